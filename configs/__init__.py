@@ -1,0 +1,1 @@
+"""Example job files for ``warpsplat batch``."""

@@ -1,0 +1,53 @@
+"""Numbers that host code, kernels and the reference renderer share, with the reason for each."""
+
+import math
+
+TILE = 16
+"""Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
+
+TILE_PIXELS = TILE * TILE
+
+GAUSSIAN_MIN = 1.0 / 255.0
+"""A Gaussian weaker than this is cut: it changes no 8-bit colour."""
+
+Q_MAX = -2.0 * math.log(GAUSSIAN_MIN)
+"""The same cut as a squared Mahalanobis distance: exp(-Q_MAX / 2) = GAUSSIAN_MIN."""
+
+GAUSSIAN_MAX = 0.99
+"""Peak of one Gaussian. Below 1 so that 1 - g can divide in the adjoint; the clamp is the same forward and
+backward, and a clamped Gaussian has no gradient."""
+
+TRANSMITTANCE_MIN = 1.0e-4
+"""A pixel that lets less light through than this is finished: what lies behind changes no 8-bit colour."""
+
+SPREAD = 2.0 / 3.0
+"""1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""
+
+PIXEL_SIGMA = 0.3
+"""Standard deviation [px] of the pixel's own filter, added in quadrature to both scales: no Gaussian falls
+between pixel centres, and an edge is about as soft as one that a viewer anti-aliases."""
+
+ROW_INSET = 0.8
+"""Distance [px] from the path of the outermost row of Gaussians. A row's half-coverage line lies outside
+the row; with this inset it lies on the path, so the splat covers what the exported path will cover."""
+
+ROW_GROWTH = 0.5
+"""Distance between rows as a fraction of the distance to the boundary: small enough that the Gaussians of
+an inner row end at the path."""
+
+COLUMN_SPACING = 4.0
+"""Largest distance [px] between samples along a curve."""
+
+COLUMN_DENSITY = 3.0
+"""Samples along a curve of length L [px]: at least this times sqrt(L). A Gaussian is straight, so on a bend
+of radius R its ends leave the curve by SPREAD^2 h^2 / R for a spacing h; with R about L / 3 this keeps it
+under a fifth of a pixel."""
+
+COLUMNS_MIN = 8
+"""Fewest samples along a curve, however small it is."""
+
+EPSILON = 1.0e-6
+"""Length [px] below which a difference vector has no direction."""
+
+INT_MAX = 2**31 - 1
+"""Sort key of an unused slot: sorts behind every tile."""

@@ -1,0 +1,184 @@
+"""Grid positions -> Gaussians (position, scale, angle, and what rasterisation needs of them), and the adjoint.
+
+With Dx the difference of neighbours along a row and Dr that across rows (central inside, one-sided at the
+border of the grid, both per one step):
+
+    scale_x = sqrt((SPREAD |Dx|)^2 + PIXEL_SIGMA^2)                      paper eq. 6
+    scale_y = sqrt((SPREAD cross(Dx, Dr) / |Dx|)^2 + PIXEL_SIGMA^2)      the part of Dr across the row
+    angle   = atan2(Dx.y, Dx.x)                                          paper eq. 7
+
+The paper takes |Dr| for scale_y. Where the grid is sheared (near the ends of a closed curve, where the
+chains run towards each other) that makes Gaussians reach far out of the shape; the perpendicular part
+does not, and covers the same cells.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+
+wp.set_module_options({"enable_backward": False})
+
+SPREAD = wp.constant(constants.SPREAD)
+PIXEL_SIGMA = wp.constant(constants.PIXEL_SIGMA)
+EPSILON = wp.constant(constants.EPSILON)
+Q_MAX = wp.constant(constants.Q_MAX)
+
+
+@wp.func
+def difference_weight(index: wp.int32, neighbour: wp.int32, count: wp.int32) -> wp.float32:
+    """Weight of position ``neighbour`` in the difference at ``index`` of ``count`` (>= 2) positions."""
+    low = wp.max(index - 1, 0)
+    high = wp.min(index + 1, count - 1)
+    weight = 1.0 / float(high - low)
+    if neighbour == high:
+        return weight
+    if neighbour == low:
+        return -weight
+    return 0.0
+
+
+@wp.func
+def difference(
+    values: wp.array[wp.vec2], i: wp.int32, stride: wp.int32, index: wp.int32, count: wp.int32
+) -> wp.vec2:
+    """Difference per step at entry ``i``, which is number ``index`` of ``count`` entries ``stride`` apart."""
+    low = wp.max(index - 1, 0)
+    high = wp.min(index + 1, count - 1)
+    return (values[i + (high - index) * stride] - values[i + (low - index) * stride]) / float(high - low)
+
+
+@wp.func
+def cross(a: wp.vec2, b: wp.vec2) -> wp.float32:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+@wp.kernel
+def gaussians_forward(
+    # In:
+    first: wp.int32,
+    gaussian_part: wp.array[wp.int32],  # [capacity] -1: unused
+    part_first: wp.array[wp.int32],  # [part_count]
+    part_columns: wp.array[wp.int32],  # [part_count]
+    part_rows: wp.array[wp.int32],  # [part_count]
+    mean: wp.array[wp.vec2],  # [capacity] px
+    # Out:
+    gaussian_scale: wp.array[wp.vec2],  # [capacity] px, standard deviations along and across the row
+    gaussian_angle: wp.array[wp.float32],  # [capacity] rad
+    conic: wp.array[wp.vec3],  # [capacity] (a, b, c) of q = a dx^2 + 2 b dx dy + c dy^2, px^-2
+    extent: wp.array[wp.vec2],  # [capacity] px, half size of the box where q <= Q_MAX
+):
+    """Scale, angle and inverse covariance (paper eq. 10 and 11) of each grid position."""
+    i = first + wp.tid()
+    part = gaussian_part[i]
+    if part < 0:
+        return
+    columns = part_columns[part]
+    index = i - part_first[part]
+    dx = difference(mean, i, 1, index % columns, columns)
+    dr = difference(mean, i, columns, index / columns, part_rows[part])
+    length = wp.length(dx)
+    e = wp.vec2(1.0, 0.0)
+    across = wp.length(dr)
+    if length >= EPSILON:
+        e = dx / length
+        across = cross(e, dr)
+    variance_x = SPREAD * SPREAD * length * length + PIXEL_SIGMA * PIXEL_SIGMA
+    variance_y = SPREAD * SPREAD * across * across + PIXEL_SIGMA * PIXEL_SIGMA
+    ix = 1.0 / variance_x
+    iy = 1.0 / variance_y
+    cc = e[0] * e[0]
+    ss = e[1] * e[1]
+    cs = e[0] * e[1]
+    gaussian_scale[i] = wp.vec2(wp.sqrt(variance_x), wp.sqrt(variance_y))
+    gaussian_angle[i] = wp.atan2(e[1], e[0])
+    conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
+    extent[i] = wp.vec2(
+        wp.sqrt(Q_MAX * (cc * variance_x + ss * variance_y)),
+        wp.sqrt(Q_MAX * (ss * variance_x + cc * variance_y)),
+    )
+
+
+@wp.kernel
+def differences_backward(
+    # In:
+    first: wp.int32,
+    gaussian_part: wp.array[wp.int32],  # [capacity]
+    part_first: wp.array[wp.int32],  # [part_count]
+    part_columns: wp.array[wp.int32],  # [part_count]
+    part_rows: wp.array[wp.int32],  # [part_count]
+    mean: wp.array[wp.vec2],  # [capacity] px
+    conic_grad: wp.array[wp.vec3],  # [capacity] (of a, b, c)
+    # Out:
+    along_grad: wp.array[wp.vec2],  # [capacity] of Dx
+    across_grad: wp.array[wp.vec2],  # [capacity] of Dr
+):
+    """From dL/d(a, b, c) through 1 / scale^2 and the angle to Dx and Dr.
+
+    With ix = scale_x^-2, iy = scale_y^-2, (c, s) the unit of Dx, n = (-s, c):
+    d ix = c^2 da + cs db + s^2 dc;  d iy = s^2 da - cs db + c^2 dc;
+    d angle = (ix - iy) (-2cs da + (c^2 - s^2) db + 2cs dc);
+    ix = 1 / (SPREAD^2 |Dx|^2 + PIXEL_SIGMA^2), so d|Dx| = -2 SPREAD^2 |Dx| ix^2 d ix, iy likewise with
+    h = n . Dr; h depends on the direction too: dh/d angle = -(c, s) . Dr.
+    """
+    i = first + wp.tid()
+    part = gaussian_part[i]
+    if part < 0:
+        return
+    along_grad[i] = wp.vec2(0.0, 0.0)
+    across_grad[i] = wp.vec2(0.0, 0.0)
+    columns = part_columns[part]
+    index = i - part_first[part]
+    dx = difference(mean, i, 1, index % columns, columns)
+    dr = difference(mean, i, columns, index / columns, part_rows[part])
+    length = wp.length(dx)
+    if length < EPSILON:
+        return
+    e = dx / length
+    n = wp.vec2(-e[1], e[0])
+    h = wp.dot(n, dr)
+    ix = 1.0 / (SPREAD * SPREAD * length * length + PIXEL_SIGMA * PIXEL_SIGMA)
+    iy = 1.0 / (SPREAD * SPREAD * h * h + PIXEL_SIGMA * PIXEL_SIGMA)
+    g = conic_grad[i]
+    cc = e[0] * e[0]
+    ss = e[1] * e[1]
+    cs = e[0] * e[1]
+    ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
+    iy_grad = ss * g[0] - cs * g[1] + cc * g[2]
+    length_grad = -2.0 * SPREAD * SPREAD * length * ix * ix * ix_grad
+    h_grad = -2.0 * SPREAD * SPREAD * h * iy * iy * iy_grad
+    angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2]) - h_grad * wp.dot(e, dr)
+    along_grad[i] = length_grad * e + (angle_grad / length) * n
+    across_grad[i] = h_grad * n
+
+
+@wp.kernel
+def positions_backward(
+    # In:
+    first: wp.int32,
+    gaussian_part: wp.array[wp.int32],  # [capacity]
+    part_first: wp.array[wp.int32],  # [part_count]
+    part_columns: wp.array[wp.int32],  # [part_count]
+    part_rows: wp.array[wp.int32],  # [part_count]
+    mean_grad: wp.array[wp.vec2],  # [capacity]
+    along_grad: wp.array[wp.vec2],  # [capacity] of Dx
+    across_grad: wp.array[wp.vec2],  # [capacity] of Dr
+    through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
+    # Out:
+    position_grad: wp.array[wp.vec2],  # [capacity] of the grid positions
+):
+    """A gather: a position counts as a mean and in the differences at its neighbours and at itself."""
+    i = first + wp.tid()
+    part = gaussian_part[i]
+    if part < 0:
+        return
+    columns = part_columns[part]
+    rows = part_rows[part]
+    column = (i - part_first[part]) % columns
+    row = (i - part_first[part]) / columns
+    total = mean_grad[i]
+    if through_scales != 0.0:
+        for k in range(wp.max(column - 1, 0), wp.min(column + 2, columns)):
+            total += difference_weight(k, column, columns) * along_grad[i + k - column]
+        for r in range(wp.max(row - 1, 0), wp.min(row + 2, rows)):
+            total += difference_weight(r, row, rows) * across_grad[i + (r - row) * columns]
+    position_grad[i] = total

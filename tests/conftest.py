@@ -1,0 +1,25 @@
+"""One suite, the device chosen outside: ``pytest --device cuda:0``; by default every device found."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+# Fixed before Warp reads it, so that kernels are compiled once and kept between runs of the suite.
+os.environ.setdefault("WARP_CACHE_PATH", str(Path(tempfile.gettempdir()) / "warpsplat-test-kernels"))
+
+import pytest
+import warp as wp
+
+wp.config.log_level = wp.LOG_ERROR
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--device", action="append", default=None, help="Warp devices to test (default: all here)")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "device" in metafunc.fixturenames:
+        names = metafunc.config.getoption("--device") or [str(d) for d in wp.get_devices()]
+        metafunc.parametrize("device", names)

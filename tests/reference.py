@@ -1,0 +1,190 @@
+"""The renderer again: plain, slow, float64, one formula after the other; gradients by torch autograd.
+
+It shares the constants and the grid plan (rows, columns, reach: integers and detached) with the kernels,
+and nothing else. Image sizes of a few dozen pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from warpsplat.kernels import constants as k
+from warpsplat.scene import Scene
+
+torch.set_default_dtype(torch.float64)
+
+
+@dataclass
+class Plan:
+    """Grid of one part."""
+
+    columns: int
+    rows: int
+    reach: float
+
+
+def tensors(scene: Scene) -> dict[str, torch.Tensor]:
+    """The scene's parameters as leaves that require gradients."""
+    names = ("points", "colors", "opacities", "widths")
+    return {name: torch.tensor(getattr(scene, name), dtype=torch.float64, requires_grad=True) for name in names}
+
+
+def bezier(p: torch.Tensor, t: torch.Tensor) -> torch.Tensor:
+    """Chain of cubics: p [3 n + 1, 2], t [m] in [0, n] -> [m, 2], by de Casteljau."""
+    n = (len(p) - 1) // 3
+    segment = torch.clamp(t.floor().long(), 0, n - 1)
+    s = (t - segment)[:, None]
+    q = [p[3 * segment + j] for j in range(4)]
+    while len(q) > 1:
+        q = [(1 - s) * a + s * b for a, b in zip(q[:-1], q[1:], strict=True)]
+    return q[0]
+
+
+def tangent(p: torch.Tensor, t: torch.Tensor) -> torch.Tensor:
+    """Derivative of ``bezier`` by t, from differences of control points."""
+    n = (len(p) - 1) // 3
+    segment = torch.clamp(t.floor().long(), 0, n - 1)
+    s = (t - segment)[:, None]
+    d = [3 * (p[3 * segment + j + 1] - p[3 * segment + j]) for j in range(3)]
+    return (1 - s) ** 2 * d[0] + 2 * s * (1 - s) * d[1] + s**2 * d[2]
+
+
+def row_positions(plan: Plan) -> torch.Tensor:
+    """u of each row: the normal cumulative distribution at equally spaced places."""
+    z = torch.linspace(-plan.reach, plan.reach, plan.rows)
+    return torch.special.ndtr(z)
+
+
+def closed_grid(points: torch.Tensor, plan: Plan) -> torch.Tensor:
+    """Grid positions of a closed curve, [rows, columns, 2] canvas units."""
+    n = len(points) // 2
+    chain_a = points[: n + 1]
+    chain_b = torch.cat([points[:1], points[n:].flip(0)])
+    t = (torch.arange(plan.columns) + 0.5) * (n // 3) / plan.columns
+    u = row_positions(plan)[:, None, None]
+    return (1 - u) * bezier(chain_a, t) + u * bezier(chain_b, t)
+
+
+def open_grid(points: torch.Tensor, width: torch.Tensor, plan: Plan, scale: float) -> torch.Tensor:
+    """Grid positions of a stroke or of one of its segments, caps included, [rows, columns, 2]."""
+    n = (len(points) - 1) // 3
+    caps = max(1, plan.rows // 2)
+    body = plan.columns - 2 * caps
+    radius = max(1 - 2 * k.ROW_INSET / (scale * float(width.detach())), 0.5)
+    angles = (torch.arange(caps) + 0.75) / caps * math.pi / 2
+    t = torch.cat([torch.zeros(caps), (torch.arange(body) + 0.5) / body, torch.ones(caps)]) * n
+    along = torch.cat([-radius * angles.flip(0).sin(), torch.zeros(body), radius * angles.sin()])
+    across = torch.cat([angles.flip(0).cos(), torch.ones(body), angles.cos()])
+    d = tangent(points, t)
+    e = d / d.norm(dim=1, keepdim=True)
+    normal = torch.stack([-e[:, 1], e[:, 0]], dim=1)
+    v = (2 * row_positions(plan) - 1)[:, None, None]
+    return bezier(points, t) + width / 2 * (along[:, None] * e + across[:, None] * v * normal)
+
+
+def differences(x: torch.Tensor) -> torch.Tensor:
+    """Central differences along the first axis, one-sided at its ends."""
+    return torch.cat([x[1:2] - x[:1], (x[2:] - x[:-2]) / 2, x[-1:] - x[-2:-1]])
+
+
+def gaussians(grid: torch.Tensor, detach: bool = False) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, columns, 2] in px."""
+    source = grid.detach() if detach else grid
+    dx = differences(source.transpose(0, 1)).transpose(0, 1)
+    dr = differences(source)
+    length = dx.norm(dim=2)
+    perpendicular = (dx[..., 0] * dr[..., 1] - dx[..., 1] * dr[..., 0]) / length
+    scale_x = torch.sqrt((k.SPREAD * length) ** 2 + k.PIXEL_SIGMA**2)
+    scale_y = torch.sqrt((k.SPREAD * perpendicular) ** 2 + k.PIXEL_SIGMA**2)
+    angle = torch.atan2(dx[..., 1], dx[..., 0])
+    return grid.reshape(-1, 2), torch.stack([scale_x, scale_y], 2).reshape(-1, 2), angle.reshape(-1)
+
+
+def pixel_centres(width: int, height: int) -> torch.Tensor:
+    """[height, width, 2]."""
+    y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
+    return torch.stack([x, y], dim=2)
+
+
+def gaussian_values(
+    mean: torch.Tensor, scale: torch.Tensor, angle: torch.Tensor, width: int, height: int
+) -> torch.Tensor:
+    """g of each Gaussian at each pixel, [n, height, width] (paper eq. 9 to 11), cut and clamped."""
+    rotation = torch.stack(
+        [torch.stack([angle.cos(), -angle.sin()], 1), torch.stack([angle.sin(), angle.cos()], 1)], 1
+    )
+    rs = rotation * scale[:, None, :]
+    inverse = torch.linalg.inv(rs @ rs.transpose(1, 2))
+    d = pixel_centres(width, height)[None] - mean[:, None, None, :]
+    q = torch.einsum("nhwi,nij,nhwj->nhw", d, inverse, d)
+    g = torch.exp(-0.5 * q).clamp(max=k.GAUSSIAN_MAX)
+    return torch.where(q <= k.Q_MAX, g, torch.zeros_like(g))
+
+
+def coverage(grid: torch.Tensor, width: int, height: int, detach: bool = False) -> torch.Tensor:
+    """1 - prod (1 - g) over a part's Gaussians, [height, width]."""
+    return 1 - torch.prod(1 - gaussian_values(*gaussians(grid, detach), width, height), dim=0)
+
+
+def composite(
+    coverages: list[torch.Tensor], colors: torch.Tensor, opacities: torch.Tensor, background: torch.Tensor
+) -> torch.Tensor:
+    """Back to front, the other way round than the kernels: C <- alpha c + (1 - alpha) C."""
+    image = background.expand(*coverages[0].shape, 3)
+    for i, cover in enumerate(coverages):
+        alpha = (opacities.reshape(-1)[i] * cover)[..., None]
+        image = alpha * colors[i // opacities.shape[1]] + (1 - alpha) * image
+    return image
+
+
+def grids(scene: Scene, p: dict[str, torch.Tensor], plans: list[Plan], scale: float) -> list[torch.Tensor]:
+    """Grid positions [px] of every part."""
+    result = []
+    opacity_count = scene.opacities.shape[1]
+    for i, plan in enumerate(plans):
+        curve, j = divmod(i, opacity_count)
+        points = p["points"][curve]
+        if scene.kind == "closed":
+            grid = closed_grid(points, plan)
+        else:
+            n = (len(points) - 1) // opacity_count
+            grid = open_grid(points[n * j : n * (j + 1) + 1], p["widths"][curve], plan, scale)
+        result.append(scale * grid)
+    return result
+
+
+def render(
+    scene: Scene,
+    p: dict[str, torch.Tensor],
+    plans: list[Plan],
+    width: int,
+    height: int,
+    scale: float = 1.0,
+    detach: bool = False,
+) -> torch.Tensor:
+    """The image, [height, width, 3]."""
+    covers = [coverage(grid, width, height, detach) for grid in grids(scene, p, plans, scale)]
+    background = torch.tensor(np.asarray(scene.background, np.float64))
+    return composite(covers, p["colors"], p["opacities"], background)
+
+
+def xing(scene: Scene, points: torch.Tensor) -> torch.Tensor:
+    """Xing loss of LIVE: mean over all cubics of the scene."""
+    closed = scene.kind == "closed"
+    count = points.shape[1] // 3
+    padded = torch.cat([points, points[:, :1]], dim=1) if closed else points
+    total = torch.zeros(())
+    for curve in padded:
+        for segment in range(count):
+            edges = torch.diff(curve[3 * segment : 3 * segment + 4], dim=0)
+
+            def sine(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+                return (a[0] * b[1] - a[1] * b[0]) / (a.norm() * b.norm())
+
+            s12, s13 = sine(edges[0], edges[1]), sine(edges[0], edges[2])
+            total = total + (torch.relu(-s13) if s12 >= 0 else torch.relu(s13))
+    return total / (len(points) * count)
