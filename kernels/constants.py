@@ -51,3 +51,7 @@ EPSILON = 1.0e-6
 
 INT_MAX = 2**31 - 1
 """Sort key of an unused slot: sorts behind every tile."""
+
+PLATEAU = 0.985
+"""Mean coverage well inside a splatted shape (its Gaussians overlap to a little less than 1). A solid path
+with this fraction of the opacity looks like the splat."""

@@ -1,0 +1,131 @@
+"""Settings of a run: the one home of every default, checked when made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, Literal
+
+from warpsplat.errors import UsageError
+from warpsplat.scene import Kind
+
+Quality = Literal["draft", "balanced", "high"]
+Order = Literal["age", "area"]
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Adam learning rates at the start, per parameter group; they decay along a cosine."""
+
+    points: float = 1.0
+    """[px of the finest training size]"""
+    colors: float = 0.02
+    """[sRGB, 0 to 1]"""
+    opacities: float = 0.02
+    widths: float = 0.15
+    """[px of the finest training size]"""
+    final: float = 0.1
+    """Fraction of each rate that is left at the end."""
+
+
+@dataclass(frozen=True)
+class Density:
+    """Pruning and densification (paper section 3.4); the count of curves stays constant."""
+
+    interval: int = 25
+    """Steps between two turns."""
+    stop: float = 0.75
+    """Fraction of the run after which the set of curves stays as it is."""
+    opacity_start: float = 0.2
+    """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""
+    opacity_end: float = 0.05
+    area: float = 6.0
+    """Prune below this area [px of the canvas, squared]."""
+    duplicate_color: float = 0.03
+    """Two curves are alike below this distance of colours ..."""
+    duplicate_overlap: float = 0.9
+    """... and above this overlap (intersection over union) of their boxes."""
+    faint_middle: float = 0.5
+    """Prune strokes whose middle opacity is further than this below both ends."""
+    replace: float = 0.03
+    """Replace at least this fraction of the curves each turn, those that show least first."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All that decides the result, besides the image."""
+
+    kind: Kind = "closed"
+    curves: int = 512
+    quality: Quality = "balanced"
+    iterations: int = 400
+    coarse: float = 0.7
+    """Fraction of the iterations on a reduced image."""
+    coarse_pixels: int = 100_000
+    """Size of that image [pixels]; a smaller image is not reduced."""
+    fine_pixels: int = 1_600_000
+    """Largest size of the image that the last iterations see [pixels]."""
+    seed: int = 0
+    chain_cubics: int = 2
+    """Cubics in each of the two chains of a closed curve."""
+    segment_opacities: bool = False
+    """Strokes with an opacity per segment (the paper's 3-opacity): each is three paths in the file."""
+    order: Order = "age"
+    """Newest in front, or smallest in front as in the paper."""
+    xing: float = 0.01
+    """Weight of the Xing loss."""
+    through_scales: bool = True
+    """Whether gradients flow through the Gaussians' scales and angles."""
+    precision: int = 1
+    """Decimals of coordinates in the file."""
+    rates: Rates = field(default_factory=Rates)
+    density: Density = field(default_factory=Density)
+
+    def __post_init__(self) -> None:
+        """Check ranges.
+
+        Raises:
+            UsageError: a value is out of its range.
+        """
+        checks = (
+            ("curves", self.curves, 1, 100_000),
+            ("iterations", self.iterations, 1, 1_000_000),
+            ("precision", self.precision, 0, 6),
+            ("seed", self.seed, 0, 2**32 - 1),
+            ("chain-cubics", self.chain_cubics, 1, 8),
+        )
+        for name, value, low, high in checks:
+            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+                raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+
+    def fingerprint(self) -> str:
+        """A short hash of all settings."""
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+PRESETS: dict[Quality, dict[str, Any]] = {
+    "draft": {"iterations": 120, "coarse": 0.9, "coarse_pixels": 50_000, "fine_pixels": 400_000},
+    "balanced": {},
+    "high": {"iterations": 1200, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
+}
+"""What each preset changes in the defaults."""
+
+QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
+
+
+def make_settings(quality: Quality = "balanced", **overrides: Any) -> Settings:
+    """The preset ``quality`` with ``overrides`` on top; overrides that are None are left out.
+
+    Raises:
+        UsageError: an unknown name or a value out of range.
+    """
+    if quality not in PRESETS:
+        raise UsageError(f"quality must be one of {', '.join(PRESETS)}, not {quality!r}")
+    known = {f.name for f in fields(Settings)}
+    given = {name: value for name, value in overrides.items() if value is not None}
+    for name in given:
+        if name not in known:
+            raise UsageError(f"unknown setting {name!r}")
+    return replace(Settings(quality=quality, **PRESETS[quality]), **given)

@@ -1,0 +1,134 @@
+"""First curves: small circles or strokes on a jittered grid, with the colours of the image."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.config import Settings
+from warpsplat.scene import OPEN_SEGMENTS, FloatArray, Scene
+
+OPACITY = 0.9
+"""Opacity of a new curve: the least that hides what it should replace, with room to move both ways."""
+
+COVER = 1.3
+"""Area of the first shapes over the area of the canvas: circles on a grid that leave few gaps."""
+
+STROKE_ASPECT = 3.0
+"""Length over width of a new stroke."""
+
+Floats = npt.NDArray[np.floating]
+
+
+def background_color(target: FloatArray) -> FloatArray:
+    """The border's colour where most of the border is alike (a drawing on paper), else the mean."""
+    border = np.concatenate([target[0], target[-1], target[:, 0], target[:, -1]])
+    median = np.median(border, axis=0)
+    alike = np.abs(border - median).max(axis=1) < 8 / 255
+    color = median if alike.mean() > 0.5 else target.mean(axis=(0, 1))
+    # As the file will have it.
+    return np.asarray(np.round(color * 255) / 255, np.float32)
+
+
+def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatArray:
+    """Circles as rings of ``2 * chain_cubics`` cubics, shape (curve, 6 * chain_cubics, 2)."""
+    count = 2 * chain_cubics
+    handle = 4 / 3 * np.tan(np.pi / (2 * count))
+    angle = 2 * np.pi * np.arange(count) / count
+    on = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    turn = np.stack([-on[:, 1], on[:, 0]], axis=1)
+    following, following_turn = np.roll(on, -1, axis=0), np.roll(turn, -1, axis=0)
+    ring = np.stack([on, on + handle * turn, following - handle * following_turn], axis=1).reshape(-1, 2)
+    return np.asarray(centres[:, None] + radii[:, None, None] * ring[None], np.float32)
+
+
+def stroke_outlines(centres: Floats, lengths: Floats, angles: Floats) -> FloatArray:
+    """Straight strokes of three cubics, shape (curve, 10, 2)."""
+    t = np.linspace(-0.5, 0.5, 3 * OPEN_SEGMENTS + 1)
+    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    along = lengths[:, None] * t[None, :]
+    return np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
+
+
+def place(
+    settings: Settings,
+    template: Scene,
+    centres: Floats,
+    areas: Floats,
+    angles: Floats,
+    colors: Floats,
+) -> Scene:
+    """New shapes of the settings' kind: ``areas`` in px squared, ``angles`` (strokes) in rad."""
+    count = len(centres)
+    if settings.kind == "closed":
+        points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
+        widths = np.zeros(count)
+    else:
+        widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
+        points = stroke_outlines(centres, np.maximum(areas / widths, 2.0), angles)
+    return Scene(
+        kind=settings.kind,
+        width=template.width,
+        height=template.height,
+        points=points,
+        colors=np.asarray(colors, np.float32).reshape(count, 3),
+        opacities=np.full((count, template.opacities.shape[1]), OPACITY, np.float32),
+        widths=np.asarray(widths, np.float32),
+        background=template.background,
+    )
+
+
+def empty_scene(settings: Settings, target: FloatArray) -> Scene:
+    """A canvas of ``target``'s size without shapes."""
+    height, width = target.shape[:2]
+    point_count = 6 * settings.chain_cubics if settings.kind == "closed" else 3 * OPEN_SEGMENTS + 1
+    opacity_count = OPEN_SEGMENTS if settings.kind == "open" and settings.segment_opacities else 1
+    return Scene(
+        kind=settings.kind,
+        width=width,
+        height=height,
+        points=np.zeros((0, point_count, 2), np.float32),
+        colors=np.zeros((0, 3), np.float32),
+        opacities=np.zeros((0, opacity_count), np.float32),
+        widths=np.zeros(0, np.float32),
+        background=background_color(target),
+    )
+
+
+def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
+    """Direction along the contours at ``centres`` [rad]: the structure tensor's lesser eigenvector."""
+    grey = target.mean(axis=2)
+    gx, gy = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
+    xx, yy, xy = (cv2.GaussianBlur(g, (0, 0), max(sigma, 0.5)) for g in (gx * gx, gy * gy, gx * gy))
+    column, row = pixel_of(centres, target)
+    gradient = 0.5 * np.arctan2(2 * xy[row, column], (xx - yy)[row, column])
+    return np.asarray(gradient + np.pi / 2, np.float32)
+
+
+def pixel_of(centres: Floats, target: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Column and row of the pixels that hold ``centres``, clamped to the image."""
+    column = np.clip(centres[:, 0].astype(np.intp), 0, target.shape[1] - 1)
+    row = np.clip(centres[:, 1].astype(np.intp), 0, target.shape[0] - 1)
+    return column, row
+
+
+def grid_scene(settings: Settings, target: FloatArray, rng: np.random.Generator) -> Scene:
+    """``settings.curves`` shapes that cover the canvas, large ones at the back left to the optimiser."""
+    template = empty_scene(settings, target)
+    height, width = target.shape[:2]
+    count = settings.curves
+    rows = max(1, min(count, round(np.sqrt(count * height / width))))
+    per_row = np.full(rows, count // rows)
+    per_row[: count % rows] += 1
+    x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
+    y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
+    cell = np.sqrt(width * height / count)
+    centres = np.stack([x, y], axis=1) + rng.uniform(-0.25, 0.25, (count, 2)) * cell
+    centres = np.clip(centres, 0, [width, height])
+    blurred = cv2.GaussianBlur(target, (0, 0), max(cell / 4, 0.5))
+    column, row = pixel_of(centres, target)
+    areas = np.full(count, COVER * cell * cell)
+    angles = contour_angles(target, centres, cell / 2)
+    scene = place(settings, template, centres, areas, angles, blurred[row, column])
+    return scene.take(rng.permutation(count))

@@ -1,0 +1,104 @@
+"""The file as a viewer shows it, and how far that is from the image.
+
+All figures are taken in 8-bit sRGB from a render by resvg, an independent renderer.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import re
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import resvg_py
+from PIL import Image
+
+from warpsplat.errors import ImageError
+
+Pixels = npt.NDArray[np.float64]
+SSIM_WINDOW = 11
+DRAWN = re.compile(rb"<(?:path|circle|ellipse|polygon|polyline|line)\b")
+
+
+def render_svg(text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None) -> Image.Image:
+    """Render SVG text with resvg, at its own size, at a size in px, or magnified by ``zoom``.
+
+    Raises:
+        ImageError: resvg does not accept the text.
+    """
+    try:
+        png = resvg_py.svg_to_bytes(svg_string=text, width=width, height=height, zoom=zoom, skip_system_fonts=True)
+    except ValueError as error:
+        raise ImageError(f"cannot be rendered: {str(error).splitlines()[0]}") from error
+    return Image.open(io.BytesIO(bytes(png)))
+
+
+def on_white(image: Image.Image) -> Pixels:
+    """RGB in 0..255, shape (height, width, 3), transparency composited on white."""
+    rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
+    alpha = rgba[..., 3:] / 255.0
+    return np.asarray(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha))
+
+
+def psnr(a: Pixels, b: Pixels) -> float:
+    """Peak signal-to-noise ratio [dB] of two arrays in 0..255; infinite where they are equal."""
+    error = float(np.mean((a - b) ** 2))
+    return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
+
+
+def ssim(a: Pixels, b: Pixels) -> float | None:
+    """Structural similarity (Wang et al. 2004), Gaussian window of 11x11, sigma 1.5, mean over channels.
+
+    None for an image smaller than the window.
+    """
+    if min(a.shape[:2]) <= SSIM_WINDOW:
+        return None
+    inner = SSIM_WINDOW // 2
+
+    def blur(x: Pixels) -> Pixels:
+        return np.asarray(cv2.GaussianBlur(x, (SSIM_WINDOW, SSIM_WINDOW), 1.5)[inner:-inner, inner:-inner])
+
+    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+    mean_a, mean_b = blur(a), blur(b)
+    var_a, var_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
+    covariance = blur(a * b) - mean_a * mean_b
+    luminance = (2 * mean_a * mean_b + c1) / (mean_a**2 + mean_b**2 + c1)
+    return float((luminance * (2 * covariance + c2) / (var_a + var_b + c2)).mean())
+
+
+@dataclass(frozen=True)
+class Score:
+    """Figures of one file against its image."""
+
+    psnr: float
+    """[dB]"""
+    ssim: float | None
+    paths: int
+    bytes: int
+    gzip_bytes: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; rounded to what the measurement is worth."""
+        values = asdict(self)
+        values["psnr"] = round(self.psnr, 3) if np.isfinite(self.psnr) else None
+        values["ssim"] = None if self.ssim is None else round(self.ssim, 4)
+        return values
+
+
+def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
+    """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare."""
+    height, width = target.shape[:2]
+    shown = on_white(render_svg(text, width=width, height=height))
+    wanted = np.round(target.astype(np.float64) * 255)
+    data = text.encode()
+    return Score(
+        psnr=psnr(shown, wanted),
+        ssim=ssim(shown, wanted),
+        paths=len(DRAWN.findall(data)),
+        bytes=len(data),
+        gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
+    )
