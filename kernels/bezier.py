@@ -30,6 +30,12 @@ def closed_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int3
 
 
 @wp.func
+def cross(a: wp.vec2, b: wp.vec2) -> wp.float32:
+    """Signed area of the parallelogram of ``a`` and ``b``."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+@wp.func
 def segment_at(t: wp.float32, segment_count: wp.int32) -> wp.int32:
     """Segment that holds parameter ``t`` in [0, segment_count] of a chain."""
     return wp.clamp(int(wp.floor(t)), 0, segment_count - 1)

@@ -15,6 +15,7 @@ does not, and covers the same cells.
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.bezier import cross
 
 wp.set_module_options({"enable_backward": False})
 
@@ -45,11 +46,6 @@ def difference(
     low = wp.max(index - 1, 0)
     high = wp.min(index + 1, count - 1)
     return (values[i + (high - index) * stride] - values[i + (low - index) * stride]) / float(high - low)
-
-
-@wp.func
-def cross(a: wp.vec2, b: wp.vec2) -> wp.float32:
-    return a[0] * b[1] - a[1] * b[0]
 
 
 @wp.kernel
@@ -108,6 +104,9 @@ def differences_backward(
     part_rows: wp.array[wp.int32],  # [part_count]
     mean: wp.array[wp.vec2],  # [capacity] px
     conic_grad: wp.array[wp.vec3],  # [capacity] (of a, b, c)
+    through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
+    part_sign: wp.array[wp.float32],  # [part_count] orientation of the outline; 0: may fold
+    fold_factor: wp.float32,  # weight of the folded area [per px squared]
     # Out:
     along_grad: wp.array[wp.vec2],  # [capacity] of Dx
     across_grad: wp.array[wp.vec2],  # [capacity] of Dr
@@ -119,6 +118,10 @@ def differences_backward(
     d angle = (ix - iy) (-2cs da + (c^2 - s^2) db + 2cs dc);
     ix = 1 / (SPREAD^2 |Dx|^2 + PIXEL_SIGMA^2), so d|Dx| = -2 SPREAD^2 |Dx| ix^2 d ix, iy likewise with
     h = n . Dr; h depends on the direction too: dh/d angle = -(c, s) . Dr.
+
+    And from the fold loss, fold_factor * sum relu(-sign J) over grid points, J = cross(Dx, Dr) their cell's
+    signed area: where the strip between the chains folds over, its cells turn round and splats cover what
+    the path does not.
     """
     i = first + wp.tid()
     part = gaussian_part[i]
@@ -138,7 +141,7 @@ def differences_backward(
     h = wp.dot(n, dr)
     ix = 1.0 / (SPREAD * SPREAD * length * length + PIXEL_SIGMA * PIXEL_SIGMA)
     iy = 1.0 / (SPREAD * SPREAD * h * h + PIXEL_SIGMA * PIXEL_SIGMA)
-    g = conic_grad[i]
+    g = through_scales * conic_grad[i]
     cc = e[0] * e[0]
     ss = e[1] * e[1]
     cs = e[0] * e[1]
@@ -147,8 +150,14 @@ def differences_backward(
     length_grad = -2.0 * SPREAD * SPREAD * length * ix * ix * ix_grad
     h_grad = -2.0 * SPREAD * SPREAD * h * iy * iy * iy_grad
     angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2]) - h_grad * wp.dot(e, dr)
-    along_grad[i] = length_grad * e + (angle_grad / length) * n
-    across_grad[i] = h_grad * n
+    along = length_grad * e + (angle_grad / length) * n
+    across = h_grad * n
+    sign = part_sign[part]
+    if sign * h < 0.0:
+        along -= fold_factor * sign * wp.vec2(dr[1], -dr[0])
+        across -= fold_factor * sign * wp.vec2(-dx[1], dx[0])
+    along_grad[i] = along
+    across_grad[i] = across
 
 
 @wp.kernel
@@ -162,7 +171,6 @@ def positions_backward(
     mean_grad: wp.array[wp.vec2],  # [capacity]
     along_grad: wp.array[wp.vec2],  # [capacity] of Dx
     across_grad: wp.array[wp.vec2],  # [capacity] of Dr
-    through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
     # Out:
     position_grad: wp.array[wp.vec2],  # [capacity] of the grid positions
 ):
@@ -176,9 +184,8 @@ def positions_backward(
     column = (i - part_first[part]) % columns
     row = (i - part_first[part]) / columns
     total = mean_grad[i]
-    if through_scales != 0.0:
-        for k in range(wp.max(column - 1, 0), wp.min(column + 2, columns)):
-            total += difference_weight(k, column, columns) * along_grad[i + k - column]
-        for r in range(wp.max(row - 1, 0), wp.min(row + 2, rows)):
-            total += difference_weight(r, row, rows) * across_grad[i + (r - row) * columns]
+    for k in range(wp.max(column - 1, 0), wp.min(column + 2, columns)):
+        total += difference_weight(k, column, columns) * along_grad[i + k - column]
+    for r in range(wp.max(row - 1, 0), wp.min(row + 2, rows)):
+        total += difference_weight(r, row, rows) * across_grad[i + (r - row) * columns]
     position_grad[i] = total

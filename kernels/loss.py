@@ -3,7 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.gaussian import cross
+from warpsplat.kernels.bezier import cross
 
 wp.set_module_options({"enable_backward": False})
 

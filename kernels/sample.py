@@ -13,6 +13,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import (
     closed_index,
+    cross,
     cubic_tangent_weights,
     cubic_weights,
     find_range,
@@ -89,6 +90,7 @@ def plan_closed(
     part_rows: wp.array[wp.int32],  # [part_count]
     part_reach: wp.array[wp.float32],  # [part_count]
     part_gaussians: wp.array[wp.int32],  # [part_count] columns x rows
+    part_sign: wp.array[wp.float32],  # [part_count] 1 or -1, the orientation of the outline
 ):
     """Grid size from the longer chain and the mean width of the strip."""
     part = first + wp.tid()
@@ -99,6 +101,7 @@ def plan_closed(
     length_a = float(0.0)
     length_b = float(0.0)
     width = float(0.0)
+    doubled_area = float(0.0)
     for i in range(1, count + 1):
         t = float(i) / float(PLAN_SAMPLES)
         a1 = scale * chain_point(points, part, 0, t, segment_count)
@@ -106,6 +109,7 @@ def plan_closed(
         length_a += wp.length(a1 - a0)
         length_b += wp.length(b1 - b0)
         width += wp.length(a1 - b1)
+        doubled_area += cross(a0, a1) - cross(b0, b1)
         a0 = a1
         b0 = b1
     rows = row_plan(width / float(count))
@@ -114,6 +118,7 @@ def plan_closed(
     part_rows[part] = int(rows[0])
     part_reach[part] = rows[1]
     part_gaussians[part] = columns * int(rows[0])
+    part_sign[part] = wp.sign(doubled_area)
 
 
 @wp.kernel

@@ -104,6 +104,13 @@ def gaussians(grid: torch.Tensor, detach: bool = False) -> tuple[torch.Tensor, t
     return grid.reshape(-1, 2), torch.stack([scale_x, scale_y], 2).reshape(-1, 2), angle.reshape(-1)
 
 
+def fold_area(grid: torch.Tensor, sign: float) -> torch.Tensor:
+    """Area of the grid's cells that are turned round against ``sign`` [px squared]."""
+    dx = differences(grid.transpose(0, 1)).transpose(0, 1)
+    dr = differences(grid)
+    return torch.relu(-sign * (dx[..., 0] * dr[..., 1] - dx[..., 1] * dr[..., 0])).sum()
+
+
 def pixel_centres(width: int, height: int) -> torch.Tensor:
     """[height, width, 2]."""
     y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")

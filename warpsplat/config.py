@@ -75,6 +75,8 @@ class Settings:
     """Newest in front, or smallest in front as in the paper."""
     xing: float = 0.01
     """Weight of the Xing loss."""
+    fold: float = 0.1
+    """Weight of the fold loss: the area where a closed curve's strip folds over itself."""
     through_scales: bool = True
     """Whether gradients flow through the Gaussians' scales and angles."""
     precision: int = 1

@@ -34,6 +34,8 @@ class Capacity:
 class SplatRenderer:
     """Renders ``parameters`` at ``width`` x ``height`` px, ``scale`` px per canvas unit; and the adjoint.
 
+    ``through_scales``: whether gradients flow through the Gaussians' scales and angles. ``fold``: weight of
+    the fold loss (closed curves; the folded fraction of the canvas), which ``backward`` adds.
     Nothing is allocated and nothing is copied to the host between ``forward`` and ``backward``. A scene
     that needs more than the capacity is rendered without the parts that do not fit; ``grow`` reports it.
     """
@@ -47,12 +49,13 @@ class SplatRenderer:
         *,
         threads: int | None = None,
         through_scales: bool = True,
+        fold: float = 0.0,
         capacity: Capacity | None = None,
     ) -> None:
         self.parameters = parameters
         self.width, self.height, self.scale = width, height, scale
         self.device = parameters.device
-        self.through_scales = through_scales
+        self.through_scales, self.fold = through_scales, fold
         self._threads = threads
         self.tiles_x = -(-width // TILE)
         self.tiles_y = -(-height // TILE)
@@ -96,7 +99,7 @@ class SplatRenderer:
         parts, gaussians, slots = self.parameters.part_count, self.capacity.gaussians, self.capacity.slots
         tiles = self.tiles_x * self.tiles_y
         self.part_columns, self.part_rows, self.part_gaussians = ints(parts), ints(parts), ints(parts)
-        self.part_reach = floats(parts)
+        self.part_reach, self.part_sign = floats(parts), floats(parts)
         self.part_ends, self.part_first, self.part_last = ints(parts), ints(parts), ints(parts)
         self.part_tiles = ints(parts, 4)
         self.front_slots, self.front_ends = ints(parts), ints(parts)
@@ -125,7 +128,7 @@ class SplatRenderer:
         plan = [self.part_columns, self.part_rows, self.part_reach]
         ranges = [self.part_ends, self.part_first, self.part_last, *plan]
         if p.kind == "closed":
-            program.add(sample.plan_closed, parts, [p.points, self.scale], [*plan, self.part_gaussians])
+            program.add(sample.plan_closed, parts, [p.points, self.scale], [*plan, self.part_gaussians, self.part_sign])
         else:
             program.add(
                 sample.plan_open,
@@ -230,14 +233,15 @@ class SplatRenderer:
         program.add(
             gaussian.differences_backward,
             gaussians,
-            [*grid, self.mean, self.conic_grad],
+            [*grid, self.mean, self.conic_grad, float(self.through_scales), self.part_sign]
+            + [self.fold / (self.width * self.height)],
             [self.along_grad, self.across_grad],
             split=True,
         )
         program.add(
             gaussian.positions_backward,
             gaussians,
-            [*grid, self.mean_grad, self.along_grad, self.across_grad, float(self.through_scales)],
+            [*grid, self.mean_grad, self.along_grad, self.across_grad],
             [self.position_grad],
             split=True,
         )

@@ -108,6 +108,7 @@ class Trainer:
             self.scale,
             threads=self.threads,
             through_scales=self.settings.through_scales,
+            fold=self.settings.fold,
             capacity=previous.capacity if previous else None,
         )
         if previous is None:
