@@ -1,7 +1,6 @@
 """Grid positions -> Gaussians (position, scale, angle, and what rasterisation needs of them), and the adjoint.
 
-With Dx the difference of neighbours along a row and Dr that across rows (central inside, one-sided at the
-border of the grid, both per one step):
+With Dx the central difference of neighbours along a row and Dr that across rows:
 
     scale_x = sqrt((SPREAD |Dx|)^2 + PIXEL_SIGMA^2)                      paper eq. 6
     scale_y = sqrt((SPREAD cross(Dx, Dr) / |Dx|)^2 + PIXEL_SIGMA^2)      the part of Dr across the row
@@ -28,24 +27,24 @@ Q_MAX = wp.constant(constants.Q_MAX)
 @wp.func
 def difference_weight(index: wp.int32, neighbour: wp.int32, count: wp.int32) -> wp.float32:
     """Weight of position ``neighbour`` in the difference at ``index`` of ``count`` (>= 2) positions."""
-    low = wp.max(index - 1, 0)
-    high = wp.min(index + 1, count - 1)
-    weight = 1.0 / float(high - low)
-    if neighbour == high:
-        return weight
-    if neighbour == low:
-        return -weight
-    return 0.0
+    weight = float(0.0)
+    if neighbour == wp.min(index + 1, count - 1):
+        weight += 0.5
+    if neighbour == wp.max(index - 1, 0):
+        weight -= 0.5
+    return weight
 
 
 @wp.func
 def difference(
     values: wp.array[wp.vec2], i: wp.int32, stride: wp.int32, index: wp.int32, count: wp.int32
 ) -> wp.vec2:
-    """Difference per step at entry ``i``, which is number ``index`` of ``count`` entries ``stride`` apart."""
+    """Central difference at entry ``i``, which is number ``index`` of ``count`` entries ``stride`` apart. At an
+    end the entry stands for its missing neighbour: the last Gaussians reach half as far out.
+    """
     low = wp.max(index - 1, 0)
     high = wp.min(index + 1, count - 1)
-    return (values[i + (high - index) * stride] - values[i + (low - index) * stride]) / float(high - low)
+    return 0.5 * (values[i + (high - index) * stride] - values[i + (low - index) * stride])
 
 
 @wp.kernel

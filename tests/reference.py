@@ -87,8 +87,9 @@ def open_grid(points: torch.Tensor, width: torch.Tensor, plan: Plan, scale: floa
 
 
 def differences(x: torch.Tensor) -> torch.Tensor:
-    """Central differences along the first axis, one-sided at its ends."""
-    return torch.cat([x[1:2] - x[:1], (x[2:] - x[:-2]) / 2, x[-1:] - x[-2:-1]])
+    """Central differences along the first axis; at an end the entry stands for its missing neighbour."""
+    padded = torch.cat([x[:1], x, x[-1:]])
+    return (padded[2:] - padded[:-2]) / 2
 
 
 def gaussians(grid: torch.Tensor, detach: bool = False) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -75,8 +75,10 @@ class Settings:
     """Newest in front, or smallest in front as in the paper."""
     xing: float = 0.01
     """Weight of the Xing loss."""
-    fold: float = 0.1
-    """Weight of the fold loss: the area where a closed curve's strip folds over itself."""
+    fold_start: float = 0.2
+    """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
+    grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
+    fold_end: float = 3.0
     through_scales: bool = True
     """Whether gradients flow through the Gaussians' scales and angles."""
     precision: int = 1
@@ -100,6 +102,10 @@ class Settings:
         for name, value, low, high in checks:
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+        choices = (("kind", self.kind, ("closed", "open")), ("order", self.order, ("age", "area")))
+        for name, choice, allowed in choices:
+            if choice not in allowed:
+                raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
 
     def fingerprint(self) -> str:
         """A short hash of all settings."""

@@ -51,7 +51,9 @@ def duplicates(scene: Scene, density: Density) -> BoolArray:
 def prune_mask(scene: Scene, density: Density, progress: float) -> BoolArray:
     """True for the curves to remove: faint, tiny, doubled, or a stroke that fades in its middle."""
     doomed = scene.opacities.max(axis=1) < opacity_threshold(density, progress)
-    doomed |= scene.areas() < density.area
+    # A small canvas with many curves has no room for curves of the usual least area.
+    share = scene.width * scene.height / max(len(scene), 1)
+    doomed |= scene.areas() < min(density.area, 0.1 * share)
     doomed |= ~np.isfinite(scene.points).all(axis=(1, 2))
     doomed |= duplicates(scene, density)
     if scene.opacities.shape[1] > 1:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import gzip
 import io
 import re
+import zlib
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -102,3 +104,41 @@ def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
         bytes=len(data),
         gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
     )
+
+
+def read_svg_text(path: Path) -> str:
+    """Text of an SVG file, gzipped (``.svgz``) or not.
+
+    Raises:
+        ImageError: missing, unreadable or not text.
+    """
+    try:
+        data = path.read_bytes()
+        if data[:2] == b"\x1f\x8b":
+            data = gzip.decompress(data)
+        return data.decode("utf-8")
+    except FileNotFoundError:
+        raise ImageError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise ImageError(f"{path}: is a folder, not an SVG") from None
+    except PermissionError:
+        raise ImageError(f"{path}: no permission to read it") from None
+    except (UnicodeDecodeError, OSError, EOFError, zlib.error):
+        raise ImageError(f"{path}: not an SVG") from None
+
+
+def svg_size(text: str, path: Path) -> tuple[int, int]:
+    """Size [px] at which a viewer shows an SVG.
+
+    Raises:
+        ImageError: not an SVG; the message names ``path``.
+    """
+    try:
+        # resvg knows every way of giving a size; a probe that keeps the proportions is cheap.
+        wide = render_svg(text, width=64)
+        own = re.search(r"<svg\b[^>]*?\swidth=[\"']([\d.]+)(?:px)?[\"']", text)
+        box = re.search(r"<svg\b[^>]*?\sviewBox=[\"'][-\d.]+[ ,]+[-\d.]+[ ,]+([\d.]+)", text)
+    except ImageError as error:
+        raise ImageError(f"{path}: {error}") from error
+    width = float(own[1]) if own else float(box[1]) if box else 100.0
+    return max(1, round(width)), max(1, round(width * wide.height / wide.width))

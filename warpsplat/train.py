@@ -79,6 +79,7 @@ class Trainer:
         self.clock = wp.zeros(1, dtype=wp.int32, device=device)
         self.loss = wp.zeros(1, dtype=wp.float32, device=device)
         self.renderer: SplatRenderer | None = None
+        self.measure: Program | None = None
         self.update: Program | None = None
         self.overflows = 0
         self.step = 0
@@ -99,6 +100,7 @@ class Trainer:
 
     def _record(self, width: int, height: int, previous: SplatRenderer | None) -> None:
         """Record the launches of a step anew: the arrays they use have changed."""
+        s = self.settings
         if self.renderer:
             self.renderer.close()
         self.renderer = SplatRenderer(
@@ -107,12 +109,13 @@ class Trainer:
             height,
             self.scale,
             threads=self.threads,
-            through_scales=self.settings.through_scales,
-            fold=self.settings.fold,
+            through_scales=s.through_scales,
+            fold=s.fold_start * (s.fold_end / s.fold_start) ** (self.step / s.iterations),
             capacity=previous.capacity if previous else None,
         )
         if previous is None:
             self.renderer.forward_complete()
+        self.measure = self._record_loss()
         self.update = self._record_update()
 
     def _record_update(self) -> Program:
@@ -147,12 +150,12 @@ class Trainer:
             )
         return program
 
-    def _loss_program(self) -> Program:
+    def _record_loss(self) -> Program:
         assert self.renderer
         r = self.renderer
-        program = Program(self.device, self.threads)
+        program = Program(self.device, 1)
         program.add(
-            loss.l2_loss, r.height, [r.image, self.device_target], [r.image_grad, self.row_loss], split=True
+            loss.l2_loss, r.height, [r.image, self.device_target], [r.image_grad, self.row_loss]
         )
         program.add(loss.sum_rows, 1, [self.row_loss, r.width], [self.loss])
         return program
@@ -171,36 +174,46 @@ class Trainer:
             added = densify(s, scene, self.small, self.renderer.image.numpy(), len(gone), self.rng)
             self.parameters.rearrange(keep, added)
         if s.order == "area":
-            order = np.argsort(-self.scene().areas(), kind="stable")
-            self.parameters.rearrange(order, added.take(np.arange(0)) if len(gone) else scene.take(order[:0]))
+            scene = self.scene()
+            self.parameters.rearrange(np.argsort(-scene.areas(), kind="stable"), scene.take(np.arange(0)))
         self._record(self.renderer.width, self.renderer.height, self.renderer)
 
-    def run(self, report: Callable[[Progress], None] | None = None) -> Scene:
-        """All phases; ``report`` is called between steps, every few.
+    def psnr(self) -> float:
+        """Of the render in the last step, at its size [dB]. Reads one number back from the device."""
+        return -10 * math.log10(max(float(self.loss.numpy()[0]), 1e-12))
 
-        An exception out of ``report`` (Ctrl-C among them) leaves the scene as it stands.
+    def close(self) -> None:
+        """End the threads of the recorded launches."""
+        if self.renderer:
+            self.renderer.close()
+
+    def run(
+        self, report: Callable[[Progress], None] | None = None, stop: Callable[[], bool] | None = None
+    ) -> Scene:
+        """All phases. ``report`` is called every few steps; ``stop`` is asked after every step and ends the
+        run early.
         """
         started = time.monotonic()
         s = self.settings
         for phase in phases(s, self.width, self.height):
             self._enter(phase)
-            measure = self._loss_program()
             for _ in range(phase.steps):
-                assert self.renderer and self.update
+                assert self.renderer and self.measure and self.update
                 self.renderer.forward()
-                measure.run()
+                self.measure.run()
                 self.renderer.backward()
                 self.update.run()
                 self.step += 1
                 if self.step % CHECK_INTERVAL == 0 or self.step == s.iterations:
                     if self.renderer.grow():
                         self.overflows += 1
-                        measure = self._loss_program()
+                        self.measure = self._record_loss()
                     if report:
-                        psnr = -10 * math.log10(max(float(self.loss.numpy()[0]), 1e-12))
-                        report(Progress(self.step, s.iterations, psnr, time.monotonic() - started))
+                        seconds = time.monotonic() - started
+                        report(Progress(self.step, s.iterations, self.psnr(), seconds))
+                if stop and stop():
+                    return self.scene()
                 due = s.density.interval > 0 and self.step % s.density.interval == 0
                 if due and self.step < s.density.stop * s.iterations:
                     self._surgery(self.step / s.iterations)
-                    measure = self._loss_program()
         return self.scene()

@@ -1,0 +1,5 @@
+"""``python -m warpsplat.cli``."""
+
+from warpsplat.cli.main import main
+
+main()

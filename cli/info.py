@@ -1,0 +1,40 @@
+"""``warpsplat info``."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+
+
+@click.command("info", context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(as_json: bool) -> None:
+    """Show the version, the devices and where compiled kernels are kept."""
+    import os
+    import platform
+
+    import warp as wp
+
+    from warpsplat import __version__
+    from warpsplat.device import choose_device, start_warp
+
+    start_warp()
+    values: dict[str, Any] = {
+        "warpsplat": __version__,
+        "warp": wp.__version__,
+        "python": platform.python_version(),
+        "cpu_threads": os.cpu_count(),
+        "devices": [{"name": str(d), "description": d.name} for d in wp.get_devices()],
+        "default_device": str(choose_device("auto")),
+        "kernel_cache": str(wp.config.kernel_cache_dir),
+    }
+    if as_json:
+        click.echo(json.dumps(values))
+        return
+    click.echo(f"warpsplat {values['warpsplat']}, Warp {values['warp']}, Python {values['python']}")
+    for found in values["devices"]:
+        mark = "  (default)" if found["name"] == values["default_device"] else ""
+        click.echo(f"  {found['name']:8} {found['description']}{mark}")
+    click.echo(f"  {values['cpu_threads']} CPU threads; compiled kernels in {values['kernel_cache']}")

@@ -1,0 +1,57 @@
+"""Options that commands share. Defaults are those of ``warpsplat.config``: an option not given is None."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from warpsplat.config import QUALITIES, Settings, make_settings
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+_defaults = Settings()
+
+
+def quality_options(function: Function) -> Function:
+    """What decides the result."""
+    options = [
+        click.option("--curves", type=int, metavar="N", help=f"Number of shapes.  [default: {_defaults.curves}]"),
+        click.option("--closed", "kind", flag_value="closed", help="Filled shapes.  [default]"),
+        click.option("--open", "kind", flag_value="open", help="Strokes."),
+        click.option(
+            "--quality", type=click.Choice(QUALITIES), help=f"Effort.  [default: {_defaults.quality}]"
+        ),
+        click.option("--iterations", type=int, metavar="N", help="Steps; overrides the effort's number."),
+        click.option("--seed", type=int, metavar="N", help=f"Random seed.  [default: {_defaults.seed}]"),
+        click.option(
+            "--precision", type=int, metavar="N", help=f"Decimals of coordinates.  [default: {_defaults.precision}]"
+        ),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def run_options(function: Function) -> Function:
+    """What does not change the result."""
+    options = [
+        click.option(
+            "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
+        ),
+        click.option("-v", "--verbose", count=True, help="Say more, on stderr."),
+        click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def settings_from(given: dict[str, Any]) -> Settings:
+    """Settings from options; those not given come from the preset.
+
+    Raises:
+        UsageError: a value is out of range.
+    """
+    quality = given.pop("quality", None) or _defaults.quality
+    return make_settings(quality, **given)

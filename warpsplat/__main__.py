@@ -1,0 +1,5 @@
+"""``python -m warpsplat``."""
+
+from warpsplat.cli.main import main
+
+main()
