@@ -55,6 +55,7 @@ def gaussians_forward(
     part_first: wp.array[wp.int32],  # [part_count]
     part_columns: wp.array[wp.int32],  # [part_count]
     part_rows: wp.array[wp.int32],  # [part_count]
+    runs: wp.int32,  # stretches of columns without neighbours in one another: the segments of a stroke
     mean: wp.array[wp.vec2],  # [capacity] px
     # Out:
     gaussian_scale: wp.array[wp.vec2],  # [capacity] px, standard deviations along and across the row
@@ -69,7 +70,7 @@ def gaussians_forward(
         return
     columns = part_columns[part]
     index = i - part_first[part]
-    dx = difference(mean, i, 1, index % columns, columns)
+    dx = difference(mean, i, 1, (index % columns) % (columns / runs), columns / runs)
     dr = difference(mean, i, columns, index / columns, part_rows[part])
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
@@ -101,6 +102,7 @@ def differences_backward(
     part_first: wp.array[wp.int32],  # [part_count]
     part_columns: wp.array[wp.int32],  # [part_count]
     part_rows: wp.array[wp.int32],  # [part_count]
+    runs: wp.int32,  # stretches of columns without neighbours in one another: the segments of a stroke
     mean: wp.array[wp.vec2],  # [capacity] px
     conic_grad: wp.array[wp.vec3],  # [capacity] (of a, b, c)
     through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
@@ -130,7 +132,7 @@ def differences_backward(
     across_grad[i] = wp.vec2(0.0, 0.0)
     columns = part_columns[part]
     index = i - part_first[part]
-    dx = difference(mean, i, 1, index % columns, columns)
+    dx = difference(mean, i, 1, (index % columns) % (columns / runs), columns / runs)
     dr = difference(mean, i, columns, index / columns, part_rows[part])
     length = wp.length(dx)
     if length < EPSILON:
@@ -167,6 +169,7 @@ def positions_backward(
     part_first: wp.array[wp.int32],  # [part_count]
     part_columns: wp.array[wp.int32],  # [part_count]
     part_rows: wp.array[wp.int32],  # [part_count]
+    runs: wp.int32,  # stretches of columns without neighbours in one another: the segments of a stroke
     mean_grad: wp.array[wp.vec2],  # [capacity]
     along_grad: wp.array[wp.vec2],  # [capacity] of Dx
     across_grad: wp.array[wp.vec2],  # [capacity] of Dr
@@ -183,8 +186,10 @@ def positions_backward(
     column = (i - part_first[part]) % columns
     row = (i - part_first[part]) / columns
     total = mean_grad[i]
-    for k in range(wp.max(column - 1, 0), wp.min(column + 2, columns)):
-        total += difference_weight(k, column, columns) * along_grad[i + k - column]
+    run = columns / runs
+    column = column % run
+    for k in range(wp.max(column - 1, 0), wp.min(column + 2, run)):
+        total += difference_weight(k, column, run) * along_grad[i + k - column]
     for r in range(wp.max(row - 1, 0), wp.min(row + 2, rows)):
         total += difference_weight(r, row, rows) * across_grad[i + (r - row) * columns]
     position_grad[i] = total

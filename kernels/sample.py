@@ -1,8 +1,9 @@
 """Curves -> grid positions, and the adjoint.
 
 A closed curve is a strip between its two chains: row ``r`` lies at the fraction ``u_r`` of the way from
-chain 0 to chain 1 (paper eq. 4). An open curve is a strip too, between its two offset lines at half the
-stroke width, with half discs at the ends, because that is what an SVG stroke with round caps covers.
+chain 0 to chain 1 (paper eq. 4). Each segment of an open curve is a strip too, between its two offset lines at half the
+stroke width, with half discs at both ends: together they cover what an SVG stroke with round caps and
+round joins covers, cusps included.
 
 ``u_r = Phi(z_r)`` for equally spaced ``z_r`` in [-reach, reach], Phi the normal cumulative distribution:
 rows crowd towards the boundary. ``reach`` puts the outermost row ROW_INSET inside the path.
@@ -135,24 +136,25 @@ def plan_open(
     part_reach: wp.array[wp.float32],  # [part_count]
     part_gaussians: wp.array[wp.int32],  # [part_count] columns x rows
 ):
-    """Grid size from the stroke's length and width; the columns include both caps."""
+    """Grid size from the stroke's width and its longest segment; the columns include the caps."""
     part = first + wp.tid()
     curve = part / opacity_count
     segment_count = (points.shape[1] - 1) / (3 * opacity_count)
     base = (part % opacity_count) * segment_count
-    before = scale * points[curve, 3 * base]
-    length = float(0.0)
-    for i in range(1, PLAN_SAMPLES * segment_count + 1):
-        t = float(i) / float(PLAN_SAMPLES)
-        segment = segment_at(t, segment_count)
-        weights = cubic_weights(t - float(segment))
-        here = wp.vec2(0.0, 0.0)
-        for j in range(4):
-            here += scale * weights[j] * points[curve, 3 * (base + segment) + j]
-        length += wp.length(here - before)
-        before = here
+    longest = float(0.0)
+    for segment in range(segment_count):
+        before = scale * points[curve, 3 * (base + segment)]
+        length = float(0.0)
+        for i in range(1, PLAN_SAMPLES + 1):
+            weights = cubic_weights(float(i) / float(PLAN_SAMPLES))
+            here = wp.vec2(0.0, 0.0)
+            for j in range(4):
+                here += scale * weights[j] * points[curve, 3 * (base + segment) + j]
+            length += wp.length(here - before)
+            before = here
+        longest = wp.max(longest, length)
     rows = row_plan(scale * widths[curve])
-    columns = column_plan(length) + 2 * cap_plan(int(rows[0]))
+    columns = segment_count * (column_plan(longest) + 2 * cap_plan(int(rows[0])))
     part_columns[part] = columns
     part_rows[part] = int(rows[0])
     part_reach[part] = rows[1]
@@ -294,8 +296,8 @@ def points_closed_backward(
 
 @wp.func
 def open_column(column: wp.int32, columns: wp.int32, rows: wp.int32, width: wp.float32) -> wp.vec3:
-    """(t / segment_count, along, across) of a stroke's column: in a cap ``t`` is an end and ``along`` the
-    distance beyond it in half widths; ``across`` shrinks with the cap's circle.
+    """(t, along, across) of column ``column`` of the ``columns`` of one segment: in a cap ``t`` is 0 or 1 and
+    ``along`` the distance beyond that end in half widths; ``across`` shrinks with the cap's circle.
     """
     caps = cap_plan(rows)
     # A cap's last Gaussians stay as far inside the circle as the outermost rows inside the sides.
@@ -319,16 +321,14 @@ def unit_tangent(tangent: wp.vec2) -> wp.vec2:
 
 
 @wp.func
-def open_tangent(
-    points: wp.array2d[wp.vec2], curve: wp.int32, base: wp.int32, t: wp.float32, segment_count: wp.int32
+def weighted_point(
+    points: wp.array2d[wp.vec2], curve: wp.int32, point: wp.int32, weights: wp.vec4
 ) -> wp.vec2:
-    """B'(t), canvas units. At an end where two control points coincide it is 0 and has no direction."""
-    segment = segment_at(t, segment_count)
-    weights = cubic_tangent_weights(t - float(segment))
-    tangent = wp.vec2(0.0, 0.0)
+    """Weighted sum of the four control points from ``point`` on, canvas units."""
+    total = wp.vec2(0.0, 0.0)
     for j in range(4):
-        tangent += weights[j] * points[curve, 3 * (base + segment) + j]
-    return tangent
+        total += weights[j] * points[curve, point + j]
+    return total
 
 
 @wp.kernel
@@ -351,7 +351,7 @@ def points_open_forward(
     mean: wp.array[wp.vec2],  # [capacity] px
 ):
     """X(r, k) = B(t_k) + width / 2 (along_k e_k + across_k (2 u_r - 1) n_k), e the unit tangent, n = e
-    turned by a right angle.
+    turned by a right angle. A tangent of length 0 (coinciding control points) counts as (1, 0).
     """
     i = first + wp.tid()
     part = find_range(part_ends, part_ends.shape[0], i)
@@ -367,14 +367,11 @@ def points_open_forward(
     curve = part / opacity_count
     segment_count = (points.shape[1] - 1) / (3 * opacity_count)
     base = (part % opacity_count) * segment_count
-    place = open_column(column, columns, rows, scale * widths[curve])
-    t = place[0] * float(segment_count)
-    segment = segment_at(t, segment_count)
-    weights = cubic_weights(t - float(segment))
-    centre = wp.vec2(0.0, 0.0)
-    for j in range(4):
-        centre += weights[j] * points[curve, 3 * (base + segment) + j]
-    e = unit_tangent(open_tangent(points, curve, base, t, segment_count))
+    run = columns / segment_count
+    place = open_column(column % run, run, rows, scale * widths[curve])
+    point = 3 * (base + column / run)
+    centre = weighted_point(points, curve, point, cubic_weights(place[0]))
+    e = unit_tangent(weighted_point(points, curve, point, cubic_tangent_weights(place[0])))
     u = row_position(row, rows, part_reach[part])
     offset = place[1] * e + place[2] * (2.0 * u - 1.0) * wp.vec2(-e[1], e[0])
     gaussian_part[i] = part
@@ -415,9 +412,10 @@ def columns_open_backward(
     curve = part / opacity_count
     segment_count = (points.shape[1] - 1) / (3 * opacity_count)
     base = (part % opacity_count) * segment_count
-    place = open_column(column, columns, rows, scale * widths[curve])
-    t = place[0] * float(segment_count)
-    tangent = open_tangent(points, curve, base, t, segment_count)
+    run = columns / segment_count
+    place = open_column(column % run, run, rows, scale * widths[curve])
+    point = 3 * (base + column / run)
+    tangent = weighted_point(points, curve, point, cubic_tangent_weights(place[0]))
     e = unit_tangent(tangent)
     centre_grad = wp.vec2(0.0, 0.0)
     e_grad = wp.vec2(0.0, 0.0)
@@ -462,24 +460,19 @@ def points_open_backward(
     segment_count = (points_grad.shape[1] - 1) / (3 * opacity_count)
     total = wp.vec2(0.0, 0.0)
     width_total = float(0.0)
-    for j in range(opacity_count):
-        part = curve * opacity_count + j
+    for opacity in range(opacity_count):
+        part = curve * opacity_count + opacity
         start = part_first[part]
         if part_last[part] > start:
             columns = part_columns[part]
-            index = point - 3 * segment_count * j
+            index = point - 3 * segment_count * opacity
+            run = columns / segment_count
             for column in range(columns):
-                if index >= 0 and index <= 3 * segment_count:
-                    place = open_column(column, columns, part_rows[part], scale * widths[curve])
-                    t = place[0] * float(segment_count)
-                    segment = segment_at(t, segment_count)
-                    if index >= 3 * segment and index <= 3 * segment + 3:
-                        local = t - float(segment)
-                        total += local_weight(cubic_weights(local), segment, index) * column_grad[start + column]
-                        total += (
-                            local_weight(cubic_tangent_weights(local), segment, index)
-                            * column_grad[start + columns + column]
-                        )
+                j = index - 3 * (column / run)
+                if j >= 0 and j <= 3:
+                    place = open_column(column % run, run, part_rows[part], scale * widths[curve])
+                    total += cubic_weights(place[0])[j] * column_grad[start + column]
+                    total += cubic_tangent_weights(place[0])[j] * column_grad[start + columns + column]
                 if point == 0:
                     width_total += column_width_grad[start + column]
     points_grad[curve, point] = total

@@ -70,20 +70,25 @@ def closed_grid(points: torch.Tensor, plan: Plan) -> torch.Tensor:
 
 
 def open_grid(points: torch.Tensor, width: torch.Tensor, plan: Plan, scale: float) -> torch.Tensor:
-    """Grid positions of a stroke or of one of its segments, caps included, [rows, columns, 2]."""
+    """Grid positions of a stroke or of one of its segments, [rows, columns, 2]: segment after segment."""
     n = (len(points) - 1) // 3
+    run = plan.columns // n
     caps = max(1, plan.rows // 2)
-    body = plan.columns - 2 * caps
+    body = run - 2 * caps
     radius = max(1 - 2 * k.ROW_INSET / (scale * float(width.detach())), 0.5)
     angles = (torch.arange(caps) + 0.75) / caps * math.pi / 2
-    t = torch.cat([torch.zeros(caps), (torch.arange(body) + 0.5) / body, torch.ones(caps)]) * n
+    t = torch.cat([torch.zeros(caps), (torch.arange(body) + 0.5) / body, torch.ones(caps)])
     along = torch.cat([-radius * angles.flip(0).sin(), torch.zeros(body), radius * angles.sin()])
     across = torch.cat([angles.flip(0).cos(), torch.ones(body), angles.cos()])
-    d = tangent(points, t)
-    e = d / d.norm(dim=1, keepdim=True)
-    normal = torch.stack([-e[:, 1], e[:, 0]], dim=1)
     v = (2 * row_positions(plan) - 1)[:, None, None]
-    return bezier(points, t) + width / 2 * (along[:, None] * e + across[:, None] * v * normal)
+    segments = []
+    for i in range(n):
+        p = points[3 * i : 3 * i + 4]
+        d = tangent(p, t)
+        e = d / d.norm(dim=1, keepdim=True)
+        normal = torch.stack([-e[:, 1], e[:, 0]], dim=1)
+        segments.append(bezier(p, t) + width / 2 * (along[:, None] * e + across[:, None] * v * normal))
+    return torch.cat(segments, dim=1)
 
 
 def differences(x: torch.Tensor) -> torch.Tensor:
@@ -92,10 +97,13 @@ def differences(x: torch.Tensor) -> torch.Tensor:
     return (padded[2:] - padded[:-2]) / 2
 
 
-def gaussians(grid: torch.Tensor, detach: bool = False) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+def gaussians(
+    grid: torch.Tensor, detach: bool = False, runs: int = 1
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, columns, 2] in px."""
     source = grid.detach() if detach else grid
-    dx = differences(source.transpose(0, 1)).transpose(0, 1)
+    stretches = torch.chunk(source.transpose(0, 1), runs)
+    dx = torch.cat([differences(x) for x in stretches]).transpose(0, 1)
     dr = differences(source)
     length = dx.norm(dim=2)
     perpendicular = (dx[..., 0] * dr[..., 1] - dx[..., 1] * dr[..., 0]) / length
@@ -133,9 +141,11 @@ def gaussian_values(
     return torch.where(q <= k.Q_MAX, g, torch.zeros_like(g))
 
 
-def coverage(grid: torch.Tensor, width: int, height: int, detach: bool = False) -> torch.Tensor:
+def coverage(
+    grid: torch.Tensor, width: int, height: int, detach: bool = False, runs: int = 1
+) -> torch.Tensor:
     """1 - prod (1 - g) over a part's Gaussians, [height, width]."""
-    return 1 - torch.prod(1 - gaussian_values(*gaussians(grid, detach), width, height), dim=0)
+    return 1 - torch.prod(1 - gaussian_values(*gaussians(grid, detach, runs), width, height), dim=0)
 
 
 def composite(
@@ -175,7 +185,8 @@ def render(
     detach: bool = False,
 ) -> torch.Tensor:
     """The image, [height, width, 3]."""
-    covers = [coverage(grid, width, height, detach) for grid in grids(scene, p, plans, scale)]
+    runs = (scene.points.shape[1] - 1) // 3 // scene.opacities.shape[1] if scene.kind == "open" else 1
+    covers = [coverage(grid, width, height, detach, runs) for grid in grids(scene, p, plans, scale)]
     background = torch.tensor(np.asarray(scene.background, np.float64))
     return composite(covers, p["colors"], p["opacities"], background)
 

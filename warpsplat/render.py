@@ -12,7 +12,7 @@ from warpsplat.kernels import bin as binning
 from warpsplat.kernels import composite, constants, gaussian, sample, splat
 from warpsplat.launch import Program
 from warpsplat.parameters import Parameters
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import OPEN_SEGMENTS, FloatArray, Scene
 
 TILE = constants.TILE
 GROWTH = 1.5
@@ -153,7 +153,7 @@ class SplatRenderer:
         program.add(
             gaussian.gaussians_forward,
             gaussians,
-            [self.gaussian_part, self.part_first, self.part_columns, self.part_rows, self.mean],
+            [*self._grid_inputs(), self.mean],
             [self.gaussian_scale, self.gaussian_angle, self.conic, self.extent],
             split=True,
         )
@@ -197,6 +197,10 @@ class SplatRenderer:
         )
         return program
 
+    def _grid_inputs(self) -> list[object]:
+        runs = OPEN_SEGMENTS // self.parameters.opacity_count if self.parameters.kind == "open" else 1
+        return [self.gaussian_part, self.part_first, self.part_columns, self.part_rows, runs]
+
     def _composite_inputs(self) -> list[object]:
         p = self.parameters
         lists = [self.tile_first, self.tile_last, self.sort_slots, self.slot_part, self.slot_seen]
@@ -208,7 +212,7 @@ class SplatRenderer:
         p = self.parameters
         program = Program(self.device, self._threads)
         gaussians = self.capacity.gaussians
-        grid = [self.gaussian_part, self.part_first, self.part_columns, self.part_rows]
+        grid = self._grid_inputs()
         program.add(
             composite.composite_backward,
             (self.tiles_x * self.tiles_y, self.lanes),
@@ -245,7 +249,7 @@ class SplatRenderer:
             [self.position_grad],
             split=True,
         )
-        columns = [self.gaussian_part, self.gaussian_across, *grid[1:], self.position_grad]
+        columns = [self.gaussian_part, self.gaussian_across, *grid[1:-1], self.position_grad]
         if p.kind == "closed":
             program.add(
                 sample.columns_closed_backward,
