@@ -22,7 +22,7 @@ FAILED = 5
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object at the end.")
 def command(jobs: Path, device: str | None, verbose: int, quiet: bool, as_json: bool) -> None:
-    """Vectorize the images that the YAML file JOBS lists.
+    r"""Vectorize the images that the YAML file JOBS lists.
 
     \b
     defaults:
@@ -62,7 +62,13 @@ def command(jobs: Path, device: str | None, verbose: int, quiet: bool, as_json: 
                     raise OutputError(f"{job.output.parent}: cannot be made: {error.strerror}") from error
                 chosen = devices[device or job.device]
                 result = run_file(
-                    job.image, job.output, job.settings, chosen, verbose=verbose, quiet=quiet, interrupt=interrupt
+                    job.image,
+                    job.output,
+                    job.settings,
+                    chosen,
+                    verbose=verbose,
+                    quiet=quiet,
+                    interrupt=interrupt,
                 )
                 values |= {"status": "stopped" if result.stopped else "made", **result.as_dict()}
                 say(f"{count} {summary(job.output, values)}")

@@ -41,7 +41,7 @@ class LazyGroup(click.Group):
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="warpsplat")
 def cli() -> None:
-    """Turn raster images into SVGs of Bézier shapes by gradient descent.
+    r"""Turn raster images into SVGs of Bézier shapes by gradient descent.
 
     \b
     Exit codes: 0 done, 2 wrong usage, 3 unreadable image, 4 result could not

@@ -16,7 +16,9 @@ _defaults = Settings()
 def quality_options(function: Function) -> Function:
     """What decides the result."""
     options = [
-        click.option("--curves", type=int, metavar="N", help=f"Number of shapes.  [default: {_defaults.curves}]"),
+        click.option(
+            "--curves", type=int, metavar="N", help=f"Number of shapes.  [default: {_defaults.curves}]"
+        ),
         click.option("--closed", "kind", flag_value="closed", help="Filled shapes.  [default]"),
         click.option("--open", "kind", flag_value="open", help="Strokes."),
         click.option(
@@ -25,7 +27,10 @@ def quality_options(function: Function) -> Function:
         click.option("--iterations", type=int, metavar="N", help="Steps; overrides the effort's number."),
         click.option("--seed", type=int, metavar="N", help=f"Random seed.  [default: {_defaults.seed}]"),
         click.option(
-            "--precision", type=int, metavar="N", help=f"Decimals of coordinates.  [default: {_defaults.precision}]"
+            "--precision",
+            type=int,
+            metavar="N",
+            help=f"Decimals of coordinates.  [default: {_defaults.precision}]",
         ),
     ]
     for option in reversed(options):
@@ -37,7 +42,10 @@ def run_options(function: Function) -> Function:
     """What does not change the result."""
     options = [
         click.option(
-            "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
+            "--device",
+            default="auto",
+            show_default=True,
+            help="auto (a GPU if there is one), cpu, or cuda:N.",
         ),
         click.option("-v", "--verbose", count=True, help="Say more, on stderr."),
         click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),

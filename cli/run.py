@@ -59,7 +59,7 @@ def run_file(
         click.echo(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
     with contextlib.ExitStack() as stack:
         stack.enter_context(interrupt.watching())
-        bar = None
+        bar: Any = None
         if show:
             bar = stack.enter_context(
                 click.progressbar(

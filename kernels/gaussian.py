@@ -1,4 +1,4 @@
-"""Grid positions -> Gaussians (position, scale, angle, and what rasterisation needs of them), and the adjoint.
+"""Grid positions -> Gaussians (position, scale, angle, and what rasterisation needs), and the adjoint.
 
 With Dx the central difference of neighbours along a row and Dr that across rows:
 
@@ -27,7 +27,7 @@ Q_MAX = wp.constant(constants.Q_MAX)
 @wp.func
 def difference_weight(index: wp.int32, neighbour: wp.int32, count: wp.int32) -> wp.float32:
     """Weight of position ``neighbour`` in the difference at ``index`` of ``count`` (>= 2) positions."""
-    weight = float(0.0)
+    weight = 0.0
     if neighbour == wp.min(index + 1, count - 1):
         weight += 0.5
     if neighbour == wp.max(index - 1, 0):
@@ -39,7 +39,7 @@ def difference_weight(index: wp.int32, neighbour: wp.int32, count: wp.int32) -> 
 def difference(
     values: wp.array[wp.vec2], i: wp.int32, stride: wp.int32, index: wp.int32, count: wp.int32
 ) -> wp.vec2:
-    """Central difference at entry ``i``, which is number ``index`` of ``count`` entries ``stride`` apart. At an
+    """Central difference at entry ``i``, number ``index`` of ``count`` entries ``stride`` apart. At an
     end the entry stands for its missing neighbour: the last Gaussians reach half as far out.
     """
     low = wp.max(index - 1, 0)

@@ -23,7 +23,7 @@ def l2_loss(
     """Mean squared error over pixels and channels (paper eq. 12, first term) and its gradient."""
     y = first + wp.tid()
     factor = 2.0 / (3.0 * float(image.shape[0]) * float(image.shape[1]))
-    total = float(0.0)
+    total = 0.0
     for x in range(image.shape[1]):
         difference = image[y, x] - target[y, x]
         image_grad[y, x] = factor * difference
@@ -49,6 +49,7 @@ def sum_rows(
 
 @wp.func
 def sine(a: wp.vec2, b: wp.vec2) -> wp.float32:
+    """Sine of the angle from ``a`` to ``b``; 0 where either has no length."""
     return cross(a, b) / wp.max(wp.length(a) * wp.length(b), EPSILON)
 
 
@@ -72,7 +73,7 @@ def xing_backward(
     point_count = points.shape[1]
     segment_count = point_count / 3
     factor = weight / float(points.shape[0] * segment_count)
-    total = float(0.0)
+    total = 0.0
     for segment in range(segment_count):
         i0 = 3 * segment
         i3 = i0 + 3
@@ -82,7 +83,7 @@ def xing_backward(
         middle = points[curve, i0 + 2] - points[curve, i0 + 1]
         b = points[curve, i3] - points[curve, i0 + 2]
         s = sine(a, b)
-        sign = float(0.0)  # d loss / d s
+        sign = 0.0  # d loss / d s
         if cross(a, middle) >= 0.0:
             if s < 0.0:
                 sign = -1.0

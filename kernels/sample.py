@@ -1,9 +1,9 @@
 """Curves -> grid positions, and the adjoint.
 
 A closed curve is a strip between its two chains: row ``r`` lies at the fraction ``u_r`` of the way from
-chain 0 to chain 1 (paper eq. 4). Each segment of an open curve is a strip too, between its two offset lines at half the
-stroke width, with half discs at both ends: together they cover what an SVG stroke with round caps and
-round joins covers, cusps included.
+chain 0 to chain 1 (paper eq. 4). Each segment of an open curve is a strip too, between its two offset
+lines at half the stroke width, with half discs at both ends: together they cover what an SVG stroke with
+round caps and round joins covers, cusps included.
 
 ``u_r = Phi(z_r)`` for equally spaced ``z_r`` in [-reach, reach], Phi the normal cumulative distribution:
 rows crowd towards the boundary. ``reach`` puts the outermost row ROW_INSET inside the path.
@@ -99,10 +99,10 @@ def plan_closed(
     count = PLAN_SAMPLES * segment_count
     a0 = scale * points[part, 0]
     b0 = a0
-    length_a = float(0.0)
-    length_b = float(0.0)
-    width = float(0.0)
-    doubled_area = float(0.0)
+    length_a = 0.0
+    length_b = 0.0
+    width = 0.0
+    doubled_area = 0.0
     for i in range(1, count + 1):
         t = float(i) / float(PLAN_SAMPLES)
         a1 = scale * chain_point(points, part, 0, t, segment_count)
@@ -141,10 +141,10 @@ def plan_open(
     curve = part / opacity_count
     segment_count = (points.shape[1] - 1) / (3 * opacity_count)
     base = (part % opacity_count) * segment_count
-    longest = float(0.0)
+    longest = 0.0
     for segment in range(segment_count):
         before = scale * points[curve, 3 * (base + segment)]
-        length = float(0.0)
+        length = 0.0
         for i in range(1, PLAN_SAMPLES + 1):
             weights = cubic_weights(float(i) / float(PLAN_SAMPLES))
             here = wp.vec2(0.0, 0.0)
@@ -314,6 +314,7 @@ def open_column(column: wp.int32, columns: wp.int32, rows: wp.int32, width: wp.f
 
 @wp.func
 def unit_tangent(tangent: wp.vec2) -> wp.vec2:
+    """``tangent`` / its length; (1, 0) where it has none."""
     length = wp.length(tangent)
     if length < EPSILON:
         return wp.vec2(1.0, 0.0)
@@ -419,7 +420,7 @@ def columns_open_backward(
     e = unit_tangent(tangent)
     centre_grad = wp.vec2(0.0, 0.0)
     e_grad = wp.vec2(0.0, 0.0)
-    width_grad = float(0.0)
+    width_grad = 0.0
     for row in range(rows):
         j = i + row * columns
         g = scale * position_grad[j]
@@ -459,7 +460,7 @@ def points_open_backward(
     curve = first + i
     segment_count = (points_grad.shape[1] - 1) / (3 * opacity_count)
     total = wp.vec2(0.0, 0.0)
-    width_total = float(0.0)
+    width_total = 0.0
     for opacity in range(opacity_count):
         part = curve * opacity_count + opacity
         start = part_first[part]

@@ -16,7 +16,9 @@ wp.config.log_level = wp.LOG_ERROR
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--device", action="append", default=None, help="Warp devices to test (default: all here)")
+    parser.addoption(
+        "--device", action="append", default=None, help="Warp devices to test (default: all here)"
+    )
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -6,6 +6,7 @@ and nothing else. Image sizes of a few dozen pixels.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -30,7 +31,9 @@ class Plan:
 def tensors(scene: Scene) -> dict[str, torch.Tensor]:
     """The scene's parameters as leaves that require gradients."""
     names = ("points", "colors", "opacities", "widths")
-    return {name: torch.tensor(getattr(scene, name), dtype=torch.float64, requires_grad=True) for name in names}
+    return {
+        name: torch.tensor(getattr(scene, name), dtype=torch.float64, requires_grad=True) for name in names
+    }
 
 
 def bezier(p: torch.Tensor, t: torch.Tensor) -> torch.Tensor:
@@ -40,7 +43,7 @@ def bezier(p: torch.Tensor, t: torch.Tensor) -> torch.Tensor:
     s = (t - segment)[:, None]
     q = [p[3 * segment + j] for j in range(4)]
     while len(q) > 1:
-        q = [(1 - s) * a + s * b for a, b in zip(q[:-1], q[1:], strict=True)]
+        q = [(1 - s) * a + s * b for a, b in itertools.pairwise(q)]
     return q[0]
 
 

@@ -88,7 +88,9 @@ class _File:
     def error(self, line: int, message: str) -> UsageError:
         return UsageError(f"{self.path}:{line}: {message}")
 
-    def mapping(self, node: yaml.Node | None, where: str, allowed: tuple[str, ...]) -> dict[str, tuple[int, yaml.Node]]:
+    def mapping(
+        self, node: yaml.Node | None, where: str, allowed: tuple[str, ...]
+    ) -> dict[str, tuple[int, yaml.Node]]:
         """Key -> (line, value node); unknown and repeated keys are errors."""
         if not isinstance(node, yaml.MappingNode):
             line = node.start_mark.line + 1 if node else 1
@@ -105,7 +107,7 @@ class _File:
         return result
 
     def value(self, node: yaml.Node) -> Any:
-        return self.loader.construct_object(node, deep=True)  # type: ignore[no-untyped-call]
+        return self.loader.construct_object(node, deep=True)
 
 
 def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, _Value]:
@@ -170,7 +172,9 @@ def _glob(folder: Path, pattern: str) -> Iterator[Path]:
         return
     base, parts = (Path(path.anchor), path.parts[1:]) if path.is_absolute() else (folder, path.parts)
     yield from sorted(
-        p for p in base.glob(str(Path(*parts))) if p.is_file() and not p.name.startswith(".") and p.suffix != ".svg"
+        p
+        for p in base.glob(str(Path(*parts)))
+        if p.is_file() and not p.name.startswith(".") and p.suffix != ".svg"
     )
 
 
@@ -211,5 +215,7 @@ def load_jobs(path: Path) -> list[Job]:
         jobs.append(Job(image, folder / f"{name}.svg", settings, device))
     for output_path, count in Counter(job.output for job in jobs).items():
         if count > 1:
-            raise file.error(line, f"jobs: {count} images would be written to {output_path}; give other outputs")
+            raise file.error(
+                line, f"jobs: {count} images would be written to {output_path}; give other outputs"
+            )
     return jobs

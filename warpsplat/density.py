@@ -27,14 +27,19 @@ def opacity_threshold(density: Density, progress: float) -> float:
 
 def duplicates(scene: Scene, density: Density) -> BoolArray:
     """Curves with a neighbour further in front of nearly their colour and box."""
-    boxes, areas = scene.bounds(), np.maximum(1e-6, np.ptp(scene.bounds().reshape(-1, 2, 2), axis=1).prod(axis=1))
+    boxes, areas = (
+        scene.bounds(),
+        np.maximum(1e-6, np.ptp(scene.bounds().reshape(-1, 2, 2), axis=1).prod(axis=1)),
+    )
     found = np.zeros(len(scene), np.bool_)
     # Boxes that overlap so much have nearly the same left edge: a window over the sorted edges is enough.
     order = np.argsort(boxes[:, 0], kind="stable")
     left = boxes[order, 0]
     slack = (1 - density.duplicate_overlap) * (boxes[:, 2] - boxes[:, 0])
     for i in order:
-        window = order[np.searchsorted(left, boxes[i, 0]) : np.searchsorted(left, boxes[i, 0] + slack[i], "right")]
+        window = order[
+            np.searchsorted(left, boxes[i, 0]) : np.searchsorted(left, boxes[i, 0] + slack[i], "right")
+        ]
         window = window[window != i]
         if len(window) == 0:
             continue
@@ -95,7 +100,12 @@ def _candidates(error: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def densify(
-    settings: Settings, scene: Scene, target: FloatArray, image: FloatArray, count: int, rng: np.random.Generator
+    settings: Settings,
+    scene: Scene,
+    target: FloatArray,
+    image: FloatArray,
+    count: int,
+    rng: np.random.Generator,
 ) -> Scene:
     """``count`` new curves on the components of the quantised error map, the largest error first.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -57,7 +59,7 @@ def place(
     centres: Floats,
     areas: Floats,
     angles: Floats,
-    colors: Floats,
+    colors: npt.NDArray[Any],
 ) -> Scene:
     """New shapes of the settings' kind: ``areas`` in px squared, ``angles`` (strokes) in rad."""
     count = len(centres)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -44,7 +45,7 @@ class Program:
         pieces = min(pieces, shape[0])
         borders = [shape[0] * i // pieces for i in range(pieces + 1)]
         stage: list[Callable[[], None]] = []
-        for start, stop in zip(borders[:-1], borders[1:], strict=True):
+        for start, stop in itertools.pairwise(borders):
             command = wp.launch(
                 kernel,
                 dim=(stop - start, *shape[1:]),

@@ -26,14 +26,18 @@ SSIM_WINDOW = 11
 DRAWN = re.compile(rb"<(?:path|circle|ellipse|polygon|polyline|line)\b")
 
 
-def render_svg(text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None) -> Image.Image:
+def render_svg(
+    text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
+) -> Image.Image:
     """Render SVG text with resvg, at its own size, at a size in px, or magnified by ``zoom``.
 
     Raises:
         ImageError: resvg does not accept the text.
     """
     try:
-        png = resvg_py.svg_to_bytes(svg_string=text, width=width, height=height, zoom=zoom, skip_system_fonts=True)
+        png = resvg_py.svg_to_bytes(
+            svg_string=text, width=width, height=height, zoom=zoom, skip_system_fonts=True
+        )
     except ValueError as error:
         raise ImageError(f"cannot be rendered: {str(error).splitlines()[0]}") from error
     return Image.open(io.BytesIO(bytes(png)))

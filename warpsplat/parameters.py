@@ -22,8 +22,10 @@ class Group:
     @staticmethod
     def upload(value: FloatArray, moment1: FloatArray, moment2: FloatArray, device: wp.Device) -> Group:
         """Copy to ``device``; the gradient starts at 0."""
-        flat = [np.ascontiguousarray(x.reshape(len(value), -1), np.float32) for x in (value, moment1, moment2)]
-        arrays = [wp.array(x, dtype=wp.float32, device=device) for x in flat]
+        flat = [
+            np.ascontiguousarray(x.reshape(len(value), -1), np.float32) for x in (value, moment1, moment2)
+        ]
+        arrays: list[wp.array] = [wp.array(x, dtype=wp.float32, device=device) for x in flat]
         return Group(arrays[0], wp.zeros_like(arrays[0]), arrays[1], arrays[2])
 
 
@@ -52,7 +54,7 @@ class Parameters:
             value = np.asarray(getattr(scene, name), np.float32).reshape(len(scene), -1)
             m1, m2 = moments[name] if moments else (np.zeros_like(value), np.zeros_like(value))
             self.groups[name] = Group.upload(value, m1, m2, self.device)
-        self.ages = wp.array(ages, dtype=wp.int32, device=self.device)
+        self.ages: wp.array = wp.array(ages, dtype=wp.int32, device=self.device)
         count, point_count = scene.points.shape[:2]
         opacity_count = scene.opacities.shape[1]
         self.curve_count, self.point_count, self.opacity_count = count, point_count, opacity_count
@@ -75,7 +77,7 @@ class Parameters:
 
     @property
     def kind(self) -> str:
-        """"closed" or "open"."""
+        """Kind of the curves: closed or open."""
         return self._template.kind
 
     @property

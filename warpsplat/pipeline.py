@@ -112,9 +112,7 @@ def vectorize_file(
     target = load_image(source)
     key = job_key(settings, source.read_bytes())
     metadata = f"key={key}"
-    result = vectorize(
-        target, settings, device, threads=threads, metadata=metadata, report=report, stop=stop
-    )
+    result = vectorize(target, settings, device, threads=threads, metadata=metadata, report=report, stop=stop)
     svg = result.svg
     if result.stopped:
         # A file that was cut short must not pass for a finished one.

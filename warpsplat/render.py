@@ -128,7 +128,12 @@ class SplatRenderer:
         plan = [self.part_columns, self.part_rows, self.part_reach]
         ranges = [self.part_ends, self.part_first, self.part_last, *plan]
         if p.kind == "closed":
-            program.add(sample.plan_closed, parts, [p.points, self.scale], [*plan, self.part_gaussians, self.part_sign])
+            program.add(
+                sample.plan_closed,
+                parts,
+                [p.points, self.scale],
+                [*plan, self.part_gaussians, self.part_sign],
+            )
         else:
             program.add(
                 sample.plan_open,
@@ -311,7 +316,8 @@ class SplatRenderer:
         if gaussians <= self.capacity.gaussians and slots <= self.capacity.slots:
             return False
         self.capacity = Capacity(
-            max(self.capacity.gaussians, int(GROWTH * gaussians)), max(self.capacity.slots, int(GROWTH * slots))
+            max(self.capacity.gaussians, int(GROWTH * gaussians)),
+            max(self.capacity.slots, int(GROWTH * slots)),
         )
         self.needed_gaussians.zero_()
         self.needed_slots.zero_()

@@ -7,8 +7,8 @@ before it, so that rounding errors do not add up.
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from xml.etree import ElementTree
 
 import numpy as np
 

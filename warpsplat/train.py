@@ -91,10 +91,11 @@ class Trainer:
     def _enter(self, phase: Phase) -> None:
         small = self.target
         if (phase.width, phase.height) != (self.width, self.height):
-            small = cv2.resize(self.target, (phase.width, phase.height), interpolation=cv2.INTER_AREA)
+            size = (phase.width, phase.height)
+            small = np.asarray(cv2.resize(self.target, size, interpolation=cv2.INTER_AREA), np.float32)
         self.small = np.ascontiguousarray(small, np.float32)
         self.scale = phase.width / self.width
-        self.device_target = wp.array(self.small, dtype=wp.vec3, device=self.device)
+        self.device_target: wp.array = wp.array(self.small, dtype=wp.vec3, device=self.device)
         self.row_loss = wp.zeros(phase.height, dtype=wp.float32, device=self.device)
         self._record(phase.width, phase.height, None)
 
@@ -154,9 +155,7 @@ class Trainer:
         assert self.renderer
         r = self.renderer
         program = Program(self.device, 1)
-        program.add(
-            loss.l2_loss, r.height, [r.image, self.device_target], [r.image_grad, self.row_loss]
-        )
+        program.add(loss.l2_loss, r.height, [r.image, self.device_target], [r.image_grad, self.row_loss])
         program.add(loss.sum_rows, 1, [self.row_loss, r.width], [self.loss])
         return program
 

@@ -11,7 +11,13 @@ from tests.kernels.helpers import reference_image, relative_error, renderer_for
 from tests.scenes import random_scene
 from warpsplat.scene import Kind
 
-CASES = [("closed", 1, 1, 1.0), ("closed", 2, 1, 1.0), ("closed", 2, 1, 0.6), ("open", 2, 1, 1.0), ("open", 2, 3, 1.7)]
+CASES = [
+    ("closed", 1, 1, 1.0),
+    ("closed", 2, 1, 1.0),
+    ("closed", 2, 1, 0.6),
+    ("open", 2, 1, 1.0),
+    ("open", 2, 3, 1.7),
+]
 
 
 @pytest.mark.parametrize(("kind", "chain_cubics", "opacity_count", "scale"), CASES)
