@@ -53,7 +53,7 @@ def local_weight(weights: wp.vec4, segment: wp.int32, i: wp.int32) -> wp.float32
 @wp.func
 def find_range(ends: wp.array[wp.int32], count: wp.int32, i: wp.int32) -> wp.int32:
     """Smallest index with ``ends[index] > i``; ``ends`` is an inclusive prefix sum of ``count`` entries."""
-    low = 0
+    low = int(0)
     high = int(count)
     while low < high:
         middle = (low + high) / 2

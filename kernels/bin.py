@@ -36,10 +36,10 @@ def part_rectangles(
     for i in range(part_first[part], part_last[part]):
         low = wp.min(low, mean[i] - extent[i])
         high = wp.max(high, mean[i] + extent[i])
-    x0 = 0
-    y0 = 0
-    x1 = 0
-    y1 = 0
+    x0 = int(0)
+    y0 = int(0)
+    x1 = int(0)
+    y1 = int(0)
     # Written so that NaN positions give an empty rectangle.
     if high[0] > 0.0 and high[1] > 0.0 and low[0] < float(TILE * tiles_x) and low[1] < float(TILE * tiles_y):
         x0 = int(wp.max(low[0], 0.0)) / TILE
@@ -72,7 +72,7 @@ def fill_slots(
     slot = first + wp.tid()
     part_count = front_ends.shape[0]
     front = find_range(front_ends, part_count, slot)
-    part = -1
+    part = int(-1)
     tile = int(INT_MAX)
     if front < part_count:
         candidate = part_count - 1 - front
@@ -116,7 +116,7 @@ def tile_ranges(
     tile = sort_keys[i]
     if tile == INT_MAX:
         return
-    before = -1
+    before = int(-1)
     if i > 0:
         before = sort_keys[i - 1]
     after = int(INT_MAX)

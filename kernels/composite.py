@@ -59,7 +59,7 @@ def composite_forward(
             curve = part / opacity_count
             color = colors[curve]
             opacity = opacities[curve, part % opacity_count]
-            light = 0.0
+            light = float(0.0)
             for y in range(row_first, row_last):
                 base = (y - y0) * TILE - x0
                 for x in range(x0, x1):
@@ -112,11 +112,11 @@ def composite_backward(
         for x in range(x0, x1):
             transmittance[y, x] = 1.0
             behind[y, x] = wp.dot(image[y, x], image_grad[y, x])
-    light = 1.0
+    light = float(1.0)
     for k in range(tile_first[tile], tile_last[tile]):
         slot = sort_slots[k]
         color_sum = wp.vec3(0.0, 0.0, 0.0)
-        opacity_sum = 0.0
+        opacity_sum = float(0.0)
         if slot_seen[slot, lane] != 0:
             part = slot_part[slot]
             curve = part / opacity_count
@@ -126,12 +126,12 @@ def composite_backward(
                 for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
                     coverage_grad[slot, p] = 0.0
             else:
-                light = 0.0
+                light = float(0.0)
                 for y in range(row_first, row_last):
                     base = (y - y0) * TILE - x0
                     for x in range(x0, x1):
                         t = transmittance[y, x]
-                        alpha_grad = 0.0
+                        alpha_grad = float(0.0)
                         if t > TRANSMITTANCE_MIN:
                             c = coverage[slot, base + x]
                             alpha = opacity * c
@@ -166,7 +166,7 @@ def reduce_slots(
     color_total = wp.vec3(0.0, 0.0, 0.0)
     for j in range(opacity_count):
         part = curve * opacity_count + j
-        opacity_total = 0.0
+        opacity_total = float(0.0)
         for slot in range(slot_first[part], slot_last[part]):
             for lane in range(slot_grad.shape[1]):
                 g = slot_grad[slot, lane]

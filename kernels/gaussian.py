@@ -27,7 +27,7 @@ Q_MAX = wp.constant(constants.Q_MAX)
 @wp.func
 def difference_weight(index: wp.int32, neighbour: wp.int32, count: wp.int32) -> wp.float32:
     """Weight of position ``neighbour`` in the difference at ``index`` of ``count`` (>= 2) positions."""
-    weight = 0.0
+    weight = float(0.0)
     if neighbour == wp.min(index + 1, count - 1):
         weight += 0.5
     if neighbour == wp.max(index - 1, 0):

@@ -23,7 +23,7 @@ def l2_loss(
     """Mean squared error over pixels and channels (paper eq. 12, first term) and its gradient."""
     y = first + wp.tid()
     factor = 2.0 / (3.0 * float(image.shape[0]) * float(image.shape[1]))
-    total = 0.0
+    total = float(0.0)
     for x in range(image.shape[1]):
         difference = image[y, x] - target[y, x]
         image_grad[y, x] = factor * difference
@@ -73,7 +73,7 @@ def xing_backward(
     point_count = points.shape[1]
     segment_count = point_count / 3
     factor = weight / float(points.shape[0] * segment_count)
-    total = 0.0
+    total = float(0.0)
     for segment in range(segment_count):
         i0 = 3 * segment
         i3 = i0 + 3
@@ -83,7 +83,7 @@ def xing_backward(
         middle = points[curve, i0 + 2] - points[curve, i0 + 1]
         b = points[curve, i3] - points[curve, i0 + 2]
         s = sine(a, b)
-        sign = 0.0  # d loss / d s
+        sign = float(0.0)  # d loss / d s
         if cross(a, middle) >= 0.0:
             if s < 0.0:
                 sign = -1.0

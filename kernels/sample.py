@@ -99,10 +99,10 @@ def plan_closed(
     count = PLAN_SAMPLES * segment_count
     a0 = scale * points[part, 0]
     b0 = a0
-    length_a = 0.0
-    length_b = 0.0
-    width = 0.0
-    doubled_area = 0.0
+    length_a = float(0.0)
+    length_b = float(0.0)
+    width = float(0.0)
+    doubled_area = float(0.0)
     for i in range(1, count + 1):
         t = float(i) / float(PLAN_SAMPLES)
         a1 = scale * chain_point(points, part, 0, t, segment_count)
@@ -141,10 +141,10 @@ def plan_open(
     curve = part / opacity_count
     segment_count = (points.shape[1] - 1) / (3 * opacity_count)
     base = (part % opacity_count) * segment_count
-    longest = 0.0
+    longest = float(0.0)
     for segment in range(segment_count):
         before = scale * points[curve, 3 * (base + segment)]
-        length = 0.0
+        length = float(0.0)
         for i in range(1, PLAN_SAMPLES + 1):
             weights = cubic_weights(float(i) / float(PLAN_SAMPLES))
             here = wp.vec2(0.0, 0.0)
@@ -420,7 +420,7 @@ def columns_open_backward(
     e = unit_tangent(tangent)
     centre_grad = wp.vec2(0.0, 0.0)
     e_grad = wp.vec2(0.0, 0.0)
-    width_grad = 0.0
+    width_grad = float(0.0)
     for row in range(rows):
         j = i + row * columns
         g = scale * position_grad[j]
@@ -460,7 +460,7 @@ def points_open_backward(
     curve = first + i
     segment_count = (points_grad.shape[1] - 1) / (3 * opacity_count)
     total = wp.vec2(0.0, 0.0)
-    width_total = 0.0
+    width_total = float(0.0)
     for opacity in range(opacity_count):
         part = curve * opacity_count + opacity
         start = part_first[part]

@@ -71,7 +71,7 @@ def splat_forward(
     row_last = row_first + lane_rows
     for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
         coverage[slot, p] = 1.0
-    seen = 0
+    seen = int(0)
     for j in range(part_first[part], part_last[part]):
         m = mean[j]
         e = extent[j]
@@ -146,11 +146,11 @@ def splat_backward(
         tiles_wide = part_tiles[part, 2] - tiles_x0
         y0 = wp.max(0, first_pixel(wp.max(m[1] - e[1], 0.0)))
         y1 = wp.min(height, first_pixel(wp.min(m[1] + e[1], float(height) + 1.0)))
-        sum_x = 0.0
-        sum_y = 0.0
-        sum_xx = 0.0
-        sum_xy = 0.0
-        sum_yy = 0.0
+        sum_x = float(0.0)
+        sum_y = float(0.0)
+        sum_xx = float(0.0)
+        sum_xy = float(0.0)
+        sum_yy = float(0.0)
         for y in range(y0, y1):
             dy = float(y) + 0.5 - m[1]
             span = chord(con, dy)
@@ -160,9 +160,9 @@ def splat_backward(
                 dx = float(x0) + 0.5 - m[0]
                 g = gaussian_at(con, dx, dy)
                 ratio = wp.exp(-(con[0] * (dx + 0.5) + con[1] * dy))
-                row_sum = 0.0
-                row_x = 0.0
-                row_xx = 0.0
+                row_sum = float(0.0)
+                row_x = float(0.0)
+                row_xx = float(0.0)
                 slot_row = start + (y / TILE - tiles_y0) * tiles_wide - tiles_x0
                 x = x0
                 while x < x1:
