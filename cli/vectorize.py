@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import quality_options, run_options, settings_from
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, UsageError
 
 
 def summary(output: Path, values: dict[str, Any]) -> str:
@@ -48,6 +48,8 @@ def command(
     """
     settings = settings_from(given)
     output = output or Path(image.name).with_suffix(".svg")
+    if output.exists() and output.resolve() == image.resolve():
+        raise UsageError(f"{output}: is the image itself; give another output with -o")
     if not image.exists():
         raise ImageError(f"{image}: no such file")
     from warpsplat.files import check_output

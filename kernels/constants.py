@@ -23,12 +23,12 @@ TRANSMITTANCE_MIN = 1.0e-4
 SPREAD = 2.0 / 3.0
 """1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""
 
-PIXEL_SIGMA = 0.17
+PIXEL_SIGMA = 0.13
 """Standard deviation [px] added in quadrature to both scales, so that no Gaussian vanishes. The softer the
-edges, the better splats fit a photograph and the less the file, whose edges are hard, looks like them: 0.3
-costs 0.7 dB between render and file, 0.2 costs 0.45, 0.15 costs 0.35 (docs/experiments.md)."""
+edges, the better splats fit a photograph and the less the file, whose edges are hard, looks like them: 0.13
+keeps the file within half a dB of the render (docs/experiments.md)."""
 
-ROW_INSET = 0.75
+ROW_INSET = 0.45
 """Distance [px] from the path of the outermost row of Gaussians. A row's half-coverage line lies outside
 the row; with this inset it lies on the path, so the splat covers what the exported path will cover."""
 
@@ -36,10 +36,10 @@ ROW_GROWTH = 0.45
 """Distance between rows as a fraction of the distance to the boundary: small enough that the Gaussians of
 an inner row end at the path."""
 
-COLUMN_SPACING = 4.0
+COLUMN_SPACING = 3.0
 """Largest distance [px] between samples along a curve."""
 
-COLUMN_DENSITY = 3.0
+COLUMN_DENSITY = 4.0
 """Samples along a curve of length L [px]: at least this times sqrt(L). A Gaussian is straight, so on a bend
 of radius R its ends leave the curve by SPREAD^2 h^2 / R for a spacing h; with R about L / 3 this keeps it
 under a fifth of a pixel."""

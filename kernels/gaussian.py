@@ -2,13 +2,15 @@
 
 With Dx the central difference of neighbours along a row and Dr that across rows:
 
-    scale_x = sqrt((SPREAD |Dx|)^2 + PIXEL_SIGMA^2)                      paper eq. 6
+    scale_x = sqrt((SPREAD straightness |Dx|)^2 + PIXEL_SIGMA^2)         paper eq. 6, straightness = 1
     scale_y = sqrt((SPREAD cross(Dx, Dr) / |Dx|)^2 + PIXEL_SIGMA^2)      the part of Dr across the row
     angle   = atan2(Dx.y, Dx.x)                                          paper eq. 7
 
 The paper takes |Dr| for scale_y. Where the grid is sheared (near the ends of a closed curve, where the
 chains run towards each other) that makes Gaussians reach far out of the shape; the perpendicular part
-does not, and covers the same cells.
+does not, and covers the same cells. Where a row turns sharply (it does where an outline has a corner),
+a Gaussian as long as the spacing would reach out of the shape: its length shrinks with the straightness,
+the squared cosine of the turn. The straightness is taken as a constant by the adjoint.
 """
 
 import warp as wp
@@ -47,6 +49,22 @@ def difference(
     return 0.5 * (values[i + (high - index) * stride] - values[i + (low - index) * stride])
 
 
+@wp.func
+def straightness(
+    values: wp.array[wp.vec2], i: wp.int32, stride: wp.int32, index: wp.int32, count: wp.int32
+) -> wp.float32:
+    """Squared cosine of the turn at entry ``i``, 0 for right angles and more, 1 at an end."""
+    if index == 0 or index == count - 1:
+        return 1.0
+    before = values[i] - values[i - stride]
+    after = values[i + stride] - values[i]
+    lengths = wp.length(before) * wp.length(after)
+    if lengths < EPSILON * EPSILON:
+        return 1.0
+    cosine = wp.max(wp.dot(before, after) / lengths, 0.0)
+    return cosine * cosine
+
+
 @wp.kernel
 def gaussians_forward(
     # In:
@@ -72,13 +90,15 @@ def gaussians_forward(
     index = i - part_first[part]
     dx = difference(mean, i, 1, (index % columns) % (columns / runs), columns / runs)
     dr = difference(mean, i, columns, index / columns, part_rows[part])
+    run = columns / runs
     length = wp.length(dx)
+    reach = straightness(mean, i, 1, (index % columns) % run, run) * length
     e = wp.vec2(1.0, 0.0)
     across = wp.length(dr)
     if length >= EPSILON:
         e = dx / length
         across = cross(e, dr)
-    variance_x = SPREAD * SPREAD * length * length + PIXEL_SIGMA * PIXEL_SIGMA
+    variance_x = SPREAD * SPREAD * reach * reach + PIXEL_SIGMA * PIXEL_SIGMA
     variance_y = SPREAD * SPREAD * across * across + PIXEL_SIGMA * PIXEL_SIGMA
     ix = 1.0 / variance_x
     iy = 1.0 / variance_y
@@ -140,7 +160,10 @@ def differences_backward(
     e = dx / length
     n = wp.vec2(-e[1], e[0])
     h = wp.dot(n, dr)
-    ix = 1.0 / (SPREAD * SPREAD * length * length + PIXEL_SIGMA * PIXEL_SIGMA)
+    run = columns / runs
+    straight = straightness(mean, i, 1, (index % columns) % run, run)
+    reach = straight * length
+    ix = 1.0 / (SPREAD * SPREAD * reach * reach + PIXEL_SIGMA * PIXEL_SIGMA)
     iy = 1.0 / (SPREAD * SPREAD * h * h + PIXEL_SIGMA * PIXEL_SIGMA)
     g = through_scales * conic_grad[i]
     cc = e[0] * e[0]
@@ -148,7 +171,7 @@ def differences_backward(
     cs = e[0] * e[1]
     ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
     iy_grad = ss * g[0] - cs * g[1] + cc * g[2]
-    length_grad = -2.0 * SPREAD * SPREAD * length * ix * ix * ix_grad
+    length_grad = -2.0 * SPREAD * SPREAD * straight * reach * ix * ix * ix_grad
     h_grad = -2.0 * SPREAD * SPREAD * h * iy * iy * iy_grad
     angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2]) - h_grad * wp.dot(e, dr)
     along = length_grad * e + (angle_grad / length) * n

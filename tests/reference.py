@@ -100,6 +100,14 @@ def differences(x: torch.Tensor) -> torch.Tensor:
     return (padded[2:] - padded[:-2]) / 2
 
 
+def straightness(x: torch.Tensor) -> torch.Tensor:
+    """Squared cosine of the turn along the first axis of [n, m, 2], 0 past a right angle, 1 at the ends."""
+    steps = torch.diff(x, dim=0)
+    cosine = torch.nn.functional.cosine_similarity(steps[:-1], steps[1:], dim=2).clamp(min=0)
+    ones = torch.ones_like(x[:1, :, 0])
+    return torch.cat([ones, cosine**2, ones])
+
+
 def gaussians(
     grid: torch.Tensor, detach: bool = False, runs: int = 1
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -110,7 +118,8 @@ def gaussians(
     dr = differences(source)
     length = dx.norm(dim=2)
     perpendicular = (dx[..., 0] * dr[..., 1] - dx[..., 1] * dr[..., 0]) / length
-    scale_x = torch.sqrt((k.SPREAD * length) ** 2 + k.PIXEL_SIGMA**2)
+    straight = torch.cat([straightness(x.detach()) for x in stretches]).transpose(0, 1)
+    scale_x = torch.sqrt((k.SPREAD * straight * length) ** 2 + k.PIXEL_SIGMA**2)
     scale_y = torch.sqrt((k.SPREAD * perpendicular) ** 2 + k.PIXEL_SIGMA**2)
     angle = torch.atan2(dx[..., 1], dx[..., 0])
     return grid.reshape(-1, 2), torch.stack([scale_x, scale_y], 2).reshape(-1, 2), angle.reshape(-1)

@@ -73,7 +73,7 @@ class Settings:
     """Strokes with an opacity per segment (the paper's 3-opacity): each is three paths in the file."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
-    xing: float = 0.01
+    xing: float = 0.001
     """Weight of the Xing loss."""
     fold_start: float = 0.2
     """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it

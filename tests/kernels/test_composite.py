@@ -1,0 +1,136 @@
+"""Blending and its adjoint on coverages of our own; losses; Adam."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+import warp as wp
+
+from tests import reference
+from tests.kernels.helpers import relative_error, renderer_for
+from tests.kernels.test_splat import coverage_images
+from tests.scenes import random_scene
+from warpsplat.kernels import adam, loss
+from warpsplat.scene import Kind
+
+
+@pytest.mark.parametrize("opaque", [False, True])
+def test_blending_and_adjoint(device: str, opaque: bool) -> None:
+    """Colour and opacity gradients need nothing of the splats: the coverage is taken as given."""
+    scene = random_scene("closed", count=8, seed=5)
+    if opaque:
+        scene.opacities[:] = 0.996
+    renderer = renderer_for(scene, device)
+    covers = [torch.tensor(c[: scene.height, : scene.width].astype(np.float64)) for c in coverage_images(renderer)]
+    for c in covers:
+        c.requires_grad_()
+    p = reference.tensors(scene)
+    image = reference.composite(covers, p["colors"], p["opacities"], torch.tensor(scene.background.astype(np.float64)))
+    np.testing.assert_allclose(renderer.image.numpy(), image.detach().numpy(), atol=2e-4)
+    weights = np.random.default_rng(2).normal(size=image.shape)
+    (image * torch.tensor(weights)).sum().backward()
+    renderer.image_grad.assign(wp.array(weights.astype(np.float32), dtype=wp.vec3, device=device))
+    renderer.backward()
+    got = renderer.parameters.gradients()
+    for name in ("colors", "opacities"):
+        gradient = p[name].grad
+        assert gradient is not None
+        # Behind TRANSMITTANCE_MIN the kernels stop: up to 1e-4 of a weight is missing there.
+        assert relative_error(got[name], gradient.numpy()) < (2e-3 if opaque else 2e-5)
+    # The gradient of the coverage itself.
+    parts, tiles = renderer.slot_part.numpy(), renderer.slot_tile.numpy()
+    grads = renderer.coverage_grad.numpy()
+    for slot in np.flatnonzero((parts >= 0) & (renderer.slot_seen.numpy().max(axis=1) > 0)):
+        y, x = divmod(int(tiles[slot]), renderer.tiles_x)
+        gradient = covers[parts[slot]].grad
+        assert gradient is not None
+        block = gradient[16 * y : 16 * y + 16, 16 * x : 16 * x + 16].numpy()
+        mine = grads[slot].reshape(16, 16)[: block.shape[0], : block.shape[1]]
+        # behind / (1 - alpha): what float32 leaves of a difference, magnified 250 times by an opaque shape.
+        np.testing.assert_allclose(mine, block, atol=3e-2 if opaque else 2e-4)
+        assert np.abs(mine - block).mean() < 1e-4
+
+
+def test_l2(device: str) -> None:
+    rng = np.random.default_rng(3)
+    a, b = (rng.uniform(size=(13, 21, 3)).astype(np.float32) for _ in range(2))
+    image, target = (wp.array(x, dtype=wp.vec3, device=device) for x in (a, b))
+    grad = wp.zeros((13, 21), dtype=wp.vec3, device=device)
+    rows, total = wp.zeros(13, dtype=float, device=device), wp.zeros(1, dtype=float, device=device)
+    wp.launch(loss.l2_loss, 13, inputs=[0, image, target], outputs=[grad, rows], device=device)
+    wp.launch(loss.sum_rows, 1, inputs=[0, rows, 21], outputs=[total], device=device)
+    x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
+    value = torch.nn.functional.mse_loss(x, torch.tensor(b, dtype=torch.float64))
+    value.backward()
+    assert total.numpy()[0] == pytest.approx(float(value.detach()), rel=1e-6)
+    assert x.grad is not None
+    np.testing.assert_allclose(grad.numpy(), x.grad.numpy(), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+def test_xing(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, count=6, seed=6)
+    rng = np.random.default_rng(0)
+    scene.points[:] += rng.normal(0, 6, scene.points.shape).astype(np.float32)
+    renderer = renderer_for(scene, device)
+    p = renderer.parameters
+    p.points_grad.zero_()
+    per_curve = wp.zeros(len(scene), dtype=float, device=device)
+    inputs = [0, p.points, int(kind == "closed"), 0.7]
+    wp.launch(loss.xing_backward, len(scene), inputs=inputs, outputs=[p.points_grad, per_curve], device=device)
+    points = torch.tensor(scene.points, dtype=torch.float64, requires_grad=True)
+    value = reference.xing(scene, points)
+    assert float(value.detach()) > 0.05
+    (0.7 * value).backward()
+    segments = scene.points.shape[1] // 3
+    assert per_curve.numpy().sum() / (len(scene) * segments) == pytest.approx(float(value.detach()), rel=1e-4)
+    assert points.grad is not None
+    assert relative_error(p.gradients()["points"], points.grad.numpy()) < 1e-4
+
+
+def test_xing_is_zero_for_a_convex_outline(device: str) -> None:
+    from tests.scenes import disc
+
+    scene = disc(10, 30, 15)
+    assert float(reference.xing(scene, torch.tensor(scene.points, dtype=torch.float64))) == 0
+    p = renderer_for(scene, device).parameters
+    p.points_grad.zero_()
+    per_curve = wp.zeros(1, dtype=float, device=device)
+    wp.launch(loss.xing_backward, 1, inputs=[0, p.points, 1, 1.0], outputs=[p.points_grad, per_curve], device=device)
+    assert per_curve.numpy()[0] == 0
+    assert not p.gradients()["points"].any()
+
+
+def test_adam_matches_torch(device: str) -> None:
+    rng = np.random.default_rng(7)
+    start = rng.normal(size=(5, 4)).astype(np.float32)
+    gradients = rng.normal(size=(20, 5, 4)).astype(np.float32)
+    value, grad = (wp.array(start, dtype=float, device=device) for _ in range(2))
+    m1, m2 = wp.zeros_like(value), wp.zeros_like(value)
+    ages, clock = wp.zeros(5, dtype=int, device=device), wp.zeros(1, dtype=int, device=device)
+    x = torch.tensor(start, dtype=torch.float64, requires_grad=True)
+    optimizer = torch.optim.Adam([x], lr=0.1, betas=(0.9, 0.99), eps=1e-12)
+    schedule = torch.optim.lr_scheduler.LambdaLR(
+        optimizer, lambda n: 0.1 + 0.9 * 0.5 * (1 + np.cos(np.pi * min((n + 1) / 20, 1)))
+    )
+    for g in gradients:
+        grad.assign(g)
+        wp.launch(adam.advance, 5, inputs=[0], outputs=[ages, clock], device=device)
+        inputs = [0, grad, ages, clock, 20, 0.1, 0.1, -100.0, 100.0]
+        wp.launch(adam.adam_update, (5, 4), inputs=inputs, outputs=[value, m1, m2], device=device)
+        x.grad = torch.tensor(g, dtype=torch.float64)
+        optimizer.step()
+        schedule.step()
+    np.testing.assert_allclose(value.numpy(), x.detach().numpy(), rtol=1e-4, atol=1e-4)
+    assert clock.numpy()[0] == 20
+
+
+def test_adam_keeps_bounds_and_ignores_what_is_not_finite(device: str) -> None:
+    value = wp.array(np.array([[0.5, 0.5]], np.float32), dtype=float, device=device)
+    grad = wp.array(np.array([[-1.0, np.nan]], np.float32), dtype=float, device=device)
+    m1, m2 = wp.zeros_like(value), wp.zeros_like(value)
+    ages, clock = wp.ones(1, dtype=int, device=device), wp.ones(1, dtype=int, device=device)
+    inputs = [0, grad, ages, clock, 10, 5.0, 1.0, 0.0, 1.0]
+    wp.launch(adam.adam_update, (1, 2), inputs=inputs, outputs=[value, m1, m2], device=device)
+    np.testing.assert_array_equal(value.numpy(), [[1.0, 0.5]])

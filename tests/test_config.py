@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from warpsplat.config import PRESETS, Settings, make_settings
+from warpsplat.errors import UsageError
+
+
+def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
+    for name, changes in PRESETS.items():
+        settings = make_settings(name)
+        assert settings == replace(Settings(), quality=name, **changes)
+
+
+def test_overrides_win_and_none_is_left_out() -> None:
+    settings = make_settings("draft", curves=7, seed=None)
+    assert (settings.curves, settings.seed) == (7, Settings().seed)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("curves", 0), ("curves", -3), ("curves", 1.5), ("curves", "many"), ("curves", True), ("seed", -1)]
+    + [("iterations", 0), ("precision", 9), ("kind", "round"), ("colour", 3)],
+)
+def test_bad_values(name: str, value: object) -> None:
+    with pytest.raises(UsageError, match=name):
+        make_settings(**{name: value})
+
+
+def test_bad_quality() -> None:
+    with pytest.raises(UsageError, match="draft, balanced, high"):
+        make_settings("best")  # type: ignore[arg-type]
+
+
+def test_fingerprint_sees_every_setting() -> None:
+    base = Settings()
+    assert base.fingerprint() == Settings().fingerprint()
+    others = [replace(base, seed=1), replace(base, rates=replace(base.rates, points=2.0)), replace(base, kind="open")]
+    assert len({s.fingerprint() for s in (base, *others)}) == 4

@@ -1,0 +1,120 @@
+"""Reading images: every kind that is fine, every kind that is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from warpsplat.errors import ImageError
+from warpsplat.image import load_image
+
+RNG = np.random.default_rng(0)
+RGB = RNG.integers(0, 256, (20, 33, 3), dtype=np.uint8)
+
+
+def save(folder: Path, image: Image.Image, name: str, **options: object) -> Path:
+    path = folder / name
+    image.save(path, **options)
+    return path
+
+
+def test_plain(tmp_path: Path) -> None:
+    pixels = load_image(save(tmp_path, Image.fromarray(RGB), "a.png"))
+    assert pixels.dtype == np.float32
+    np.testing.assert_allclose(pixels * 255, RGB, atol=1e-4)
+
+
+def test_transparency_goes_on_white(tmp_path: Path) -> None:
+    rgba = np.dstack([RGB, np.full((20, 33), 51, np.uint8)])
+    pixels = load_image(save(tmp_path, Image.fromarray(rgba), "a.png"))
+    np.testing.assert_allclose(pixels * 255, 0.2 * RGB + 0.8 * 255, atol=0.01)
+
+
+def test_grey_and_grey_with_alpha(tmp_path: Path) -> None:
+    grey = load_image(save(tmp_path, Image.fromarray(RGB[..., 0]), "grey.png"))
+    np.testing.assert_allclose(grey[..., 1] * 255, RGB[..., 0], atol=1e-4)
+    clear = Image.merge("LA", [Image.fromarray(RGB[..., 0]), Image.new("L", (33, 20), 0)])
+    assert (load_image(save(tmp_path, clear, "la.png")) == 1).all()
+
+
+def test_palette_with_and_without_transparency(tmp_path: Path) -> None:
+    palette = Image.fromarray(RGB).quantize(16)
+    np.testing.assert_allclose(
+        load_image(save(tmp_path, palette, "p.png")) * 255, np.asarray(palette.convert("RGB")), atol=1e-4
+    )
+    index = int(np.asarray(palette)[0, 0])
+    pixels = load_image(save(tmp_path, palette, "t.png", transparency=index))
+    np.testing.assert_array_equal(pixels[0, 0], 1)
+
+
+def test_16_bit_keeps_its_precision(tmp_path: Path) -> None:
+    deep = RNG.integers(0, 65536, (20, 33)).astype(np.uint16)
+    for name in ("a.png", "a.tif", "a.pgm"):
+        pixels = load_image(save(tmp_path, Image.fromarray(deep), name))
+        np.testing.assert_allclose(pixels[..., 2] * 65535, deep, atol=0.02, err_msg=name)
+
+
+def test_one_bit(tmp_path: Path) -> None:
+    pixels = load_image(save(tmp_path, Image.fromarray(RGB).convert("1"), "a.png"))
+    assert set(np.unique(pixels)) == {0.0, 1.0}
+
+
+def test_cmyk(tmp_path: Path) -> None:
+    image = Image.new("CMYK", (8, 8), (0, 255, 255, 0))
+    np.testing.assert_allclose(load_image(save(tmp_path, image, "a.tif"))[0, 0], [1, 0, 0], atol=0.01)
+
+
+def test_exif_rotation(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    pixels = load_image(save(tmp_path, Image.fromarray(RGB), "a.png", exif=exif))
+    assert pixels.shape == (33, 20, 3)
+    np.testing.assert_allclose(pixels * 255, np.rot90(RGB, -1), atol=1e-4)
+
+
+def test_animation_gives_its_first_frame(tmp_path: Path) -> None:
+    frames = [Image.new("RGB", (8, 8), c) for c in ("red", "blue")]
+    path = save(tmp_path, frames[0], "a.gif", save_all=True, append_images=frames[1:])
+    np.testing.assert_allclose(load_image(path)[0, 0], [1, 0, 0])
+
+
+def bad_files(folder: Path) -> dict[str, Path]:
+    whole = save(folder, Image.fromarray(RGB), "whole.png").read_bytes()
+    jpeg = save(folder, Image.fromarray(np.tile(RGB, (4, 4, 1))), "whole.jpg").read_bytes()
+    contents = {
+        "empty.png": b"",
+        "text.png": b"hello, I am text\n" * 10,
+        "truncated.png": whole[: len(whole) // 2],
+        "truncated.jpg": jpeg[: len(jpeg) // 2],
+        "corrupt.png": whole[:60] + b"\x00" * 40 + whole[100:],
+    }
+    files = {}
+    for name, data in contents.items():
+        files[name] = folder / name
+        files[name].write_bytes(data)
+    files["one.png"] = save(folder, Image.new("RGB", (1, 1)), "one.png")
+    files["missing.png"] = folder / "missing.png"
+    files["folder.png"] = folder / "folder.png"
+    files["folder.png"].mkdir()
+    return files
+
+
+def test_bad_files_give_one_line_with_name_and_cause(tmp_path: Path) -> None:
+    for name, path in bad_files(tmp_path).items():
+        with pytest.raises(ImageError) as caught:
+            load_image(path)
+        message = str(caught.value)
+        assert message.startswith(f"{path}: "), name
+        assert "\n" not in message
+        assert len(message) > len(str(path)) + 8
+
+
+def test_decompression_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = save(tmp_path, Image.fromarray(RGB), "a.png")
+    for limit in (400, 100):  # a warning of Pillow's at the first, an error at the second
+        monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", limit)
+        with pytest.raises(ImageError, match="too large"):
+            load_image(path)

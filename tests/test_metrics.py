@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.scenes import random_scene
+from warpsplat.errors import ImageError
+from warpsplat.metrics import on_white, psnr, render_svg, score_svg, ssim
+from warpsplat.svg import write_svg
+
+
+def test_psnr() -> None:
+    a = np.zeros((4, 4, 3))
+    assert psnr(a, a) == float("inf")
+    assert psnr(a, a + 255) == pytest.approx(0)
+    assert psnr(a, a + 25.5) == pytest.approx(20)
+
+
+def test_ssim() -> None:
+    rng = np.random.default_rng(0)
+    a = rng.uniform(0, 255, (32, 32, 3))
+    same = ssim(a, a)
+    noisy = ssim(a, np.clip(a + rng.normal(0, 60, a.shape), 0, 255))
+    assert same == pytest.approx(1)
+    assert noisy is not None
+    assert 0.2 < noisy < 0.95
+    assert ssim(a[:11], a[:11]) is None
+
+
+def test_ssim_against_the_formula_at_one_window() -> None:
+    """A 12x12 image has four windows: computed here with explicit weights."""
+    rng = np.random.default_rng(1)
+    a, b = rng.uniform(0, 255, (2, 12, 12, 1))
+    kernel = np.exp(-0.5 * ((np.arange(11) - 5) / 1.5) ** 2)
+    weights = np.outer(kernel, kernel) / kernel.sum() ** 2
+    values = []
+    for y in range(2):
+        for x in range(2):
+            p, q = a[y : y + 11, x : x + 11, 0], b[y : y + 11, x : x + 11, 0]
+            mp, mq = (weights * p).sum(), (weights * q).sum()
+            vp, vq = (weights * p * p).sum() - mp**2, (weights * q * q).sum() - mq**2
+            c = (weights * p * q).sum() - mp * mq
+            c1, c2 = 2.55**2, 7.65**2
+            values.append((2 * mp * mq + c1) * (2 * c + c2) / ((mp**2 + mq**2 + c1) * (vp + vq + c2)))
+    assert ssim(np.repeat(a, 3, 2), np.repeat(b, 3, 2)) == pytest.approx(np.mean(values), rel=1e-6)
+
+
+def test_white_behind_transparency() -> None:
+    image = Image.new("RGBA", (1, 1), (255, 0, 0, 51))
+    np.testing.assert_allclose(on_white(image)[0, 0], [255, 204, 204])
+
+
+def test_score() -> None:
+    scene = random_scene("closed", count=5)
+    text = write_svg(scene)
+    target = (on_white(render_svg(text)) / 255).astype(np.float32)
+    score = score_svg(text, target)
+    assert score.psnr > 60
+    assert score.paths == 5
+    assert score.bytes == len(text.encode())
+    assert score.gzip_bytes < score.bytes
+
+
+def test_not_svg() -> None:
+    with pytest.raises(ImageError, match="cannot be rendered"):
+        render_svg("hello")

@@ -1,0 +1,113 @@
+"""The file: numbers, paths, what comes back, and how independent viewers show it."""
+
+from __future__ import annotations
+
+import io
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import cairosvg
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.scenes import disc, random_scene
+from warpsplat.errors import ImageError
+from warpsplat.metrics import on_white, psnr, render_svg
+from warpsplat.render import render
+from warpsplat.scene import Kind
+from warpsplat.svg import hex_color, join_numbers, number, path_data, read_metadata, read_svg, write_svg
+
+NUMBERS = [
+    (0.0, 1, "0"),
+    (-0.04, 1, "0"),
+    (0.5, 1, ".5"),
+    (-0.5, 1, "-.5"),
+    (10.0, 1, "10"),
+    (100.0, 0, "100"),
+    (-20.26, 1, "-20.3"),
+    (1.005, 3, "1.005"),
+]
+
+
+@pytest.mark.parametrize(("value", "decimals", "text"), NUMBERS)
+def test_numbers(value: float, decimals: int, text: str) -> None:
+    assert number(value, decimals) == text
+
+
+def test_numbers_in_a_row() -> None:
+    assert join_numbers(["1", "-2", "3", ".5", "1.5", ".5"]) == "1-2 3 .5 1.5.5"
+
+
+def test_colors() -> None:
+    assert hex_color(np.array([1, 1, 1], np.float32)) == "#fff"
+    assert hex_color(np.array([0, 0.5, 1.2], np.float32)) == "#0080ff"
+
+
+def test_rounding_does_not_add_up() -> None:
+    """A thousand steps of 0.04 at one decimal: the end is at 40, not at 0."""
+    points = np.stack([0.04 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
+    steps = [float(x) for x in path_data(points, False, 1).split("c")[1].replace("-", " -").split()]
+    # Each cubic is relative to the end of the one before.
+    assert sum(steps[4::6]) == pytest.approx(40, abs=0.1)
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+@pytest.mark.parametrize("precision", [0, 1, 2, 3])
+def test_reads_back_what_it_writes(kind: Kind, precision: int) -> None:
+    scene = random_scene(kind, count=9)
+    back = read_svg(write_svg(scene, precision=precision))
+    assert back.kind == scene.kind
+    assert (back.width, back.height) == (scene.width, scene.height)
+    np.testing.assert_allclose(back.points, scene.points, atol=0.51 * 10.0**-precision)
+    np.testing.assert_allclose(back.colors, scene.colors, atol=0.51 / 255)
+    np.testing.assert_allclose(back.opacities, scene.opacities, atol=0.001)
+    np.testing.assert_allclose(back.widths, scene.widths, atol=0.006)
+    np.testing.assert_allclose(back.background, scene.background, atol=0.51 / 255)
+
+
+def test_document() -> None:
+    text = write_svg(random_scene("open", count=2), metadata="key=abc")
+    root = ElementTree.fromstring(text)
+    assert root.attrib["viewBox"] == "0 0 40 36"
+    assert read_metadata(text).endswith("key=abc")
+    group = root.find("{http://www.w3.org/2000/svg}g")
+    assert group is not None
+    assert group.attrib == {"fill": "none", "stroke-linecap": "round", "stroke-linejoin": "round"}
+    assert len(group) == 2
+    assert all(float(p.attrib["stroke-width"]) > 0 for p in group)
+
+
+def test_an_opacity_per_segment_makes_three_paths() -> None:
+    assert write_svg(random_scene("open", count=2, opacity_count=3)).count("<path") == 6
+
+
+def test_opaque_shapes_need_no_opacity() -> None:
+    scene = disc(10, 30, 15)
+    scene.opacities[:] = 2.0
+    assert "fill-opacity" not in write_svg(replace(scene, opacities=np.full((1, 1), 1 / 0.985, np.float32)))
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
+    """Painter's order, opacity, extent: 30 dB between splats and paths of strong contrast."""
+    scene = random_scene(kind, count=10, width=96, height=80, seed=3)
+    inner = on_white(render_svg(write_svg(scene, precision=2)))
+    mine = render(scene, device=device).astype(np.float64) * 255
+    assert psnr(mine, inner) > 30
+    swapped = replace(scene, points=scene.points[::-1].copy())
+    assert psnr(mine, on_white(render_svg(write_svg(swapped)))) < 20
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+def test_viewers_agree(kind: Kind) -> None:
+    text = write_svg(random_scene(kind, count=12, width=96, height=80))
+    other = cairosvg.svg2png(bytestring=text.encode())
+    difference = np.abs(on_white(render_svg(text)) - on_white(Image.open(io.BytesIO(other))))
+    assert difference.mean() < 0.01 * 255
+
+
+@pytest.mark.parametrize("text", ["", "<svg", "<svg/>", '<svg width="3" height="3"><path d="M0 0"/></svg>'])
+def test_foreign_files_are_refused(text: str) -> None:
+    with pytest.raises(ImageError, match="not an SVG written by warpsplat"):
+        read_svg(text)
