@@ -31,11 +31,15 @@ def test_bad_values(name: str, value: object) -> None:
 
 def test_bad_quality() -> None:
     with pytest.raises(UsageError, match="draft, balanced, high"):
-        make_settings("best")  # type: ignore[arg-type]
+        make_settings("best")
 
 
 def test_fingerprint_sees_every_setting() -> None:
     base = Settings()
     assert base.fingerprint() == Settings().fingerprint()
-    others = [replace(base, seed=1), replace(base, rates=replace(base.rates, points=2.0)), replace(base, kind="open")]
+    others = [
+        replace(base, seed=1),
+        replace(base, rates=replace(base.rates, points=2.0)),
+        replace(base, kind="open"),
+    ]
     assert len({s.fingerprint() for s in (base, *others)}) == 4

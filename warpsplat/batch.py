@@ -208,7 +208,8 @@ def load_jobs(path: Path) -> list[Job]:
             folder = image.parent if output is None else path.parent / Path(output).expanduser()
             planned.append((image, folder, settings, device))
     # a.png and a.jpg in one folder keep their endings; an image in two jobs cannot have one result.
-    stems = Counter((folder, image.stem) for image, folder, _, _ in planned)
+    distinct = {(folder, image) for image, folder, _, _ in planned}
+    stems = Counter((folder, image.stem) for folder, image in distinct)
     jobs = []
     for image, folder, settings, device in planned:
         name = image.stem if stems[folder, image.stem] == 1 else image.name

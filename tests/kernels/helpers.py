@@ -15,7 +15,7 @@ from warpsplat.scene import Scene
 def renderer_for(scene: Scene, device: str, scale: float = 1.0, **options: object) -> SplatRenderer:
     parameters = Parameters(scene, wp.get_device(device))
     width, height = round(scene.width * scale), round(scene.height * scale)
-    renderer = SplatRenderer(parameters, width, height, scale, **options)  # type: ignore[arg-type]
+    renderer = SplatRenderer(parameters, width, height, scale, **options)
     renderer.forward_complete()
     return renderer
 

@@ -22,11 +22,15 @@ def test_blending_and_adjoint(device: str, opaque: bool) -> None:
     if opaque:
         scene.opacities[:] = 0.996
     renderer = renderer_for(scene, device)
-    covers = [torch.tensor(c[: scene.height, : scene.width].astype(np.float64)) for c in coverage_images(renderer)]
+    covers = [
+        torch.tensor(c[: scene.height, : scene.width].astype(np.float64)) for c in coverage_images(renderer)
+    ]
     for c in covers:
         c.requires_grad_()
     p = reference.tensors(scene)
-    image = reference.composite(covers, p["colors"], p["opacities"], torch.tensor(scene.background.astype(np.float64)))
+    image = reference.composite(
+        covers, p["colors"], p["opacities"], torch.tensor(scene.background.astype(np.float64))
+    )
     np.testing.assert_allclose(renderer.image.numpy(), image.detach().numpy(), atol=2e-4)
     weights = np.random.default_rng(2).normal(size=image.shape)
     (image * torch.tensor(weights)).sum().backward()
@@ -78,7 +82,9 @@ def test_xing(device: str, kind: Kind) -> None:
     p.points_grad.zero_()
     per_curve = wp.zeros(len(scene), dtype=float, device=device)
     inputs = [0, p.points, int(kind == "closed"), 0.7]
-    wp.launch(loss.xing_backward, len(scene), inputs=inputs, outputs=[p.points_grad, per_curve], device=device)
+    wp.launch(
+        loss.xing_backward, len(scene), inputs=inputs, outputs=[p.points_grad, per_curve], device=device
+    )
     points = torch.tensor(scene.points, dtype=torch.float64, requires_grad=True)
     value = reference.xing(scene, points)
     assert float(value.detach()) > 0.05
@@ -97,7 +103,9 @@ def test_xing_is_zero_for_a_convex_outline(device: str) -> None:
     p = renderer_for(scene, device).parameters
     p.points_grad.zero_()
     per_curve = wp.zeros(1, dtype=float, device=device)
-    wp.launch(loss.xing_backward, 1, inputs=[0, p.points, 1, 1.0], outputs=[p.points_grad, per_curve], device=device)
+    wp.launch(
+        loss.xing_backward, 1, inputs=[0, p.points, 1, 1.0], outputs=[p.points_grad, per_curve], device=device
+    )
     assert per_curve.numpy()[0] == 0
     assert not p.gradients()["points"].any()
 

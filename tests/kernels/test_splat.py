@@ -55,14 +55,18 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
     tiles = renderer.slot_tile.numpy()
     for part, grid in enumerate(grids):
         mean, scale, angle = (x.detach().requires_grad_() for x in reference.gaussians(grid, runs=runs))
-        cover = 1 - torch.prod(1 - reference.gaussian_values(mean, scale, angle, renderer.width, renderer.height), 0)
+        cover = 1 - torch.prod(
+            1 - reference.gaussian_values(mean, scale, angle, renderer.width, renderer.height), 0
+        )
         np.testing.assert_allclose(got[part], cover.detach().numpy(), atol=2e-3)
         assert np.abs(got[part] - cover.detach().numpy()).mean() < 1e-5
         total = torch.zeros(())
         for slot in range(renderer.slot_first.numpy()[part], renderer.slot_last.numpy()[part]):
             y, x = divmod(int(tiles[slot]), renderer.tiles_x)
             block = cover[TILE * y : TILE * (y + 1), TILE * x : TILE * (x + 1)]
-            weights = torch.tensor(coverage_grad[slot].reshape(TILE, TILE))[: block.shape[0], : block.shape[1]]
+            weights = torch.tensor(coverage_grad[slot].reshape(TILE, TILE))[
+                : block.shape[0], : block.shape[1]
+            ]
             total = total + (block * weights).sum()
         total.backward()
         rows = slice(renderer.part_first.numpy()[part], renderer.part_last.numpy()[part])
@@ -171,7 +175,9 @@ def test_stroke_covers_caps_and_joins(device: str) -> None:
 def test_invisible_and_outside_shapes_change_nothing(device: str) -> None:
     scene = random_scene("closed", count=3)
     clear = replace(scene, opacities=np.zeros_like(scene.opacities))
-    np.testing.assert_array_equal(render(clear, device=device), np.broadcast_to(scene.background, (36, 40, 3)))
+    np.testing.assert_array_equal(
+        render(clear, device=device), np.broadcast_to(scene.background, (36, 40, 3))
+    )
     away = replace(scene, points=scene.points + np.float32(500))
     renderer = renderer_for(away, device)
     assert renderer.needed_slots.numpy()[0] == 0

@@ -1,0 +1,164 @@
+"""Batch files: what is accepted, what is refused with line and key, and what a run does."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import warpsplat.configs
+from tests.test_cli import run
+from warpsplat.batch import load_jobs
+from warpsplat.errors import UsageError
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    rng = np.random.default_rng(0)
+    (tmp_path / "in" / "deep").mkdir(parents=True)
+    for name in ("in/a.png", "in/b.png", "in/b.jpg", "in/deep/c.png"):
+        Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(tmp_path / name)
+    (tmp_path / "in" / "broken.png").write_bytes(b"no image")
+    return tmp_path
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "jobs.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_jobs(folder: Path) -> None:
+    jobs = load_jobs(
+        write(
+            folder,
+            """
+defaults: {curves: 9, open: true, output: out, device: cpu}
+jobs:
+  - images: in/[ab].*
+    closed: true
+  - images: [in/**/c.png, in/broken.png]
+    curves: 5
+    quality: draft
+    output: other
+""",
+        )
+    )
+    assert [(str(j.image.relative_to(folder)), str(j.output.relative_to(folder))) for j in jobs] == [
+        ("in/a.png", "out/a.svg"),
+        ("in/b.jpg", "out/b.jpg.svg"),
+        ("in/b.png", "out/b.png.svg"),
+        ("in/deep/c.png", "other/c.svg"),
+        ("in/broken.png", "other/broken.svg"),
+    ]
+    assert [j.settings.kind for j in jobs] == ["closed"] * 3 + ["open"] * 2
+    assert [j.settings.curves for j in jobs] == [9, 9, 9, 5, 5]
+    assert jobs[3].settings.quality == "draft"
+    assert {j.device for j in jobs} == {"cpu"}
+
+
+def test_without_output_beside_the_image(folder: Path) -> None:
+    assert load_jobs(write(folder, "jobs: [{images: in/a.png}]"))[0].output == folder / "in" / "a.svg"
+
+
+BAD = [
+    ("", 1, "mapping"),
+    ("- 1", 1, "mapping"),
+    ("defaults: {}\n", 1, "'jobs' is missing"),
+    ("jobs:\n  - curves: 3\n", 2, "'images' is missing"),
+    ("jobs: []\n", 1, "at least one"),
+    ("jobs:\n  - images: in/a.png\n    curvs: 3\n", 3, "curvs"),
+    ("jobs:\n  - images: in/a.png\n    curves: 0\n", 3, "curves"),
+    ("jobs:\n  - images: in/a.png\n    curves: '12'\n", 3, "curves"),
+    ("jobs:\n  - images: in/a.png\n    curves:\n", 3, "curves"),
+    ("defaults:\n  seed: true\njobs:\n  - images: in/a.png\n", 2, "seed"),
+    ("defaults:\n  quality: best\njobs:\n  - images: in/a.png\n", 2, "quality"),
+    ("defaults:\n  quality: [draft]\njobs:\n  - images: in/a.png\n", 2, "quality"),
+    ("jobs:\n  - images: in/a.png\n    closed: true\n    open: true\n", 4, "open"),
+    ("jobs:\n  - images: in/a.png\n    open: no\n", 3, "open"),
+    ("jobs:\n  - images: in/a.png\n    output: 3\n", 3, "output"),
+    ("jobs:\n  - images: nothing/*.png\n", 2, "nothing/*.png"),
+    ("jobs:\n  - images: 7\n", 2, "images"),
+    ("jobs:\n  - images: in/a.png\n    curves: 1\n    curves: 2\n", 4, "twice"),
+    ("jobs:\n  - images: in/a.png\n  - images: in/a.png\n", 1, "a.svg"),
+    ("jobs:\n  - images: [in/a.png\n", 3, "YAML"),
+    ("jobs:\n\t- images: x\n", 2, "YAML"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "word"), BAD)
+def test_errors_name_line_and_key(
+    folder: Path, capsys: pytest.CaptureFixture[str], text: str, line: int, word: str
+) -> None:
+    path = write(folder, text)
+    before = sorted(os.listdir(folder / "in"))
+    assert run("batch", path) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"warpsplat: {path}:{line}: "), captured.err
+    assert word in captured.err
+    assert captured.err.count("\n") == 1
+    assert sorted(os.listdir(folder / "in")) == before, "nothing started"
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no such file"):
+        load_jobs(tmp_path / "none.yaml")
+
+
+def test_unknown_device_stops_before_anything_starts(folder: Path) -> None:
+    path = write(folder, "jobs: [{images: in/a.png, device: 'cuda:77'}]")
+    assert run("batch", path) == 2
+    assert not (folder / "in" / "a.svg").exists()
+
+
+def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "defaults: {curves: 4, iterations: 6, device: cpu, output: out}\njobs: [{images: in/*.png}]\n"
+    path = write(folder, text)
+    assert run("batch", path) == 5
+    captured = capsys.readouterr()
+    assert "3 images: 2 made, 0 skipped, 1 failed" in captured.out
+    assert "broken.png: not an image" in captured.err
+    assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg"]
+    times = {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
+
+    assert run("batch", path, "--json") == 5
+    values = json.loads(capsys.readouterr().out)
+    assert (values["made"], values["skipped"], values["failed"]) == (0, 2, 1)
+    assert times == {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
+
+    Image.new("RGB", (32, 24), "red").save(folder / "in" / "a.png")  # another image under the old name
+    (folder / "in" / "broken.png").unlink()
+    assert run("batch", path, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 1
+
+    write(folder, text.replace("curves: 4", "curves: 5"))
+    assert run("batch", path, "-q") == 0
+    assert capsys.readouterr() == ("", "")
+    assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
+
+
+def test_a_stopped_result_is_made_again(folder: Path) -> None:
+    path = write(folder, "jobs: [{images: in/a.png, curves: 4, iterations: 5, device: cpu}]")
+    assert run("batch", path, "-q") == 0
+    job = load_jobs(path)[0]
+    assert job.done()
+    svg = job.output.read_text()
+    job.output.write_text(svg[: svg.index("key=")] + "stopped" + svg[svg.index("</metadata>") :])
+    assert not job.done()
+
+
+def test_examples_are_valid(tmp_path: Path) -> None:
+    examples = sorted(Path(p) for p in warpsplat.configs.__path__)[0]
+    files = sorted(examples.glob("*.yaml"))
+    assert files
+    for name in ("photos/a.jpg", "photos/b.png", "more/x/c.png", "portrait.png"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    for file in files:
+        copy = tmp_path / file.name
+        copy.write_text(file.read_text())
+        assert load_jobs(copy)

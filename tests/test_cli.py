@@ -1,0 +1,222 @@
+"""The command line as a user meets it: exit codes, messages, files."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.test_image import bad_files
+from warpsplat import __version__
+from warpsplat.cli.main import main
+from warpsplat.metrics import on_white, psnr, render_svg
+
+QUICK = ["--curves", "8", "--iterations", "12", "--device", "cpu"]
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    path = tmp_path / "photo.png"
+    y, x = np.mgrid[:40, :60]
+    Image.fromarray(np.stack([4 * x, 6 * y, 0 * x + 90], axis=2).astype(np.uint8)).save(path)
+    return path
+
+
+def run(*arguments: object) -> int:
+    """Exit code of the command line in this process."""
+    with pytest.raises(SystemExit) as caught:
+        main([str(a) for a in arguments])
+    return int(caught.value.code or 0)
+
+
+def one_line(text: str) -> str:
+    lines = text.strip().splitlines()
+    assert len(lines) == 1, text
+    assert "Traceback" not in text
+    return lines[0]
+
+
+def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
+    code = (
+        "import sys; from warpsplat.cli.main import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit as e: assert not e.code\n"
+        "heavy = {'warp', 'numpy', 'torch', 'cv2', 'PIL'} & set(sys.modules); assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for name in ("vectorize", "batch", "render", "info"):
+        assert name in done.stdout
+
+
+def test_a_run_never_imports_torch(image: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys; from warpsplat.cli.main import main\n"
+        f"try: main(['vectorize', {str(image)!r}, '-o', {str(tmp_path / 'a.svg')!r}, '-q', *{QUICK!r}])\n"
+        "except SystemExit as e: assert not e.code\n"
+        "assert 'torch' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout == ""
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--version") == 0
+    assert __version__ in capsys.readouterr().out
+
+
+def test_info(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("info", "--json") == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["warpsplat"] == __version__
+    assert "cpu" in [d["name"] for d in values["devices"]]
+    assert run("info") == 0
+    assert "(default)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", ["--closed", "--open"])
+def test_vectorize(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str) -> None:
+    output = tmp_path / "out.svg"
+    assert run("vectorize", image, "-o", output, kind, "--json", *QUICK) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["paths"] == 8
+    assert values["bytes"] == output.stat().st_size
+    shown = on_white(render_svg(output.read_text()))
+    assert values["psnr"] == pytest.approx(psnr(shown, on_white(Image.open(image))), abs=0.01)
+
+
+def test_summary_and_default_output(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("vectorize", image, *QUICK) == 0
+    assert (tmp_path / "photo.svg").exists()
+    captured = capsys.readouterr()
+    assert re.fullmatch(r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}, 8 paths, .* s\n", captured.out)
+    assert captured.err == "", "no progress bar where stderr is no terminal"
+
+
+def test_bad_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, path in bad_files(tmp_path).items():
+        before = set(os.listdir(tmp_path))
+        assert run("vectorize", path, "-o", tmp_path / "out.svg", *QUICK) == 3, name
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert str(path) in one_line(captured.err)
+        assert set(os.listdir(tmp_path)) == before
+
+
+WRONG = [
+    (["--curves", "0"], "curves"),
+    (["--curves", "-5"], "curves"),
+    (["--curves", "many"], "--curves"),
+    (["--quality", "best"], "--quality"),
+    (["--device", "cuda:99"], "cuda:99"),
+    (["--device", "tpu"], "tpu"),
+    (["--iterations", "0"], "iterations"),
+    (["--frobnicate"], "--frobnicate"),
+    (["-o", "missing/folder/a.svg"], "does not exist"),
+    (["-o", "."], "is a folder"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "word"), WRONG)
+def test_wrong_usage(
+    image: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], word: str
+) -> None:
+    assert run("vectorize", image, *arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert word in captured.err
+    assert "Traceback" not in captured.err
+
+
+def test_the_image_is_not_overwritten(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = image.read_bytes()
+    assert run("vectorize", image, "-o", image, *QUICK) == 2
+    assert "is the image itself" in one_line(capsys.readouterr().err)
+    assert image.read_bytes() == before
+
+
+def test_a_full_disk_is_one_line(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    assert run("vectorize", image, "-o", tmp_path / "a.svg", *QUICK) == 4
+    assert "No space left on device" in one_line(capsys.readouterr().err)
+    assert os.listdir(tmp_path) == ["photo.png"]
+
+
+def test_ctrl_c_writes_the_best_so_far(image: Path, tmp_path: Path) -> None:
+    """In a terminal: the progress bar shows, Ctrl-C ends the run, the file is there and valid."""
+    output = tmp_path / "a.svg"
+    command = [sys.executable, "-m", "warpsplat", "vectorize", str(image), "-o", str(output)]
+    primary, secondary = pty.openpty()
+    process = subprocess.Popen(
+        [*command, "--curves", "8", "--iterations", "900000", "--device", "cpu"],
+        stdout=subprocess.PIPE,
+        stderr=secondary,
+        text=True,
+    )
+    os.close(secondary)
+    shown = b""
+    deadline = time.monotonic() + 120
+    while b"dB" not in shown and time.monotonic() < deadline:
+        shown += os.read(primary, 1000)
+    assert b"photo.png" in shown
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    os.close(primary)
+    assert process.returncode == 130
+    assert "stopped after" in out
+    render_svg(output.read_text())
+
+
+def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
+    assert run("vectorize", image, "-o", svg, "-q", *QUICK) == 0
+    assert run("render", svg, "-o", png, "--scale", "2.5") == 0
+    with Image.open(png) as picture:
+        assert picture.size == (150, 100)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_render_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good = tmp_path / "good.svg"
+    good.write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 4 2"/>')
+    (tmp_path / "binary.svg").write_bytes(bytes(range(256)))
+    (tmp_path / "text.svg").write_text("hello")
+    for name in ("binary.svg", "text.svg", "missing.svg", "."):
+        assert run("render", tmp_path / name, "-o", tmp_path / "a.png") == 3
+        assert name.strip(".") in one_line(capsys.readouterr().err)
+    for scale in ("0", "-1", "nan", "1e9"):
+        assert run("render", good, "-o", tmp_path / "a.png", "--scale", scale) == 2
+        assert "scale" in one_line(capsys.readouterr().err)
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_render_takes_any_svg(tmp_path: Path) -> None:
+    foreign = tmp_path / "a.svg"
+    foreign.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 5"><circle cx="5" cy="2" r="2" fill="red"/></svg>'
+    )
+    assert run("render", foreign, "-o", tmp_path / "a.png", "--scale", "4") == 0
+    picture = Image.open(io.BytesIO((tmp_path / "a.png").read_bytes())).convert("RGBA")
+    assert picture.size == (40, 20)
+    assert picture.getpixel((20, 8)) == (255, 0, 0, 255)
