@@ -214,7 +214,8 @@ def test_render_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
 def test_render_takes_any_svg(tmp_path: Path) -> None:
     foreign = tmp_path / "a.svg"
     foreign.write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 5"><circle cx="5" cy="2" r="2" fill="red"/></svg>'
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 5">'
+        '<circle cx="5" cy="2" r="2" fill="red"/></svg>'
     )
     assert run("render", foreign, "-o", tmp_path / "a.png", "--scale", "4") == 0
     picture = Image.open(io.BytesIO((tmp_path / "a.png").read_bytes())).convert("RGBA")
