@@ -24,6 +24,11 @@ def quality_options(function: Function) -> Function:
         click.option(
             "--quality", type=click.Choice(QUALITIES), help=f"Effort.  [default: {_defaults.quality}]"
         ),
+        click.option(
+            "--renderer",
+            type=click.Choice(["exact", "splat"]),
+            help=f"Model of coverage: the file's, or the paper's Gaussians.  [default: {_defaults.renderer}]",
+        ),
         click.option("--iterations", type=int, metavar="N", help="Steps; overrides the effort's number."),
         click.option("--seed", type=int, metavar="N", help=f"Random seed.  [default: {_defaults.seed}]"),
         click.option(

@@ -4,7 +4,8 @@ alpha = opacity x coverage; C = sum_i c_i alpha_i prod_{j<i} (1 - alpha_j) + bac
 Both directions run front to back. The adjoint starts from total = dot(C, dL/dC), subtracts each part's own
 share and so knows the share of all that lies behind, without stored lists:
 dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
-A coverage may come from splats or from any other model: this stage knows only slots.
+A coverage may come from splats or from any other model: this stage knows only slots. It takes the magnitude
+(an exact fill stores which way round it is as a sign), and 1 throughout a slot whose state is FULL.
 """
 
 import warp as wp
@@ -15,6 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 TILE = wp.constant(constants.TILE)
 TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
+FULL = wp.constant(constants.FULL)
 
 
 @wp.kernel
@@ -27,7 +29,7 @@ def composite_forward(
     tile_last: wp.array[wp.int32],  # [tile_count]
     sort_slots: wp.array[wp.int32],  # [2 x slot_capacity] slots by tile, front to back
     slot_part: wp.array[wp.int32],  # [slot_capacity]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes]
+    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
     coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
     opacity_count: wp.int32,
     colors: wp.array[wp.vec3],  # [curve_count]
@@ -54,7 +56,8 @@ def composite_forward(
     while k < last:
         slot = sort_slots[k]
         k += 1
-        if slot_seen[slot, lane] != 0:
+        state = slot_seen[slot, lane]
+        if state != 0:
             part = slot_part[slot]
             curve = part / opacity_count
             color = colors[curve]
@@ -65,7 +68,9 @@ def composite_forward(
                 for x in range(x0, x1):
                     t = transmittance[y, x]
                     if t > TRANSMITTANCE_MIN:
-                        alpha = opacity * coverage[slot, base + x]
+                        alpha = opacity
+                        if state != FULL:
+                            alpha = opacity * wp.abs(coverage[slot, base + x])
                         image[y, x] = image[y, x] + (t * alpha) * color
                         t = t * (1.0 - alpha)
                         transmittance[y, x] = t
@@ -87,7 +92,7 @@ def composite_backward(
     tile_last: wp.array[wp.int32],  # [tile_count]
     sort_slots: wp.array[wp.int32],  # [2 x slot_capacity]
     slot_part: wp.array[wp.int32],  # [slot_capacity]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes]
+    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
     coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
     opacity_count: wp.int32,
     colors: wp.array[wp.vec3],  # [curve_count]
@@ -117,7 +122,8 @@ def composite_backward(
         slot = sort_slots[k]
         color_sum = wp.vec3(0.0, 0.0, 0.0)
         opacity_sum = float(0.0)
-        if slot_seen[slot, lane] != 0:
+        state = slot_seen[slot, lane]
+        if state != 0:
             part = slot_part[slot]
             curve = part / opacity_count
             color = colors[curve]
@@ -133,7 +139,9 @@ def composite_backward(
                         t = transmittance[y, x]
                         alpha_grad = float(0.0)
                         if t > TRANSMITTANCE_MIN:
-                            c = coverage[slot, base + x]
+                            c = float(1.0)
+                            if state != FULL:
+                                c = wp.abs(coverage[slot, base + x])
                             alpha = opacity * c
                             g = image_grad[y, x]
                             share = t * wp.dot(color, g)

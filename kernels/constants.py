@@ -56,3 +56,14 @@ INT_MAX = 2**31 - 1
 PLATEAU = 0.985
 """Mean coverage well inside a splatted shape (its Gaussians overlap to a little less than 1). A solid path
 with this fraction of the opacity looks like the splat."""
+
+FLATNESS = 0.03
+"""Largest distance [px] of a flattened curve from the curve. Coarser pieces are fitted to the image by the
+optimiser and then missing in the file, whose curves are smooth (docs/experiments.md)."""
+
+PIECES_MIN = 3
+PIECES_MAX = 64
+"""Bounds of the straight pieces of one cubic; 64 are enough for one as large as 8,000 px."""
+
+FULL = 2
+"""State of a slot that is covered throughout: compositing need not read its coverage."""

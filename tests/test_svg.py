@@ -13,6 +13,7 @@ from PIL import Image
 
 from tests.scenes import disc, random_scene
 from warpsplat.errors import ImageError
+from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import on_white, psnr, render_svg
 from warpsplat.render import render
 from warpsplat.scene import Kind
@@ -85,16 +86,18 @@ def test_an_opacity_per_segment_makes_three_paths() -> None:
 def test_opaque_shapes_need_no_opacity() -> None:
     scene = disc(10, 30, 15)
     scene.opacities[:] = 2.0
-    assert "fill-opacity" not in write_svg(replace(scene, opacities=np.full((1, 1), 1 / 0.985, np.float32)))
+    assert "fill-opacity" not in write_svg(replace(scene, opacities=np.full((1, 1), 0.9985, np.float32)))
 
 
 @pytest.mark.parametrize("kind", ["closed", "open"])
 def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
-    """Painter's order, opacity, extent: 30 dB between splats and paths of strong contrast."""
+    """Painter's order, opacity, extent: for the exact model, and for splats of strong contrast."""
     scene = random_scene(kind, count=10, width=96, height=80, seed=3)
     inner = on_white(render_svg(write_svg(scene, precision=2)))
     mine = render(scene, device=device).astype(np.float64) * 255
-    assert psnr(mine, inner) > 30
+    assert psnr(mine, inner) > 42
+    shown = on_white(render_svg(write_svg(scene, precision=2, opacity_scale=PLATEAU)))
+    assert psnr(render(scene, renderer="splat", device=device).astype(np.float64) * 255, shown) > 30
     swapped = replace(scene, points=scene.points[::-1].copy())
     assert psnr(mine, on_white(render_svg(write_svg(swapped)))) < 20
 

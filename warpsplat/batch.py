@@ -30,7 +30,7 @@ from warpsplat.errors import UsageError
 from warpsplat.pipeline import job_key
 from warpsplat.svg import read_metadata
 
-SETTING_KEYS = ("curves", "quality", "iterations", "seed", "precision")
+SETTING_KEYS = ("curves", "quality", "iterations", "seed", "precision", "renderer")
 KIND_KEYS = ("closed", "open")
 TEXT_KEYS = ("output", "device")
 KEYS = (*SETTING_KEYS, *KIND_KEYS, *TEXT_KEYS)

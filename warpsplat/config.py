@@ -12,6 +12,7 @@ from warpsplat.scene import Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
+Renderer = Literal["exact", "splat"]
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class Settings:
     """Cubics in each of the two chains of a closed curve."""
     segment_opacities: bool = False
     """Strokes with an opacity per segment (the paper's 3-opacity): each is three paths in the file."""
+    renderer: Renderer = "exact"
+    """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
     xing: float = 0.001
@@ -102,7 +105,11 @@ class Settings:
         for name, value, low, high in checks:
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
-        choices = (("kind", self.kind, ("closed", "open")), ("order", self.order, ("age", "area")))
+        choices = (
+            ("kind", self.kind, ("closed", "open")),
+            ("order", self.order, ("age", "area")),
+            ("renderer", self.renderer, ("exact", "splat")),
+        )
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")

@@ -15,6 +15,7 @@ from warpsplat import __version__
 from warpsplat.config import Settings
 from warpsplat.files import write_atomically
 from warpsplat.image import load_image
+from warpsplat.kernels import constants
 from warpsplat.metrics import Score, score_svg
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg import write_svg
@@ -81,7 +82,8 @@ def vectorize(
         scene = trainer.run(report, stop)
     finally:
         trainer.close()
-    svg = write_svg(scene, precision=settings.precision, metadata=metadata)
+    plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
+    svg = write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
     return Result(
         svg=svg,
         scene=scene,

@@ -14,13 +14,15 @@ import numpy as np
 
 from warpsplat import __version__
 from warpsplat.errors import ImageError
-from warpsplat.kernels import constants
 from warpsplat.scene import FloatArray, Kind, Scene
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
 OPACITY_DECIMALS = 3
 """An 8-bit colour moves by less than an eighth of a level for half a unit of the third decimal."""
+
+OPAQUE = 1 - 0.5 / 255
+"""From here on an opacity is left out: opaque paths are smaller and quicker to draw."""
 
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
 
@@ -66,7 +68,7 @@ def hex_color(color: FloatArray) -> str:
     return f"#{text}"
 
 
-def _elements(scene: Scene, precision: int) -> Iterator[str]:
+def _elements(scene: Scene, precision: int, opacity_scale: float) -> Iterator[str]:
     attribute = "fill" if scene.kind == "closed" else "stroke"
     parts = scene.opacities.shape[1]
     for i in range(len(scene)):
@@ -76,22 +78,23 @@ def _elements(scene: Scene, precision: int) -> Iterator[str]:
         steps = (scene.points.shape[1] - 1) // parts
         for j in range(parts):
             points = scene.points[i] if parts == 1 else scene.points[i, j * steps : (j + 1) * steps + 1]
-            # A splat's plateau is a little below 1: a solid path needs that much less opacity to look alike.
-            shown = float(scene.opacities[i, j]) * constants.PLATEAU
+            shown = min(float(scene.opacities[i, j]) * opacity_scale, 1.0)
             opacity = number(shown, OPACITY_DECIMALS)
-            extra = "" if opacity == "1" else f' {attribute}-opacity="{opacity}"'
+            extra = "" if shown >= OPAQUE else f' {attribute}-opacity="{opacity}"'
             yield f'<path d="{path_data(points, scene.kind == "closed", precision)}" {style}{extra}/>'
 
 
-def write_svg(scene: Scene, *, precision: int = 1, metadata: str = "") -> str:
+def write_svg(scene: Scene, *, precision: int = 1, metadata: str = "", opacity_scale: float = 1.0) -> str:
     """The scene as an SVG document: a background and one path a shape, in painter's order.
 
     Args:
         scene: what to write; canvas units become user units.
         precision: decimals of coordinates.
         metadata: text for the ``metadata`` element, besides the program's name and version.
+        opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
+            below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
     """
-    shapes = "\n".join(_elements(scene, precision))
+    shapes = "\n".join(_elements(scene, precision, opacity_scale))
     group = f"<g {STROKE_ATTRIBUTES}>" if scene.kind == "open" else "<g>"
     note = f"warpsplat {__version__} {metadata}".strip()
     return (
@@ -145,14 +148,14 @@ def read_svg(text: str) -> Scene:
         assert background is not None
         kind: Kind = "open" if paths and "stroke" in paths[0].attrib else "closed"
         attribute = "fill" if kind == "closed" else "stroke"
-        opacities = [float(p.get(f"{attribute}-opacity", "1")) / constants.PLATEAU for p in paths]
+        opacities = [float(p.get(f"{attribute}-opacity", "1")) for p in paths]
         return Scene(
             kind=kind,
             width=width,
             height=height,
             points=np.stack([_parse_points(p.attrib["d"], kind) for p in paths]),
             colors=np.array([parse_color(p.attrib[attribute]) for p in paths], np.float32),
-            opacities=np.minimum(np.array(opacities, np.float32), 1.0)[:, None],
+            opacities=np.array(opacities, np.float32)[:, None],
             widths=np.array([float(p.get("stroke-width", "0")) for p in paths], np.float32),
             background=np.array(parse_color(background.attrib["fill"]), np.float32),
         )

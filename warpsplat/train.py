@@ -17,13 +17,13 @@ from warpsplat.initialize import grid_scene
 from warpsplat.kernels import adam, loss
 from warpsplat.launch import Program
 from warpsplat.parameters import Parameters
-from warpsplat.render import SplatRenderer
+from warpsplat.render import TileRenderer, make_renderer
 from warpsplat.scene import FloatArray, Scene
 
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
 
-OPACITY_RANGE = (0.02, 0.996)
+OPACITY_RANGE = (0.02, 0.9985)
 """Bounds of an opacity. The upper one rounds to opaque in the file and keeps 1 - alpha away from 0."""
 
 
@@ -78,7 +78,7 @@ class Trainer:
         self.parameters = Parameters(grid_scene(settings, target, self.rng), device)
         self.clock = wp.zeros(1, dtype=wp.int32, device=device)
         self.loss = wp.zeros(1, dtype=wp.float32, device=device)
-        self.renderer: SplatRenderer | None = None
+        self.renderer: TileRenderer | None = None
         self.measure: Program | None = None
         self.update: Program | None = None
         self.overflows = 0
@@ -99,12 +99,13 @@ class Trainer:
         self.row_loss = wp.zeros(phase.height, dtype=wp.float32, device=self.device)
         self._record(phase.width, phase.height, None)
 
-    def _record(self, width: int, height: int, previous: SplatRenderer | None) -> None:
+    def _record(self, width: int, height: int, previous: TileRenderer | None) -> None:
         """Record the launches of a step anew: the arrays they use have changed."""
         s = self.settings
         if self.renderer:
             self.renderer.close()
-        self.renderer = SplatRenderer(
+        self.renderer = make_renderer(
+            s.renderer,
             self.parameters,
             width,
             height,

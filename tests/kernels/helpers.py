@@ -8,7 +8,7 @@ import warp as wp
 
 from tests import reference
 from warpsplat.parameters import Parameters
-from warpsplat.render import SplatRenderer
+from warpsplat.render_splat import SplatRenderer
 from warpsplat.scene import Scene
 
 

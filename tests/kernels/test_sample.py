@@ -60,7 +60,7 @@ def test_adjoint_of_positions(device: str, kind: Kind, chain_cubics: int, opacit
     scene = random_scene(kind, chain_cubics=chain_cubics, opacity_count=opacity_count, seed=12)
     renderer = renderer_for(scene, device, 1.3, through_scales=False)
     rng = np.random.default_rng(0)
-    mean_grad = rng.normal(size=(renderer.capacity.gaussians, 2)).astype(np.float32)
+    mean_grad = rng.normal(size=(renderer.capacity.items, 2)).astype(np.float32)
     p = reference.tensors(scene)
     total = torch.zeros(())
     for part, grid in enumerate(reference.grids(scene, p, plans_of(renderer), 1.3)):
@@ -94,7 +94,7 @@ def test_rows_crowd_towards_the_boundary() -> None:
 
 def test_sample_counts_follow_the_size_in_pixels(device: str) -> None:
     scene = disc(8, 40, 20)
-    counts = [int(renderer_for(scene, device, s).needed_gaussians.numpy()[0]) for s in (0.25, 1, 4)]
+    counts = [int(renderer_for(scene, device, s).needed_items.numpy()[0]) for s in (0.25, 1, 4)]
     assert counts[0] < counts[1] < counts[2]
     assert counts[2] < 16 * counts[1]
     renderer = renderer_for(scene, device, 4)

@@ -16,7 +16,8 @@ from warpsplat.errors import CapacityError
 from warpsplat.kernels import splat
 from warpsplat.kernels.constants import TILE, TILE_PIXELS
 from warpsplat.parameters import Parameters
-from warpsplat.render import Capacity, SplatRenderer, render
+from warpsplat.render import Capacity, render
+from warpsplat.render_splat import SplatRenderer
 from warpsplat.scene import Kind
 
 
@@ -44,7 +45,7 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
     renderer.coverage_grad.assign(coverage_grad)
     wp.launch(
         splat.splat_backward,
-        dim=renderer.capacity.gaussians,
+        dim=renderer.capacity.items,
         inputs=[0, renderer.width, renderer.height, renderer.gaussian_part, renderer.slot_first]
         + [renderer.slot_last, renderer.part_tiles, renderer.mean, renderer.conic, renderer.extent]
         + [renderer.coverage, renderer.coverage_grad],
@@ -106,12 +107,12 @@ def test_slot_ranges_cover_each_pixel_once(device: str) -> None:
 
 def test_overflow_is_counted_and_mended(device: str) -> None:
     scene = random_scene("closed", count=10)
-    whole = render(scene, device=device)
+    whole = render(scene, renderer="splat", device=device)
     parameters = Parameters(scene, wp.get_device(device))
     small = SplatRenderer(parameters, scene.width, scene.height, 1.0, capacity=Capacity(700, 9))
     small.forward()
     assert np.isfinite(small.image.numpy()).all()
-    assert small.needed_gaussians.numpy()[0] > 700
+    assert small.needed_items.numpy()[0] > 700
     assert small.grow()
     small.forward()
     assert small.grow() or small.capacity.slots >= small.needed_slots.numpy()[0]
@@ -143,7 +144,7 @@ def test_same_bits_for_any_number_of_threads(device: str, kind: Kind) -> None:
 @pytest.mark.parametrize("radius", [4.0, 10.0, 25.0])
 def test_a_splatted_disc_covers_what_the_path_covers(device: str, radius: float) -> None:
     size = int(2 * radius + 12)
-    image = render(disc(radius, size, size / 2 + 0.3), device=device)[..., 0]
+    image = render(disc(radius, size, size / 2 + 0.3), renderer="splat", device=device)[..., 0]
     centres = np.arange(size) + 0.5 - (size / 2 + 0.3)
     distance = np.hypot(*np.meshgrid(centres, centres)) - radius
     assert image.sum() == pytest.approx(np.pi * radius**2, rel=0.06)
@@ -165,7 +166,7 @@ def test_stroke_covers_caps_and_joins(device: str) -> None:
         opacities=np.ones((1, 1), np.float32),
         background=np.zeros(3, np.float32),
     )
-    image = render(one, device=device)[..., 0]
+    image = render(one, renderer="splat", device=device)[..., 0]
     assert image[20, 44] > 0.9, "join: 4 px beyond the joint at x = 40, inside the radius of 6"
     assert image[20, 48] < 0.05
     assert image[20, 11] > 0.9, "cap: 4 px beyond the start at x = 15"
@@ -176,7 +177,7 @@ def test_invisible_and_outside_shapes_change_nothing(device: str) -> None:
     scene = random_scene("closed", count=3)
     clear = replace(scene, opacities=np.zeros_like(scene.opacities))
     np.testing.assert_array_equal(
-        render(clear, device=device), np.broadcast_to(scene.background, (36, 40, 3))
+        render(clear, renderer="splat", device=device), np.broadcast_to(scene.background, (36, 40, 3))
     )
     away = replace(scene, points=scene.points + np.float32(500))
     renderer = renderer_for(away, device)
@@ -190,5 +191,5 @@ def test_translation_moves_the_image(device: str) -> None:
     scene = random_scene("closed", count=3, width=64, height=64, seed=9)
     inner = replace(scene, points=(0.4 * scene.points + 12).astype(np.float32))
     moved = replace(inner, points=inner.points + np.float32(16))
-    a, b = render(inner, device=device), render(moved, device=device)
+    a, b = render(inner, renderer="splat", device=device), render(moved, renderer="splat", device=device)
     np.testing.assert_allclose(b[16:, 16:], a[:-16, :-16], atol=3e-3)
