@@ -14,9 +14,14 @@ from warpsplat.errors import WarpsplatError
 COMMANDS = {
     "vectorize": "Turn an image into an SVG.",
     "batch": "Vectorize many images by a YAML file.",
+    "eval": "Measure any SVG against an image.",
     "render": "Render an SVG to a PNG.",
     "info": "Show version and devices.",
 }
+
+
+MODULES = {"eval": "evaluate"}
+"""Commands whose file has another name: ``eval`` is a built-in function."""
 
 
 class LazyGroup(click.Group):
@@ -30,7 +35,7 @@ class LazyGroup(click.Group):
         """The command, or None for an unknown name."""
         if cmd_name not in COMMANDS:
             return None
-        return getattr(importlib.import_module(f"warpsplat.cli.{cmd_name}"), "command")  # noqa: B009
+        return getattr(importlib.import_module(f"warpsplat.cli.{MODULES.get(cmd_name, cmd_name)}"), "command")  # noqa: B009
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list, without importing the commands."""
@@ -45,7 +50,7 @@ def cli() -> None:
 
     \b
     Exit codes: 0 done, 2 wrong usage, 3 unreadable image, 4 result could not
-    be written, 5 some images of a batch failed, 130 interrupted.
+    be written, 5 some images of a batch failed, 6 a goal was missed, 130 interrupted.
     """
 
 

@@ -30,6 +30,9 @@ def quality_options(function: Function) -> Function:
             help=f"Model of coverage: the file's, or the paper's Gaussians.  [default: {_defaults.renderer}]",
         ),
         click.option("--iterations", type=int, metavar="N", help="Steps; overrides the effort's number."),
+        click.option("--target-psnr", type=float, metavar="DB", help="Stop once this is reached."),
+        click.option("--time-budget", metavar="TIME", help="Size the run to end within 60s, 2m ..."),
+        click.option("--max-bytes", metavar="SIZE", help="Largest file, 100KB ...; fewer curves if need be."),
         click.option("--seed", type=int, metavar="N", help=f"Random seed.  [default: {_defaults.seed}]"),
         click.option(
             "--precision",

@@ -12,15 +12,20 @@ import click
 from warpsplat.cli.options import quality_options, run_options, settings_from
 from warpsplat.errors import ImageError, UsageError
 
+MISSED = 6
+"""Exit code when the file is written but a goal was missed."""
+
 
 def summary(output: Path, values: dict[str, Any]) -> str:
     """One line on the result, for people."""
     ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
+    ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
     note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
     return (
-        f"{output}: {psnr}{ssim}, {values['paths']} paths, {values['bytes'] / 1000:.1f} kB "
-        f"({values['gzip_bytes'] / 1000:.1f} kB gzipped), {values['seconds']:.1f} s{note}"
+        f"{output}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
+        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
+        f"{values['seconds']:.1f} s{note}"
     )
 
 
@@ -65,5 +70,9 @@ def command(
         click.echo(json.dumps(values))
     elif not quiet:
         click.echo(summary(output, values))
+    for goal in result.missed:
+        click.echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.stopped:
         sys.exit(130)
+    if result.missed:
+        sys.exit(MISSED)

@@ -188,6 +188,36 @@ def test_ctrl_c_writes_the_best_so_far(image: Path, tmp_path: Path) -> None:
     render_svg(output.read_text())
 
 
+def test_missed_goals_are_said_and_the_file_is_written(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "a.svg"
+    assert run("vectorize", image, "-o", output, *QUICK, "--target-psnr", "90") == 6
+    captured = capsys.readouterr()
+    assert "a.svg: " in captured.out
+    assert "goal missed: target-psnr 90 dB" in one_line(captured.err)
+    render_svg(output.read_text())
+    for option, value in (("--time-budget", "soon"), ("--max-bytes", "-1"), ("--target-psnr", "-3")):
+        assert run("vectorize", image, "-o", output, option, value) == 2
+        assert "Traceback" not in capsys.readouterr().err
+
+
+def test_eval(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "a.svg"
+    assert run("vectorize", image, "-o", output, "--json", *QUICK) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert run("eval", image, output, "--json") == 0
+    values = json.loads(capsys.readouterr().out)
+    assert all(
+        values[k] == made[k] for k in ("psnr", "ssim", "ms_ssim", "paths", "nodes", "bytes", "gzip_bytes")
+    )
+    assert run("eval", image, output) == 0
+    assert f"{made['psnr']} dB" in capsys.readouterr().out
+    for bad in (image, tmp_path / "none.svg"):
+        assert run("eval", image, bad) == 3
+        assert bad.name in one_line(capsys.readouterr().err)
+
+
 def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     svg, png = tmp_path / "a.svg", tmp_path / "a.png"
     assert run("vectorize", image, "-o", svg, "-q", *QUICK) == 0

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from warpsplat.config import PRESETS, Settings, make_settings
+from warpsplat.config import PRESETS, Settings, make_settings, parse_bytes, parse_duration
 from warpsplat.errors import UsageError
 
 
@@ -27,6 +27,16 @@ def test_overrides_win_and_none_is_left_out() -> None:
 def test_bad_values(name: str, value: object) -> None:
     with pytest.raises(UsageError, match=name):
         make_settings(**{name: value})
+
+
+def test_times_and_sizes() -> None:
+    assert [parse_duration(x) for x in ("60s", "2m", 90, "1.5h", "250ms")] == [60, 120, 90, 5400, 0.25]
+    assert [parse_bytes(x) for x in ("100KB", "1MiB", 500, "2k")] == [100_000, 1_048_576, 500, 2000]
+    for bad in ("soon", "-3s", "", True):
+        with pytest.raises(UsageError):
+            parse_duration(bad)
+        with pytest.raises(UsageError):
+            parse_bytes(bad)
 
 
 def test_bad_quality() -> None:

@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import ImageError
-from warpsplat.metrics import on_white, psnr, render_svg, score_svg, ssim
+from warpsplat.metrics import count_nodes, ms_ssim, on_white, psnr, render_svg, score_svg, ssim
 from warpsplat.svg import write_svg
 
 
@@ -44,6 +45,31 @@ def test_ssim_against_the_formula_at_one_window() -> None:
             c1, c2 = 2.55**2, 7.65**2
             values.append((2 * mp * mq + c1) * (2 * c + c2) / ((mp**2 + mq**2 + c1) * (vp + vq + c2)))
     assert ssim(np.repeat(a, 3, 2), np.repeat(b, 3, 2)) == pytest.approx(np.mean(values), rel=1e-6)
+
+
+def test_ms_ssim() -> None:
+    rng = np.random.default_rng(0)
+    a = rng.uniform(0, 255, (352, 360, 3))
+    assert ms_ssim(a, a) == pytest.approx(1)
+    blurred = cv2.GaussianBlur(a, (0, 0), 1.0)
+    fine, coarse = ms_ssim(a, blurred), ms_ssim(a, np.clip(a + 40, 0, 255))
+    assert fine is not None
+    assert coarse is not None
+    assert 0.3 < fine < coarse < 1
+    assert ms_ssim(a[:351], a[:351]) is None, "the fifth scale would have 21 rows"
+
+
+NODES = [
+    ('<path d="M0 0c1 1 2 2 3 3 1 1 2 2 3 3z"/>', 3),
+    ('<path fill="#fff" d="M0,0L1-1.5.5,2H3V4Z"/><circle r="2"/>', 6),
+    ('<path id="d" d="m0 0a1 1 0 0 1 2 2q1 1 2 2t1 1"/>', 4),
+    ("<rect/>", 0),
+]
+
+
+@pytest.mark.parametrize(("text", "count"), NODES)
+def test_nodes(text: str, count: int) -> None:
+    assert count_nodes(text) == count
 
 
 def test_white_behind_transparency() -> None:

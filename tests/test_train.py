@@ -103,7 +103,6 @@ def test_odd_sizes(device: str, size: tuple[int, int]) -> None:
 def test_phases() -> None:
     settings = make_settings(iterations=100)
     coarse, fine = phases(settings, 768, 512)
-    assert coarse.steps + fine.steps == 100
     assert coarse.width * coarse.height <= 1.01 * settings.coarse_pixels
     assert (fine.width, fine.height) == (768, 512)
     assert len(phases(settings, 100, 80)) == 1
@@ -121,3 +120,32 @@ def test_a_photograph_reaches_its_figure(renderer: Renderer, kind: Kind, figure:
     result = vectorize(load_image(CAT), settings, wp.get_device("cpu"))
     assert result.score.psnr > figure
     assert abs(result.internal_psnr - result.score.psnr) < gap
+
+
+def test_time_budget_sizes_the_run(device: str) -> None:
+    settings = make_settings(curves=12, time_budget="2s", coarse_pixels=1000)
+    vectorize(picture(), replace(settings, time_budget=None, iterations=4), wp.get_device(device))  # compile
+    result = vectorize(picture(), settings, wp.get_device(device))
+    assert result.iterations > 20
+    assert result.seconds < 2.5, "a step past the deadline at the most"
+    assert not result.stopped
+
+
+def test_target_psnr_ends_the_run(device: str) -> None:
+    settings = make_settings(curves=20, iterations=3000, target_psnr=22.0)
+    result = vectorize(picture(), settings, wp.get_device(device))
+    assert result.score.psnr >= 22
+    assert result.iterations < 3000
+    assert not result.missed
+    missed = vectorize(picture(), replace(settings, iterations=10, target_psnr=60.0), wp.get_device(device))
+    assert missed.missed[0].startswith("target-psnr 60 dB: reached ")
+
+
+def test_max_bytes_is_kept(device: str) -> None:
+    for limit in (900, 3000):
+        settings = make_settings(curves=200, iterations=15, max_bytes=limit)
+        result = vectorize(picture(), settings, wp.get_device(device))
+        assert result.score.bytes <= limit
+        assert len(result.scene) >= limit // 300 - 1
+    tiny = vectorize(picture(), replace(settings, max_bytes=50), wp.get_device(device))
+    assert "max-bytes 50" in tiny.missed[0]

@@ -31,9 +31,10 @@ from warpsplat.pipeline import job_key
 from warpsplat.svg import read_metadata
 
 SETTING_KEYS = ("curves", "quality", "iterations", "seed", "precision", "renderer")
+GOAL_KEYS = ("target-psnr", "time-budget", "max-bytes")
 KIND_KEYS = ("closed", "open")
 TEXT_KEYS = ("output", "device")
-KEYS = (*SETTING_KEYS, *KIND_KEYS, *TEXT_KEYS)
+KEYS = (*SETTING_KEYS, *GOAL_KEYS, *KIND_KEYS, *TEXT_KEYS)
 
 
 @dataclass(frozen=True)
@@ -121,14 +122,14 @@ def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str
             raise file.error(line, f"{key}: must be text, not {value!r}")
         if key in KIND_KEYS and value is not True:
             raise file.error(line, f"{key}: must be true, not {value!r}; leave it out or give the other kind")
-        if key in SETTING_KEYS:
+        if key in (*SETTING_KEYS, *GOAL_KEYS):
             try:
                 if key == "quality":
                     make_settings(value)
                 else:
                     if value is None:
                         raise UsageError(f"{key} has no value")
-                    make_settings(**{key: value})
+                    make_settings(**{key.replace("-", "_"): value})
             except (UsageError, TypeError) as error:
                 raise file.error(line, f"{key}: {error}") from error
         options[key] = _Value(value, line)
@@ -144,7 +145,7 @@ def _merge(defaults: dict[str, _Value], own: dict[str, _Value]) -> dict[str, Any
         for kind in KIND_KEYS:
             merged.pop(kind, None)
     merged.update(own)
-    return {key: item.value for key, item in merged.items()}
+    return {key.replace("-", "_"): item.value for key, item in merged.items()}
 
 
 def _images(file: _File, line: int, node: yaml.Node) -> list[Path]:

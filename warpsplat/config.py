@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal
 
@@ -86,6 +87,12 @@ class Settings:
     """Whether gradients flow through the Gaussians' scales and angles."""
     precision: int = 1
     """Decimals of coordinates in the file."""
+    target_psnr: float | None = None
+    """Stop once the render has this PSNR at the finest size [dB]."""
+    time_budget: float | None = None
+    """Size the run to end within this time [s], start of the program not included."""
+    max_bytes: int | None = None
+    """Largest file [bytes]: as many curves as fit, ``curves`` at the most."""
     rates: Rates = field(default_factory=Rates)
     density: Density = field(default_factory=Density)
 
@@ -105,6 +112,14 @@ class Settings:
         for name, value, low, high in checks:
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+        goals = (
+            ("target-psnr", self.target_psnr),
+            ("time-budget", self.time_budget),
+            ("max-bytes", self.max_bytes),
+        )
+        for name, goal in goals:
+            if goal is not None and not (isinstance(goal, (int, float)) and 0 < goal < 1e12):
+                raise UsageError(f"{name.replace('_', '-')} must be a positive number, not {goal!r}")
         choices = (
             ("kind", self.kind, ("closed", "open")),
             ("order", self.order, ("age", "area")),
@@ -118,6 +133,36 @@ class Settings:
         """A short hash of all settings."""
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
+SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|b)?", re.IGNORECASE)
+UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
+BYTES = {"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2}
+
+
+def parse_duration(value: str | float) -> float:
+    """``60``, ``60s``, ``2m`` or ``1.5h`` -> seconds.
+
+    Raises:
+        UsageError: none of these.
+    """
+    found = DURATION.fullmatch(str(value).strip())
+    if isinstance(value, bool) or not found:
+        raise UsageError(f"not a time: {value!r}; write 60s or 2m")
+    return float(found[1]) * UNITS[(found[2] or "s").lower()]
+
+
+def parse_bytes(value: str | int) -> int:
+    """``100000``, ``100KB`` or ``1MiB`` -> bytes.
+
+    Raises:
+        UsageError: none of these.
+    """
+    found = SIZE.fullmatch(str(value).strip())
+    if isinstance(value, bool) or not found:
+        raise UsageError(f"not a size: {value!r}; write 100KB or 1MB")
+    return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
 
 
 PRESETS: dict[Quality, dict[str, Any]] = {
@@ -143,4 +188,8 @@ def make_settings(quality: Quality = "balanced", **overrides: Any) -> Settings:
     for name in given:
         if name not in known:
             raise UsageError(f"unknown setting {name!r}")
+    if "time_budget" in given:
+        given["time_budget"] = parse_duration(given["time_budget"])
+    if "max_bytes" in given:
+        given["max_bytes"] = parse_bytes(given["max_bytes"])
     return replace(Settings(quality=quality, **PRESETS[quality]), **given)

@@ -63,6 +63,11 @@ def ssim(a: Pixels, b: Pixels) -> float | None:
     """
     if min(a.shape[:2]) <= SSIM_WINDOW:
         return None
+    return float(_ssim_maps(a, b)[0].mean())
+
+
+def _ssim_maps(a: Pixels, b: Pixels) -> tuple[Pixels, Pixels]:
+    """SSIM and its contrast-structure factor where the window fits."""
     inner = SSIM_WINDOW // 2
 
     def blur(x: Pixels) -> Pixels:
@@ -73,7 +78,48 @@ def ssim(a: Pixels, b: Pixels) -> float | None:
     var_a, var_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
     covariance = blur(a * b) - mean_a * mean_b
     luminance = (2 * mean_a * mean_b + c1) / (mean_a**2 + mean_b**2 + c1)
-    return float((luminance * (2 * covariance + c2) / (var_a + var_b + c2)).mean())
+    contrast = (2 * covariance + c2) / (var_a + var_b + c2)
+    return luminance * contrast, contrast
+
+
+MS_SSIM_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
+"""Of the five scales (Wang et al. 2003, section 3.2)."""
+
+
+def ms_ssim(a: Pixels, b: Pixels) -> float | None:
+    """Multi-scale structural similarity (Wang et al. 2003); scales are halved by area.
+
+    None for an image of which the smallest scale has no room for the window.
+    """
+    value = 1.0
+    for scale, weight in enumerate(MS_SSIM_WEIGHTS):
+        if min(a.shape[:2]) < 2 * SSIM_WINDOW:
+            return None
+        full, contrast = _ssim_maps(a, b)
+        last = scale == len(MS_SSIM_WEIGHTS) - 1
+        value *= max(float((full if last else contrast).mean()), 0.0) ** weight
+        half = (a.shape[1] // 2, a.shape[0] // 2)
+        a = np.asarray(cv2.resize(a, half, interpolation=cv2.INTER_AREA))
+        b = np.asarray(cv2.resize(b, half, interpolation=cv2.INTER_AREA))
+    return value
+
+
+PATH_DATA = re.compile(r"<path\b[^>]*?\sd=[\"']([^\"']*)")
+COMMAND = re.compile(r"([a-zA-Z])([^a-zA-Z]*)")
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
+ARGUMENTS = {"m": 2, "l": 2, "t": 2, "h": 1, "v": 1, "s": 4, "q": 4, "c": 6, "a": 7}
+"""Numbers that each node of a path command takes (SVG 1.1 section 8.3)."""
+
+
+def count_nodes(text: str) -> int:
+    """Nodes of all paths of an SVG text; other drawn shapes count as one."""
+    nodes = len(DRAWN.findall(text.encode())) - text.count("<path")
+    for data in PATH_DATA.findall(text):
+        for command, rest in COMMAND.findall(data):
+            size = ARGUMENTS.get(command.lower())
+            if size:
+                nodes += len(NUMBER.findall(rest)) // size
+    return max(nodes, 0)
 
 
 @dataclass(frozen=True)
@@ -83,7 +129,10 @@ class Score:
     psnr: float
     """[dB]"""
     ssim: float | None
+    ms_ssim: float | None
     paths: int
+    nodes: int
+    """Points that the paths pass through, with those of basic shapes counted as one each."""
     bytes: int
     gzip_bytes: int
 
@@ -91,7 +140,8 @@ class Score:
         """For JSON; rounded to what the measurement is worth."""
         values = asdict(self)
         values["psnr"] = round(self.psnr, 3) if np.isfinite(self.psnr) else None
-        values["ssim"] = None if self.ssim is None else round(self.ssim, 4)
+        for name in ("ssim", "ms_ssim"):
+            values[name] = None if values[name] is None else round(values[name], 4)
         return values
 
 
@@ -104,7 +154,9 @@ def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
     return Score(
         psnr=psnr(shown, wanted),
         ssim=ssim(shown, wanted),
+        ms_ssim=ms_ssim(shown, wanted),
         paths=len(DRAWN.findall(data)),
+        nodes=count_nodes(text),
         bytes=len(data),
         gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
     )

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from warpsplat import __version__
@@ -36,6 +37,9 @@ class Result:
     """Steps done; fewer than asked for when stopped."""
     seconds: float
     stopped: bool
+    """Whether it was interrupted."""
+    missed: tuple[str, ...] = ()
+    """Goals that were not reached, each as a sentence."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -46,6 +50,7 @@ class Result:
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
+            "missed": list(self.missed),
         }
 
 
@@ -77,22 +82,64 @@ def vectorize(
         stop: asked after every step; once true, the curves as they are make the file.
     """
     started = time.monotonic()
+    if settings.max_bytes:
+        settings = replace(settings, curves=affordable_curves(settings))
     trainer = Trainer(target, settings, device, threads=threads)
     try:
+        if settings.time_budget:
+            trainer.size_to(settings.time_budget - TAIL_SECONDS - (time.monotonic() - started))
         scene = trainer.run(report, stop)
     finally:
         trainer.close()
-    plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
-    svg = write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
+
+    def export(scene: Scene) -> str:
+        plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
+        return write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
+
+    svg = export(scene)
+    while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
+        # The estimate was short: leave out what shows least, as many as the excess needs.
+        excess = 1 - settings.max_bytes / len(svg.encode())
+        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
+        seen = scene.areas() * scene.opacities.max(axis=1)
+        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
+        svg = export(scene)
+    score = score_svg(svg, target)
+    seconds = time.monotonic() - started
     return Result(
         svg=svg,
         scene=scene,
-        score=score_svg(svg, target),
+        score=score,
         internal_psnr=trainer.psnr(),
         iterations=trainer.step,
-        seconds=time.monotonic() - started,
-        stopped=trainer.step < settings.iterations,
+        seconds=seconds,
+        stopped=trainer.interrupted,
+        missed=missed_goals(settings, score, seconds),
     )
+
+
+TAIL_SECONDS = 0.5
+"""Of a time budget: what exporting and scoring take."""
+
+
+def affordable_curves(settings: Settings) -> int:
+    """Curves that fit into ``max_bytes``: about 8 + 2 precision bytes a point and 40 for the rest."""
+    assert settings.max_bytes
+    points = 6 * settings.chain_cubics if settings.kind == "closed" else 10
+    each = 40 + points * (8 + 2 * settings.precision)
+    return max(1, min(settings.curves, (settings.max_bytes - 400) // each))
+
+
+def missed_goals(settings: Settings, score: Score, seconds: float) -> tuple[str, ...]:
+    """The goals of ``settings`` that a run did not reach."""
+    missed = []
+    if settings.target_psnr and score.psnr < settings.target_psnr:
+        missed.append(f"target-psnr {settings.target_psnr:g} dB: reached {score.psnr:.2f} dB")
+    if settings.max_bytes and score.bytes > settings.max_bytes:
+        missed.append(f"max-bytes {settings.max_bytes}: reached {score.bytes}")
+    if settings.time_budget and seconds > settings.time_budget:
+        missed.append(f"time-budget {settings.time_budget:g} s: took {seconds:.1f} s")
+    return tuple(missed)
 
 
 def vectorize_file(

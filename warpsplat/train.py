@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -22,6 +22,18 @@ from warpsplat.scene import FloatArray, Scene
 
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
+
+TIMED_STEPS = 4
+"""Steps timed at each size to fit a run into a time."""
+
+BUDGET_MARGIN = 1.25
+"""What a step costs with its update and its share of surgery, over what was timed."""
+
+MAX_ITERATIONS = 20_000
+"""Most steps that a time budget can buy: beyond, nothing is gained."""
+
+TARGET_MARGIN = 0.1
+"""How much more than the target the training render must have [dB], for the file to have it."""
 
 OPACITY_RANGE = (0.02, 0.9985)
 """Bounds of an opacity. The upper one rounds to opaque in the file and keeps 1 - alpha away from 0."""
@@ -43,26 +55,21 @@ class Progress:
 
 @dataclass(frozen=True)
 class Phase:
-    """Steps at one image size."""
+    """A stretch of steps at one image size."""
 
-    steps: int
     width: int
     height: int
 
 
 def phases(settings: Settings, width: int, height: int) -> list[Phase]:
-    """Coarse, then fine; one phase where the image is small enough for both to be the same."""
+    """Coarse, then fine, from ``settings.coarse`` of the iterations on; one where both are the same size."""
 
     def fit(pixels: int) -> tuple[int, int]:
         scale = min(1.0, math.sqrt(pixels / (width * height)))
         return max(1, round(width * scale)), max(1, round(height * scale))
 
-    coarse_steps = round(settings.iterations * settings.coarse)
-    coarse = Phase(coarse_steps, *fit(settings.coarse_pixels))
-    fine = Phase(settings.iterations - coarse_steps, *fit(settings.fine_pixels))
-    if (coarse.width, coarse.height) == (fine.width, fine.height):
-        return [Phase(settings.iterations, fine.width, fine.height)]
-    return [phase for phase in (coarse, fine) if phase.steps > 0]
+    coarse, fine = Phase(*fit(settings.coarse_pixels)), Phase(*fit(settings.fine_pixels))
+    return [fine] if coarse == fine else [coarse, fine]
 
 
 class Trainer:
@@ -83,6 +90,9 @@ class Trainer:
         self.update: Program | None = None
         self.overflows = 0
         self.step = 0
+        self.interrupted = False
+        self._deadline = math.inf
+        self._costs: list[float] = []
 
     def scene(self) -> Scene:
         """The current scene, on the host."""
@@ -187,33 +197,75 @@ class Trainer:
         if self.renderer:
             self.renderer.close()
 
+    def size_to(self, seconds: float) -> None:
+        """Choose the number of iterations so that ``run`` ends about ``seconds`` from now.
+
+        Times a few steps without update at each size; ``run`` corrects the number as it learns what steps
+        cost with updates and surgery on a machine that may have other work.
+        """
+        self._deadline = time.monotonic() + seconds
+        plan = phases(self.settings, self.width, self.height)
+        for phase in plan:
+            self._enter(phase)
+            assert self.renderer and self.measure
+            begin = time.monotonic()
+            for _ in range(TIMED_STEPS):
+                self.renderer.forward()
+                self.measure.run()
+                self.renderer.backward()
+            wp.synchronize_device(self.device)
+            self._costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / TIMED_STEPS)
+        self._resize(1.0)
+
+    def _resize(self, slowness: float) -> None:
+        """Fit the iterations to the deadline; ``slowness``: true cost of a step over ``_costs``."""
+        s = self.settings
+        coarse = s.coarse if len(self._costs) == 2 else 0.0
+        mean = coarse * self._costs[0] + (1 - coarse) * self._costs[-1]
+        done = self.step * (self._costs[0] if self.step < coarse * s.iterations else mean)
+        left = (self._deadline - time.monotonic()) / slowness
+        # done + left is the whole run's price; the steps done were the cheap, coarse ones.
+        iterations = int((done + max(left, 0.0)) / mean)
+        iterations = min(max(iterations, self.step, CHECK_INTERVAL), MAX_ITERATIONS)
+        self.settings = replace(s, iterations=iterations)
+
     def run(
         self, report: Callable[[Progress], None] | None = None, stop: Callable[[], bool] | None = None
     ) -> Scene:
         """All phases. ``report`` is called every few steps; ``stop`` is asked after every step and ends the
-        run early.
+        run early. So does reaching ``target_psnr`` at the finest size.
         """
         started = time.monotonic()
-        s = self.settings
-        for phase in phases(s, self.width, self.height):
-            self._enter(phase)
-            for _ in range(phase.steps):
-                assert self.renderer and self.measure and self.update
-                self.renderer.forward()
-                self.measure.run()
-                self.renderer.backward()
-                self.update.run()
-                self.step += 1
-                if self.step % CHECK_INTERVAL == 0 or self.step == s.iterations:
-                    if self.renderer.grow():
-                        self.overflows += 1
-                        self.measure = self._record_loss()
-                    if report:
-                        seconds = time.monotonic() - started
-                        report(Progress(self.step, s.iterations, self.psnr(), seconds))
-                if stop and stop():
-                    return self.scene()
-                due = s.density.interval > 0 and self.step % s.density.interval == 0
-                if due and self.step < s.density.stop * s.iterations:
-                    self._surgery(self.step / s.iterations)
+        plan = phases(self.settings, self.width, self.height)
+        current: Phase | None = None
+        while self.step < self.settings.iterations:
+            s = self.settings
+            phase = plan[0] if self.step < s.coarse * s.iterations else plan[-1]
+            if phase is not current:
+                current = phase
+                self._enter(phase)
+            assert self.renderer and self.measure and self.update
+            self.renderer.forward()
+            self.measure.run()
+            self.renderer.backward()
+            self.update.run()
+            self.step += 1
+            if self.step % CHECK_INTERVAL == 0 or self.step == s.iterations:
+                if self.renderer.grow():
+                    self.overflows += 1
+                    self.measure = self._record_loss()
+                if report:
+                    report(Progress(self.step, s.iterations, self.psnr(), time.monotonic() - started))
+                if s.target_psnr and phase is plan[-1] and self.psnr() >= s.target_psnr + TARGET_MARGIN:
+                    break
+            if stop and stop():
+                self.interrupted = True
+                break
+            due = s.density.interval > 0 and self.step % s.density.interval == 0
+            if due and s.time_budget and phase is plan[0]:
+                self._resize((time.monotonic() - started) / (self.step * self._costs[0]))
+            if due and self.step < s.density.stop * s.iterations:
+                self._surgery(self.step / self.settings.iterations)
+            if s.time_budget and time.monotonic() > self._deadline:
+                break
         return self.scene()

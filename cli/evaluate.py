@@ -1,0 +1,38 @@
+"""``warpsplat eval``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from warpsplat.errors import ImageError
+
+
+@click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("image", type=click.Path(path_type=Path))
+@click.argument("svg", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(image: Path, svg: Path, as_json: bool) -> None:
+    """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
+
+    The SVG is rendered at the image's size; transparency is on white.
+    """
+    from warpsplat.image import load_image
+    from warpsplat.metrics import read_svg_text, score_svg
+
+    target = load_image(image)
+    try:
+        values = score_svg(read_svg_text(svg), target).as_dict()
+    except ImageError as error:
+        text = str(error)
+        raise ImageError(text if text.startswith(str(svg)) else f"{svg}: {text}") from error
+    if as_json:
+        click.echo(json.dumps({"image": str(image), "svg": str(svg), **values}))
+        return
+    for name, unit in (("psnr", " dB"), ("ssim", ""), ("ms_ssim", ""), ("paths", ""), ("nodes", "")):
+        shown = "-" if values[name] is None else values[name]
+        click.echo(f"{name:12}{shown}{unit if values[name] is not None else ''}")
+    click.echo(f"{'bytes':12}{values['bytes']}")
+    click.echo(f"{'gzip_bytes':12}{values['gzip_bytes']}")
