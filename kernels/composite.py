@@ -182,3 +182,65 @@ def reduce_slots(
                 opacity_total += g[3]
         opacities_grad[curve, j] = opacity_total
     colors_grad[curve] = color_total
+
+
+@wp.kernel
+def removal_cost(
+    # In:
+    first: wp.int32,
+    lane_rows: wp.int32,
+    tiles_x: wp.int32,
+    tile_first: wp.array[wp.int32],  # [tile_count]
+    tile_last: wp.array[wp.int32],  # [tile_count]
+    sort_slots: wp.array[wp.int32],  # [2 x slot_capacity]
+    slot_part: wp.array[wp.int32],  # [slot_capacity]
+    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
+    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
+    opacity_count: wp.int32,
+    colors: wp.array[wp.vec3],  # [curve_count]
+    opacities: wp.array2d[wp.float32],  # [curve_count, opacity_count]
+    image: wp.array2d[wp.vec3],  # [height, width] of the forward pass
+    target: wp.array2d[wp.vec3],  # [height, width]
+    # Out:
+    transmittance: wp.array2d[wp.float32],  # [height, width] scratch
+    rest: wp.array2d[wp.vec3],  # [height, width] scratch: light still to come
+    slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels
+):
+    """What the squared error would grow by if a part alone were taken away.
+
+    Behind a part lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
+    squared error by 2 d . (image - target) + d . d.
+    """
+    i, lane = wp.tid()
+    tile = first + i
+    x0 = TILE * (tile % tiles_x)
+    y0 = TILE * (tile / tiles_x)
+    x1 = wp.min(x0 + TILE, image.shape[1])
+    row_first = y0 + lane * lane_rows
+    row_last = wp.min(row_first + lane_rows, image.shape[0])
+    for y in range(row_first, row_last):
+        for x in range(x0, x1):
+            transmittance[y, x] = 1.0
+            rest[y, x] = image[y, x]
+    for k in range(tile_first[tile], tile_last[tile]):
+        slot = sort_slots[k]
+        state = slot_seen[slot, lane]
+        cost = float(0.0)
+        if state != 0:
+            part = slot_part[slot]
+            color = colors[part / opacity_count]
+            opacity = opacities[part / opacity_count, part % opacity_count]
+            for y in range(row_first, row_last):
+                for x in range(x0, x1):
+                    t = transmittance[y, x]
+                    if t > TRANSMITTANCE_MIN:
+                        alpha = opacity
+                        if state != FULL:
+                            alpha = opacity * wp.abs(coverage[slot, (y - y0) * TILE + x - x0])
+                        after = t * (1.0 - alpha)
+                        left = rest[y, x] - (t * alpha) * color
+                        change = (t * alpha) * (left / after - color)
+                        cost += wp.dot(change, change + 2.0 * (image[y, x] - target[y, x]))
+                        rest[y, x] = left
+                        transmittance[y, x] = after
+        slot_cost[slot, lane] = cost

@@ -219,6 +219,33 @@ class TileRenderer(ABC):
         assert self.backward_program
         self.backward_program.run()
 
+    def removal_costs(self, target: wp.array) -> FloatArray:
+        """What the mean squared error against ``target`` would grow by without each curve, after ``forward``.
+
+        ``target``: vec3, (height, width). Shape of the result: (curve,); for an opacity per segment, the sum.
+        Allocates and copies to the host: for use between steps.
+        """
+        rest = wp.zeros_like(self.image)
+        cost = self.floats(self.capacity.slots, self.lanes)
+        program = Program(self.device, self._threads)
+        program.add(
+            composite.removal_cost,
+            (self.tiles_x * self.tiles_y, self.lanes),
+            [*self._composite_inputs(), self.image, target],
+            [self.transmittance, rest, cost],
+            split=True,
+        )
+        program.run()
+        program.close()
+        parts = self.slot_part.numpy()
+        used = parts >= 0
+        totals = np.bincount(
+            parts[used] // self.parameters.opacity_count,
+            weights=cost.numpy().sum(axis=1, dtype=np.float64)[used],
+            minlength=self.parameters.curve_count,
+        )
+        return np.asarray(totals / (3 * self.width * self.height), np.float32)
+
     def grow(self) -> bool:
         """Whether the passes since the last call ran out of capacity; if so, the arrays are now larger.
 

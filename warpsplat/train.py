@@ -177,7 +177,7 @@ class Trainer:
         self.renderer.forward_complete()
         scene = self.scene()
         doomed = prune_mask(scene, s.density, progress)
-        seen = scene.areas() * scene.opacities.max(axis=1)
+        seen = self.renderer.removal_costs(self.device_target)
         gone = least_seen(scene, doomed, round(s.density.replace * len(scene)), seen)
         keep = np.setdiff1d(np.arange(len(scene)), gone)
         if len(gone):

@@ -12,6 +12,9 @@ from tests.kernels.helpers import relative_error, renderer_for
 from tests.kernels.test_splat import coverage_images
 from tests.scenes import random_scene
 from warpsplat.kernels import adam, loss
+from warpsplat.parameters import Parameters
+from warpsplat.render import render
+from warpsplat.render_exact import ExactRenderer
 from warpsplat.scene import Kind
 
 
@@ -54,6 +57,19 @@ def test_blending_and_adjoint(device: str, opaque: bool) -> None:
         # behind / (1 - alpha): what float32 leaves of a difference, magnified 250 times by an opaque shape.
         np.testing.assert_allclose(mine, block, atol=3e-2 if opaque else 2e-4)
         assert np.abs(mine - block).mean() < 1e-4
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+def test_removal_costs_match_brute_force(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, count=9, seed=3)
+    target = np.random.default_rng(0).uniform(size=(scene.height, scene.width, 3)).astype(np.float32)
+    renderer = ExactRenderer(Parameters(scene, wp.get_device(device)), scene.width, scene.height, 1.0)
+    renderer.forward_complete()
+    got = renderer.removal_costs(wp.array(target, dtype=wp.vec3, device=device))
+    whole = np.mean((render(scene, device=device) - target) ** 2)
+    for i in range(len(scene)):
+        without = render(scene.take(np.delete(np.arange(len(scene)), i)), device=device)
+        assert got[i] == pytest.approx(np.mean((without - target) ** 2) - whole, abs=1e-6)
 
 
 def test_l2(device: str) -> None:
