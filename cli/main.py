@@ -14,6 +14,7 @@ from warpsplat.errors import WarpsplatError
 COMMANDS = {
     "vectorize": "Turn an image into an SVG.",
     "batch": "Vectorize many images by a YAML file.",
+    "refine": "Improve an SVG against an image.",
     "eval": "Measure any SVG against an image.",
     "render": "Render an SVG to a PNG.",
     "info": "Show version and devices.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,41 @@ class Interrupt:
             signal.signal(signal.SIGINT, before)
 
 
+@contextlib.contextmanager
+def progress_bar(
+    source: Path, settings: Settings, *, quiet: bool, verbose: int
+) -> Iterator[Callable[[Progress], None]]:
+    """A function to report progress to: a bar on stderr where that is a terminal, lines with ``-vv``."""
+    if not sys.stderr.isatty() or quiet:
+
+        def tell(progress: Progress) -> None:
+            if verbose > 1:
+                click.echo(
+                    f"{source}: step {progress.step}/{progress.steps}, {progress.psnr:.2f} dB, "
+                    f"{progress.seconds:.1f} s",
+                    err=True,
+                )
+
+        yield tell
+        return
+    bar: Any
+    with click.progressbar(
+        length=settings.iterations,
+        label=source.name,
+        file=sys.stderr,
+        item_show_func=lambda p: f"{p.psnr:.2f} dB" if p else None,
+    ) as bar:
+        last = 0
+
+        def show(progress: Progress) -> None:
+            nonlocal last
+            bar.length = progress.steps  # a time budget may change it
+            bar.update(progress.step - last, progress)
+            last = progress.step
+
+        yield show
+
+
 def run_file(
     source: Path,
     output: Path,
@@ -52,35 +87,9 @@ def run_file(
     quiet: bool = False,
     interrupt: Interrupt | None = None,
 ) -> Result:
-    """``vectorize_file`` with a progress bar on stderr where that is a terminal."""
+    """``vectorize_file`` with a progress bar."""
     interrupt = interrupt or Interrupt()
-    show = sys.stderr.isatty() and not quiet
     if verbose:
         click.echo(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(interrupt.watching())
-        bar: Any = None
-        if show:
-            bar = stack.enter_context(
-                click.progressbar(
-                    length=settings.iterations,
-                    label=source.name,
-                    file=sys.stderr,
-                    item_show_func=lambda p: f"{p.psnr:.2f} dB" if p else None,
-                )
-            )
-        last = 0
-
-        def report(progress: Progress) -> None:
-            nonlocal last
-            if bar:
-                bar.update(progress.step - last, progress)
-            last = progress.step
-            if verbose > 1 and not bar:
-                click.echo(
-                    f"{source}: step {progress.step}/{progress.steps}, {progress.psnr:.2f} dB, "
-                    f"{progress.seconds:.1f} s",
-                    err=True,
-                )
-
+    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         return vectorize_file(source, output, settings, device, report=report, stop=interrupt)

@@ -49,7 +49,7 @@ def test_fingerprint_sees_every_setting() -> None:
     assert base.fingerprint() == Settings().fingerprint()
     others = [
         replace(base, seed=1),
-        replace(base, rates=replace(base.rates, points=2.0)),
+        replace(base, rates=replace(base.rates, points=7.0)),
         replace(base, kind="open"),
     ]
     assert len({s.fingerprint() for s in (base, *others)}) == 4

@@ -20,7 +20,7 @@ Renderer = Literal["exact", "splat"]
 class Rates:
     """Adam learning rates at the start, per parameter group; they decay along a cosine."""
 
-    points: float = 1.0
+    points: float = 2.0
     """[px of the finest training size]"""
     colors: float = 0.02
     """[sRGB, 0 to 1]"""

@@ -67,6 +67,7 @@ def vectorize(
     *,
     threads: int | None = None,
     metadata: str = "",
+    scene: Scene | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
@@ -78,13 +79,14 @@ def vectorize(
         device: where to compute.
         threads: CPU threads; default all. Does not change the result.
         metadata: text for the file's metadata.
+        scene: curves to start from; without, new ones.
         report: called every few steps.
         stop: asked after every step; once true, the curves as they are make the file.
     """
     started = time.monotonic()
     if settings.max_bytes:
         settings = replace(settings, curves=affordable_curves(settings))
-    trainer = Trainer(target, settings, device, threads=threads)
+    trainer = Trainer(target, settings, device, threads=threads, scene=scene)
     try:
         if settings.time_budget:
             trainer.size_to(settings.time_budget - TAIL_SECONDS - (time.monotonic() - started))

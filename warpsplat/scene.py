@@ -22,7 +22,8 @@ class Scene:
 
     A closed curve is a ring of cubics: points 0, 3, 6 ... lie on the outline, the others are control
     points, and the last cubic ends at point 0. Its first half of cubics is one chain, its second half,
-    run backwards, the other (the paper's paired structure). An open curve is a chain of three cubics.
+    run backwards, the other (the paper's paired structure). An open curve is a chain of cubics,
+    three where warpsplat makes it.
     """
 
     kind: Kind
@@ -47,7 +48,7 @@ class Scene:
         if self.kind == "closed":
             fits = point_count >= 6 and point_count % 6 == 0
         else:
-            fits = point_count == 3 * OPEN_SEGMENTS + 1
+            fits = point_count >= 4 and point_count % 3 == 1
         if not fits:
             raise ValueError(f"a {self.kind} curve cannot have {point_count} control points")
         shapes = (self.points.shape, self.colors.shape, self.widths.shape, self.background.shape)

@@ -56,7 +56,12 @@ def path_data(points: FloatArray, closed: bool, precision: int) -> str:
     relative: list[str] = []
     for i in range(1, len(grid), 3):
         origin = grid[i - 1]
-        relative += [number(x / unit, precision) for x in (grid[i : i + 3] - origin).ravel()]
+        steps = grid[i : i + 3] - origin
+        # A cubic without extent draws nothing in a fill; in a stroke it may be the dot that is all there is.
+        if steps.any() or not closed:
+            relative += [number(x / unit, precision) for x in steps.ravel()]
+    if not relative:
+        return f"M{start}z"
     return f"M{start}c{join_numbers(relative)}{'z' if closed else ''}"
 
 

@@ -76,13 +76,21 @@ class Trainer:
     """Owns the parameters, the renderer and the recorded step; ``run`` is the loop."""
 
     def __init__(
-        self, target: FloatArray, settings: Settings, device: wp.Device, *, threads: int | None = None
+        self,
+        target: FloatArray,
+        settings: Settings,
+        device: wp.Device,
+        *,
+        threads: int | None = None,
+        scene: Scene | None = None,
     ) -> None:
-        """``target``: sRGB in [0, 1], shape (height, width, 3)."""
+        """``target``: sRGB in [0, 1], shape (height, width, 3); ``scene``: where to start, if not anew."""
         self.target, self.settings, self.device, self.threads = target, settings, device, threads
         self.height, self.width = target.shape[:2]
         self.rng = np.random.default_rng(settings.seed)
-        self.parameters = Parameters(grid_scene(settings, target, self.rng), device)
+        if scene is None:
+            scene = grid_scene(settings, target, self.rng)
+        self.parameters = Parameters(scene, device)
         self.clock = wp.zeros(1, dtype=wp.int32, device=device)
         self.loss = wp.zeros(1, dtype=wp.float32, device=device)
         self.renderer: TileRenderer | None = None
