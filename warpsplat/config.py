@@ -20,11 +20,11 @@ Renderer = Literal["exact", "splat"]
 class Rates:
     """Adam learning rates at the start, per parameter group; they decay along a cosine."""
 
-    points: float = 2.0
+    points: float = 3.0
     """[px of the finest training size]"""
     colors: float = 0.02
     """[sRGB, 0 to 1]"""
-    opacities: float = 0.02
+    opacities: float = 0.04
     widths: float = 0.15
     """[px of the finest training size]"""
     final: float = 0.1
@@ -50,8 +50,8 @@ class Density:
     """... and above this overlap (intersection over union) of their boxes."""
     faint_middle: float = 0.5
     """Prune strokes whose middle opacity is further than this below both ends."""
-    replace: float = 0.03
-    """Replace at least this fraction of the curves each turn, those that show least first."""
+    replace: float = 0.1
+    """Replace at least this fraction of the curves each turn: those without which the error would grow least."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Settings:
     kind: Kind = "closed"
     curves: int = 512
     quality: Quality = "balanced"
-    iterations: int = 400
+    iterations: int = 1000
     coarse: float = 0.7
     """Fraction of the iterations on a reduced image."""
     coarse_pixels: int = 100_000
@@ -77,8 +77,8 @@ class Settings:
     """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
-    xing: float = 0.001
-    """Weight of the Xing loss."""
+    xing: float = 0.0
+    """Weight of the Xing loss (paper: 0.01). It forbids shapes that the fold loss and exact coverage allow."""
     fold_start: float = 0.2
     """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
     grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
@@ -166,9 +166,9 @@ def parse_bytes(value: str | int) -> int:
 
 
 PRESETS: dict[Quality, dict[str, Any]] = {
-    "draft": {"iterations": 120, "coarse": 0.9, "coarse_pixels": 50_000, "fine_pixels": 400_000},
+    "draft": {"iterations": 200, "coarse": 0.9, "coarse_pixels": 50_000, "fine_pixels": 400_000},
     "balanced": {},
-    "high": {"iterations": 1200, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
+    "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
 }
 """What each preset changes in the defaults."""
 
