@@ -61,6 +61,9 @@ FLATNESS = 0.03
 """Largest distance [px] of a flattened curve from the curve. Coarser pieces are fitted to the image by the
 optimiser and then missing in the file, whose curves are smooth (docs/experiments.md)."""
 
+FLATNESS_STROKE = 0.08
+"""The same for strokes: their corners are rounded by their width, and each piece costs the stroke's width."""
+
 PIECES_MIN = 3
 PIECES_MAX = 64
 """Bounds of the straight pieces of one cubic; 64 are enough for one as large as 8,000 px."""

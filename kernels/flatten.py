@@ -13,6 +13,7 @@ from warpsplat.kernels.bezier import cubic_weights, find_range
 wp.set_module_options({"enable_backward": False})
 
 FLATNESS = wp.constant(constants.FLATNESS)
+FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
 PIECES_MIN = wp.constant(constants.PIECES_MIN)
 PIECES_MAX = wp.constant(constants.PIECES_MAX)
 
@@ -42,7 +43,10 @@ def plan_flatten(
         p3 = points[curve, (3 * cubic + 3) % point_count]
         worst = wp.max(worst, wp.length(points[curve, 3 * cubic] - 2.0 * p1 + p2))
         worst = wp.max(worst, wp.length(p1 - 2.0 * p2 + p3))
-    pieces = wp.ceil(wp.sqrt(0.75 * scale * worst / FLATNESS))
+    flatness = FLATNESS
+    if closed == 0:
+        flatness = FLATNESS_STROKE
+    pieces = wp.ceil(wp.sqrt(0.75 * scale * worst / flatness))
     count = wp.clamp(int(wp.min(pieces, 1.0e6)), PIECES_MIN, PIECES_MAX)
     part_pieces[part] = count
     part_vertices[part] = cubics * count + 1 - closed

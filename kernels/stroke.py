@@ -97,6 +97,7 @@ def stroke_forward(
         return
     half = 0.5 * scale * widths[part / opacity_count]
     reach = half + 0.75
+    inside = wp.max(half - 0.75, 0.0) * wp.max(half - 0.75, 0.0)
     tile_x = TILE * (slot_tile[slot] % tiles_x)
     tile_y = TILE * (slot_tile[slot] / tiles_x)
     row_first = tile_y + lane * lane_rows
@@ -121,14 +122,17 @@ def stroke_forward(
                 base = (y - tile_y) * TILE - tile_x
                 py = float(y) + 0.5 - a[1]
                 for x in range(x0, x1):
-                    px = float(x) + 0.5 - a[0]
-                    t = wp.clamp((px * e[0] + py * e[1]) * inverse, 0.0, 1.0)
-                    rx = px - t * e[0]
-                    ry = py - t * e[1]
-                    squared = rx * rx + ry * ry
-                    if squared < coverage[slot, base + x]:
-                        coverage[slot, base + x] = squared
-                        segment[slot, base + x] = j
+                    so_far = coverage[slot, base + x]
+                    # Well inside the stroke it does not matter which segment is nearest.
+                    if so_far > inside:
+                        px = float(x) + 0.5 - a[0]
+                        t = wp.clamp((px * e[0] + py * e[1]) * inverse, 0.0, 1.0)
+                        rx = px - t * e[0]
+                        ry = py - t * e[1]
+                        squared = rx * rx + ry * ry
+                        if squared < so_far:
+                            coverage[slot, base + x] = squared
+                            segment[slot, base + x] = j
     if seen == 0:
         slot_seen[slot, lane] = 0
         return
@@ -141,7 +145,7 @@ def stroke_forward(
             value = float(0.0)
             if squared < reach * reach:
                 distance = wp.sqrt(squared)
-                if distance < half - 0.75:
+                if squared <= inside and half > 0.75:
                     value = 1.0
                 else:
                     j = segment[slot, p]

@@ -51,7 +51,7 @@ class Density:
     faint_middle: float = 0.5
     """Prune strokes whose middle opacity is further than this below both ends."""
     replace: float = 0.1
-    """Replace at least this fraction of the curves each turn: those without which the error would grow least."""
+    """Replace at least this fraction of the curves each turn: those without which the error grows least."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Settings:
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
     xing: float = 0.0
-    """Weight of the Xing loss (paper: 0.01). It forbids shapes that the fold loss and exact coverage allow."""
+    """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
     fold_start: float = 0.2
     """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
     grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
