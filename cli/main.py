@@ -66,7 +66,9 @@ def main(arguments: list[str] | None = None) -> Any:
         click.echo(error.format_message())
         sys.exit(2)
     except click.ClickException as error:
-        error.show()
+        context = getattr(error, "ctx", None)
+        help_of = f" (see {context.command_path} --help)" if context else ""
+        click.echo(f"warpsplat: {error.format_message()}{help_of}", err=True)
         sys.exit(error.exit_code)
     except WarpsplatError as error:
         click.echo(f"warpsplat: {error}", err=True)
@@ -74,6 +76,9 @@ def main(arguments: list[str] | None = None) -> Any:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
+    except OSError as error:
+        click.echo(f"warpsplat: {error.filename or 'output'}: {error.strerror or error}", err=True)
+        sys.exit(4)
 
 
 if __name__ == "__main__":

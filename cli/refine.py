@@ -45,7 +45,7 @@ def command(
     from warpsplat.refine import read_pair, refine
 
     text, target = read_pair(svg, image)
-    check_output(output)
+    check_output(output, image)
     start_warp()
     chosen = choose_device(device)
     interrupt = Interrupt()

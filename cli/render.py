@@ -22,12 +22,16 @@ def command(svg: Path, output: Path, scale: float) -> None:
     from warpsplat.metrics import read_svg_text, render_svg, svg_size
 
     text = read_svg_text(svg)
-    check_output(output)
+    check_output(output, svg)
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
     width, height = svg_size(text, svg)
-    if round(width * scale) * round(height * scale) > MAX_PIXELS:
+    if width * height > MAX_PIXELS:
+        raise ImageError(f"{svg}: is {width}x{height} pixels, more than {MAX_PIXELS // 1_000_000} million")
+    if width * scale * height * scale > MAX_PIXELS:
         raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
+    if min(width, height) * scale < 0.5:
+        raise UsageError(f"scale {scale} leaves no pixel of {width}x{height}")
     try:
         image = render_svg(text, zoom=scale)
     except ImageError as error:

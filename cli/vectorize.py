@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import quality_options, run_options, settings_from
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import ImageError
 
 MISSED = 6
 """Exit code when the file is written but a goal was missed."""
@@ -52,14 +52,14 @@ def command(
     against the image, number of paths, size.
     """
     settings = settings_from(given)
+    if not image.name or image.is_dir():
+        raise ImageError(f"{image}: is a folder, not an image")
     output = output or Path(image.name).with_suffix(".svg")
-    if output.exists() and output.resolve() == image.resolve():
-        raise UsageError(f"{output}: is the image itself; give another output with -o")
     if not image.exists():
         raise ImageError(f"{image}: no such file")
     from warpsplat.files import check_output
 
-    check_output(output)
+    check_output(output, image)
     from warpsplat.cli.run import run_file
     from warpsplat.device import choose_device, start_warp
 

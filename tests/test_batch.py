@@ -87,6 +87,16 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n  - images: in/a.png\n", 1, "a.svg"),
     ("jobs:\n  - images: [in/a.png\n", 3, "YAML"),
     ("jobs:\n\t- images: x\n", 2, "YAML"),
+    ("jobs:\n  - images: !foo x\n", 2, "plain value"),
+    ("jobs:\n  - images: in/a.png\n    curves: 2001-99-99\n", 3, "plain value"),
+    ("jobs:\n  - images: in/a.png\n    curves: !!int abc\n", 3, "plain value"),
+    ("jobs:\n  - images: 'in/**a/[.png'\n", 2, "[.png"),
+    ("jobs:\n  - images: ~nosuchuser/a.png\n", 2, "nosuchuser"),
+    ("jobs:\n  - images: in/a.png\n    output: ~nosuchuser\n", 2, "nosuchuser"),
+    ("jobs:\n  - images: in/a.png\n    output: in/b.png\n", 2, "not a folder"),
+    ("jobs:\n  - images: in/a.png\n    target-psnr: true\n", 3, "target-psnr"),
+    ("jobs:\n  - images: in/a.png\n    time-budget: soon\n", 3, "time-budget"),
+    ("jobs:\n  - images: in/deep/../pic.svg\n", 1, "overwritten"),
 ]
 
 
@@ -95,6 +105,7 @@ def test_errors_name_line_and_key(
     folder: Path, capsys: pytest.CaptureFixture[str], text: str, line: int, word: str
 ) -> None:
     path = write(folder, text)
+    (folder / "in" / "pic.svg").touch()
     before = sorted(os.listdir(folder / "in"))
     assert run("batch", path) == 2
     captured = capsys.readouterr()

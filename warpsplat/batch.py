@@ -17,6 +17,7 @@ Paths are relative to the YAML file.
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -108,7 +109,11 @@ class _File:
         return result
 
     def value(self, node: yaml.Node) -> Any:
-        return self.loader.construct_object(node, deep=True)
+        try:
+            return self.loader.construct_object(node, deep=True)
+        except Exception as error:  # tags and scalars of YAML's own types raise what their constructors raise
+            line = node.start_mark.line + 1
+            raise self.error(line, f"not a plain value: {str(error).splitlines()[0]}") from error
 
 
 def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, _Value]:
@@ -118,7 +123,7 @@ def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str
         if key not in KEYS:
             continue
         value = file.value(node)
-        if key in TEXT_KEYS and not isinstance(value, str):
+        if key in (*TEXT_KEYS, "quality") and (not isinstance(value, str) or "\0" in value):
             raise file.error(line, f"{key}: must be text, not {value!r}")
         if key in KIND_KEYS and value is not True:
             raise file.error(line, f"{key}: must be true, not {value!r}; leave it out or give the other kind")
@@ -157,10 +162,13 @@ def _images(file: _File, line: int, node: yaml.Node) -> list[Path]:
         raise file.error(line, "images: must be a path or pattern, or a list of them")
     found: dict[Path, None] = {}
     for pattern in patterns:
-        matches = list(_glob(file.path.parent, pattern))
+        try:
+            matches = list(_glob(file.path.parent, pattern))
+        except (ValueError, RuntimeError, OSError, NotImplementedError) as error:
+            raise file.error(line, f"images: {pattern!r} is no usable pattern: {error}") from error
         if not matches:
             raise file.error(line, f"images: nothing matches {pattern!r}")
-        found.update(dict.fromkeys(matches))
+        found.update(dict.fromkeys(Path(os.path.normpath(m)) for m in matches))
     return list(found)
 
 
@@ -205,8 +213,14 @@ def load_jobs(path: Path) -> list[Job]:
         kind = "open" if options.pop("open", False) else "closed" if options.pop("closed", False) else None
         output, device = options.pop("output", None), options.pop("device", "auto")
         settings = make_settings(options.pop("quality", "balanced"), kind=kind, **options)
+        try:
+            folder_given = None if output is None else path.parent / Path(output).expanduser()
+        except RuntimeError as error:
+            raise file.error(start, f"output: {output!r}: {error}") from error
+        if folder_given and folder_given.exists() and not folder_given.is_dir():
+            raise file.error(start, f"output: {output!r} is a file, not a folder")
         for image in _images(file, *entries["images"]):
-            folder = image.parent if output is None else path.parent / Path(output).expanduser()
+            folder = folder_given or image.parent
             planned.append((image, folder, settings, device))
     # a.png and a.jpg in one folder keep their endings; an image in two jobs cannot have one result.
     distinct = {(folder, image) for image, folder, _, _ in planned}
@@ -215,6 +229,8 @@ def load_jobs(path: Path) -> list[Job]:
     for image, folder, settings, device in planned:
         name = image.stem if stems[folder, image.stem] == 1 else image.name
         jobs.append(Job(image, folder / f"{name}.svg", settings, device))
+        if jobs[-1].output.resolve() == image.resolve():
+            raise file.error(line, f"jobs: {image} would be overwritten by its own result; give an output")
     for output_path, count in Counter(job.output for job in jobs).items():
         if count > 1:
             raise file.error(

@@ -118,7 +118,9 @@ class Settings:
             ("max-bytes", self.max_bytes),
         )
         for name, goal in goals:
-            if goal is not None and not (isinstance(goal, (int, float)) and 0 < goal < 1e12):
+            if goal is not None and (
+                isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < 1e12
+            ):
                 raise UsageError(f"{name.replace('_', '-')} must be a positive number, not {goal!r}")
         choices = (
             ("kind", self.kind, ("closed", "open")),
@@ -148,7 +150,7 @@ def parse_duration(value: str | float) -> float:
         UsageError: none of these.
     """
     found = DURATION.fullmatch(str(value).strip())
-    if isinstance(value, bool) or not found:
+    if isinstance(value, bool) or not found or len(found[1]) > 15:
         raise UsageError(f"not a time: {value!r}; write 60s or 2m")
     return float(found[1]) * UNITS[(found[2] or "s").lower()]
 
@@ -160,7 +162,7 @@ def parse_bytes(value: str | int) -> int:
         UsageError: none of these.
     """
     found = SIZE.fullmatch(str(value).strip())
-    if isinstance(value, bool) or not found:
+    if isinstance(value, bool) or not found or len(found[1]) > 15:
         raise UsageError(f"not a size: {value!r}; write 100KB or 1MB")
     return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
 

@@ -45,7 +45,8 @@ def choose_device(name: str = "auto") -> wp.Device:
     if name == "auto":
         return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
     try:
-        return wp.get_device(name)
+        with _native_messages_hidden():
+            return wp.get_device(name)
     except Exception as error:
         found = ", ".join(str(d) for d in wp.get_devices())
         raise UsageError(f"unknown device {name!r}; here there are: {found}") from error

@@ -10,12 +10,20 @@ from pathlib import Path
 from warpsplat.errors import OutputError, UsageError
 
 
-def check_output(path: Path) -> None:
+def check_output(path: Path, *sources: Path) -> None:
     """Find out before the work whether ``path`` can be written.
 
     Raises:
-        UsageError: the folder is missing or not writable, or ``path`` is a folder.
+        UsageError: the folder is missing or not writable, ``path`` is no regular file, or one of ``sources``.
     """
+    try:
+        _check_output(path, sources)
+    except (OSError, ValueError) as error:
+        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise UsageError(f"{str(path)[:200]}: cannot be written: {cause}") from error
+
+
+def _check_output(path: Path, sources: tuple[Path, ...]) -> None:
     folder = path.parent
     if not folder.exists():
         raise UsageError(f"{path}: the folder {folder} does not exist")
@@ -23,6 +31,11 @@ def check_output(path: Path) -> None:
         raise UsageError(f"{path}: {folder} is not a folder")
     if path.is_dir():
         raise UsageError(f"{path}: is a folder, not a file")
+    if path.exists() and not path.is_file():
+        raise UsageError(f"{path}: is a device or a pipe, not a file")
+    for source in sources:
+        if source.exists() and path.resolve() == source.resolve():
+            raise UsageError(f"{path}: is the input itself; give another output")
     try:
         handle, name = tempfile.mkstemp(prefix=".warpsplat-", dir=folder)
     except OSError as error:
@@ -32,12 +45,13 @@ def check_output(path: Path) -> None:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write ``data`` to a new file beside ``path``, then rename it.
+    """Write ``data`` to a new file beside ``path``, then rename it. Of a link, the target is replaced.
 
     Raises:
         OutputError: the disk is full, or the folder cannot be written; ``path`` is as it was.
     """
     name: str | None = None
+    path = path.resolve()
     try:
         handle, name = tempfile.mkstemp(prefix=".warpsplat-", suffix=path.suffix, dir=path.parent)
         with os.fdopen(handle, "wb") as file:

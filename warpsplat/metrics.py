@@ -36,7 +36,7 @@ def render_svg(
     """
     try:
         png = resvg_py.svg_to_bytes(
-            svg_string=text, width=width, height=height, zoom=zoom, skip_system_fonts=True
+            svg_string=text, width=width, height=height, zoom=zoom, dpi=96.0, skip_system_fonts=True
         )
     except ValueError as error:
         raise ImageError(f"cannot be rendered: {str(error).splitlines()[0]}") from error
@@ -146,9 +146,16 @@ class Score:
 
 
 def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
-    """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare."""
+    """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare.
+
+    Raises:
+        ImageError: not an SVG, or one of other proportions.
+    """
     height, width = target.shape[:2]
-    shown = on_white(render_svg(text, width=width, height=height))
+    image = render_svg(text, width=width, height=height)
+    if image.size != (width, height):
+        raise ImageError(f"renders as {image.width}x{image.height}, the image has {width}x{height} pixels")
+    shown = on_white(image)
     wanted = np.round(target.astype(np.float64) * 255)
     data = text.encode()
     return Score(
@@ -183,6 +190,10 @@ def read_svg_text(path: Path) -> str:
         raise ImageError(f"{path}: not an SVG") from None
 
 
+PIXELS_PER_UNIT = {"px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "pt": 96 / 72, "pc": 16.0}
+"""CSS absolute lengths."""
+
+
 def svg_size(text: str, path: Path) -> tuple[int, int]:
     """Size [px] at which a viewer shows an SVG.
 
@@ -192,9 +203,9 @@ def svg_size(text: str, path: Path) -> tuple[int, int]:
     try:
         # resvg knows every way of giving a size; a probe that keeps the proportions is cheap.
         wide = render_svg(text, width=64)
-        own = re.search(r"<svg\b[^>]*?\swidth=[\"']([\d.]+)(?:px)?[\"']", text)
-        box = re.search(r"<svg\b[^>]*?\sviewBox=[\"'][-\d.]+[ ,]+[-\d.]+[ ,]+([\d.]+)", text)
+        own = re.search(r"<svg\b[^>]*?\swidth=[\"'](\d+\.?\d*)(px|in|mm|cm|pt|pc)?[\"']", text)
+        box = re.search(r"<svg\b[^>]*?\sviewBox=[\"'][-\d.e]+[ ,]+[-\d.e]+[ ,]+(\d+\.?\d*)", text)
     except ImageError as error:
         raise ImageError(f"{path}: {error}") from error
-    width = float(own[1]) if own else float(box[1]) if box else 100.0
+    width = float(own[1]) * PIXELS_PER_UNIT[own[2] or "px"] if own else float(box[1]) if box else 100.0
     return max(1, round(width)), max(1, round(width * wide.height / wide.width))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,26 @@ from warpsplat.svg import write_svg
 
 MAX_POINTS = 60_000
 """Most control points of one path; beyond, the padding of the others would fill the memory."""
+
+
+UNSUPPORTED = re.compile(
+    r"(clip-path|mask|filter)\s*[=:]\s*[\"']?\s*url\(|(?:fill|stroke)\s*[=:]\s*[\"']?\s*(url)\(|<(image|text|use)\b"
+)
+"""What the picture would lose without a word."""
+
+
+def _opacity(values: Any, name: str) -> float:
+    """An opacity attribute: a number or a percentage.
+
+    Raises:
+        ImageError: neither.
+    """
+    text = str(values.get(name, 1)).strip()
+    try:
+        number = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        raise ImageError(f"{name} {text!r} is not a number") from None
+    return min(max(number, 0.0), 1.0)
 
 
 def _cubics(path: Any) -> list[list[np.ndarray]]:
@@ -97,6 +118,10 @@ def load_scene(text: str, width: int, height: int, name: str) -> Scene:
     try:
         render_svg(text, width=8)
         document = se.SVG.parse(io.StringIO(text), reify=True, width=width, height=height)
+        found = UNSUPPORTED.search(text)
+        if found:
+            what = next(group for group in found.groups() if group)
+            raise ImageError(f"uses {'a gradient or pattern' if what == 'url' else what}, not supported")
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
     except Exception as error:  # the parser raises what its helpers raise
@@ -123,9 +148,12 @@ def load_scene(text: str, width: int, height: int, name: str) -> Scene:
         paint = element.fill if filled else element.stroke
         color = np.array([paint.red, paint.green, paint.blue]) / 255
         key = "fill-opacity" if filled else "stroke-opacity"
-        opacity = paint.opacity * float(element.values.get("opacity", 1) or 1)
-        if paint.opacity == 1:
-            opacity *= float(element.values.get(key, 1) or 1)
+        try:
+            opacity = paint.opacity * _opacity(element.values, "opacity")
+            if paint.opacity == 1:
+                opacity *= _opacity(element.values, key)
+        except ImageError as error:
+            raise ImageError(f"{name}: {error}") from error
         if filled and isinstance(element, se.Rect) and not shapes and opacity == 1:
             x0, y0, x1, y1 = path.bbox()
             if x0 <= 0.5 and y0 <= 0.5 and x1 >= width - 0.5 and y1 >= height - 0.5:
@@ -173,7 +201,10 @@ def refine(
     """
     height, width = target.shape[:2]
     scene = load_scene(text, width, height, name)
-    before = score_svg(text, target)
+    try:
+        before = score_svg(text, target)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
     settings = replace(
         settings,
         kind=scene.kind,
