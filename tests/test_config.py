@@ -14,6 +14,11 @@ def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
         assert settings == replace(Settings(), quality=name, **changes)
 
 
+def test_splats_get_fewer_iterations_unless_told() -> None:
+    assert make_settings(renderer="splat").iterations < make_settings().iterations
+    assert make_settings(renderer="splat", iterations=77).iterations == 77
+
+
 def test_overrides_win_and_none_is_left_out() -> None:
     settings = make_settings("draft", curves=7, seed=None)
     assert (settings.curves, settings.seed) == (7, Settings().seed)

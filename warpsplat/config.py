@@ -174,6 +174,9 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 }
 """What each preset changes in the defaults."""
 
+SPLAT_SHARE = 0.4
+"""Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
+
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 
@@ -194,4 +197,7 @@ def make_settings(quality: Quality = "balanced", **overrides: Any) -> Settings:
         given["time_budget"] = parse_duration(given["time_budget"])
     if "max_bytes" in given:
         given["max_bytes"] = parse_bytes(given["max_bytes"])
-    return replace(Settings(quality=quality, **PRESETS[quality]), **given)
+    preset = Settings(quality=quality, **PRESETS[quality])
+    if given.get("renderer") == "splat":
+        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations))
+    return replace(preset, **given)
