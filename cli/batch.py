@@ -72,6 +72,8 @@ def command(jobs: Path, device: str | None, verbose: int, quiet: bool, as_json: 
                 )
                 values |= {"status": "stopped" if result.stopped else "made", **result.as_dict()}
                 say(f"{count} {summary(job.output, values)}")
+                for goal in result.missed:
+                    click.echo(f"{count} goal missed: {goal}", err=True)
         except WarpsplatError as error:
             values |= {"status": "failed", "error": str(error)}
             click.echo(f"{count} failed: {error}", err=True)

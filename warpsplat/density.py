@@ -27,10 +27,8 @@ def opacity_threshold(density: Density, progress: float) -> float:
 
 def duplicates(scene: Scene, density: Density) -> BoolArray:
     """Curves with a neighbour further in front of nearly their colour and box."""
-    boxes, areas = (
-        scene.bounds(),
-        np.maximum(1e-6, np.ptp(scene.bounds().reshape(-1, 2, 2), axis=1).prod(axis=1)),
-    )
+    boxes = scene.bounds()
+    areas = np.maximum(1e-6, (boxes[:, 2:] - boxes[:, :2]).prod(axis=1))
     found = np.zeros(len(scene), np.bool_)
     # Boxes that overlap so much have nearly the same left edge: a window over the sorted edges is enough.
     order = np.argsort(boxes[:, 0], kind="stable")
@@ -67,7 +65,7 @@ def prune_mask(scene: Scene, density: Density, progress: float) -> BoolArray:
     return doomed
 
 
-def least_seen(scene: Scene, doomed: BoolArray, count: int, seen: FloatArray) -> IndexArray:
+def least_seen(doomed: BoolArray, count: int, seen: FloatArray) -> IndexArray:
     """The ``count`` curves to remove: the doomed first, then those with the least ``seen``."""
     rank = np.lexsort((seen, ~doomed))
     return np.asarray(rank[: max(count, int(doomed.sum()))])

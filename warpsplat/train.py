@@ -186,7 +186,7 @@ class Trainer:
         scene = self.scene()
         doomed = prune_mask(scene, s.density, progress)
         seen = self.renderer.removal_costs(self.device_target)
-        gone = least_seen(scene, doomed, round(s.density.replace * len(scene)), seen)
+        gone = least_seen(doomed, round(s.density.replace * len(scene)), seen)
         keep = np.setdiff1d(np.arange(len(scene)), gone)
         if len(gone):
             added = densify(s, scene, self.small, self.renderer.image.numpy(), len(gone), self.rng)
