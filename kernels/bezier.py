@@ -2,7 +2,9 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpsplat.kernels import constants
+
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 
 @wp.func

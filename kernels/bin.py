@@ -9,10 +9,14 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import find_range
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 TILE = wp.constant(constants.TILE)
 INT_MAX = wp.constant(constants.INT_MAX)
+TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
+COVERED = wp.constant(constants.COVERED)
+FULL = wp.constant(constants.FULL)
+HIDDEN = wp.constant(constants.HIDDEN)
 
 
 @wp.kernel
@@ -65,6 +69,7 @@ def fill_slots(
     # Out:
     slot_part: wp.array[wp.int32],  # [capacity] -1: unused
     slot_tile: wp.array[wp.int32],  # [capacity]
+    slot_state: wp.array[wp.int32],  # [capacity] 0
     sort_keys: wp.array[wp.int32],  # [2 x capacity] the tile; the second half is the sort's scratch
     sort_slots: wp.array[wp.int32],  # [2 x capacity]
 ):
@@ -83,6 +88,7 @@ def fill_slots(
             tile = (part_tiles[part, 1] + local / width) * tiles_x + part_tiles[part, 0] + local % width
     slot_part[slot] = part
     slot_tile[slot] = tile
+    slot_state[slot] = 0
     sort_keys[slot] = tile
     sort_slots[slot] = slot
 
@@ -126,3 +132,42 @@ def tile_ranges(
         tile_first[tile] = i
     if after != tile:
         tile_last[tile] = i + 1
+
+
+@wp.kernel
+def list_visible(
+    # In:
+    first: wp.int32,
+    sort_slots: wp.array[wp.int32],  # [2 x capacity] slots by tile, front to back
+    slot_part: wp.array[wp.int32],  # [capacity]
+    opacity_count: wp.int32,
+    colors: wp.array[wp.vec3],  # [curve_count]
+    opacities: wp.array2d[wp.float32],  # [curve_count, opacity_count]
+    tile_first: wp.array[wp.int32],  # [tile_count]
+    tile_last: wp.array[wp.int32],  # [tile_count]
+    # Out:
+    slot_state: wp.array[wp.int32],  # [capacity] HIDDEN added
+    tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
+    list_slot: wp.array[wp.int32],  # [capacity] slot, or -1 - slot of a FULL one
+    list_paint: wp.array[wp.vec4],  # [capacity] colour and opacity
+):
+    """Each tile's slots that can be seen: covered, and not behind so many FULL ones that no light is left."""
+    tile = first + wp.tid()
+    light = float(1.0)
+    n = tile_first[tile]
+    for k in range(tile_first[tile], tile_last[tile]):
+        slot = sort_slots[k]
+        state = slot_state[slot]
+        if light <= TRANSMITTANCE_MIN:
+            slot_state[slot] = state | HIDDEN
+        elif state & COVERED != 0:
+            part = slot_part[slot]
+            color = colors[part / opacity_count]
+            opacity = opacities[part / opacity_count, part % opacity_count]
+            list_paint[n] = wp.vec4(color[0], color[1], color[2], opacity)
+            list_slot[n] = slot
+            if state == FULL:
+                list_slot[n] = -1 - slot
+                light *= 1.0 - opacity
+            n += 1
+    tile_stop[tile] = n

@@ -4,157 +4,133 @@ alpha = opacity x coverage; C = sum_i c_i alpha_i prod_{j<i} (1 - alpha_j) + bac
 Both directions run front to back. The adjoint starts from total = dot(C, dL/dC), subtracts each part's own
 share and so knows the share of all that lies behind, without stored lists:
 dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
-A coverage may come from splats or from any other model: this stage knows only slots. It takes the magnitude
-(an exact fill stores which way round it is as a sign), and 1 throughout a slot whose state is FULL.
+A coverage may come from splats or from any other model: this stage knows only the tiles' lists of visible
+slots. It takes the magnitude (an exact fill stores which way round it is as a sign), and 1 throughout a FULL
+slot. Images are arrays of tiles, planes and columns (see ``warpsplat.tiles``).
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.tile import column, total
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
-TILE = wp.constant(constants.TILE)
+COVERED = wp.constant(constants.COVERED)
+HIDDEN = wp.constant(constants.HIDDEN)
 TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
-FULL = wp.constant(constants.FULL)
+LIT = wp.constant(1.0e9)  # takes a transmittance a bit above TRANSMITTANCE_MIN to 1
+TINY = wp.constant(1.0e-9)
 
 
 @wp.kernel
 def composite_forward(
     # In:
     first: wp.int32,
-    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
-    tiles_x: wp.int32,
+    lane_columns: wp.int32,  # columns of a tile that a thread handles
     tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_last: wp.array[wp.int32],  # [tile_count]
-    sort_slots: wp.array[wp.int32],  # [2 x slot_capacity] slots by tile, front to back
-    slot_part: wp.array[wp.int32],  # [slot_capacity]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
-    opacity_count: wp.int32,
-    colors: wp.array[wp.vec3],  # [curve_count]
-    opacities: wp.array2d[wp.float32],  # [curve_count, opacity_count]
+    tile_stop: wp.array[wp.int32],  # [tile_count]
+    list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
+    list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
+    coverage: wp.array2d[column],  # [slot_capacity, TILE]
     background: wp.vec3,
     # Out:
-    image: wp.array2d[wp.vec3],  # [height, width]
-    transmittance: wp.array2d[wp.float32],  # [height, width] light left behind the last part
+    image: wp.array3d[column],  # [tile_count, 3, TILE]
 ):
-    """One thread a tile and lane; a lane stops when no light passes any of its pixels."""
+    """One thread a tile and lane."""
     i, lane = wp.tid()
     tile = first + i
-    x0 = TILE * (tile % tiles_x)
-    y0 = TILE * (tile / tiles_x)
-    x1 = wp.min(x0 + TILE, image.shape[1])
-    row_first = y0 + lane * lane_rows
-    row_last = wp.min(row_first + lane_rows, image.shape[0])
-    for y in range(row_first, row_last):
-        for x in range(x0, x1):
-            image[y, x] = wp.vec3(0.0, 0.0, 0.0)
-            transmittance[y, x] = 1.0
-    k = tile_first[tile]
-    last = tile_last[tile]
-    while k < last:
-        slot = sort_slots[k]
-        k += 1
-        state = slot_seen[slot, lane]
-        if state != 0:
-            part = slot_part[slot]
-            curve = part / opacity_count
-            color = colors[curve]
-            opacity = opacities[curve, part % opacity_count]
-            light = float(0.0)
-            for y in range(row_first, row_last):
-                base = (y - y0) * TILE - x0
-                for x in range(x0, x1):
-                    t = transmittance[y, x]
-                    if t > TRANSMITTANCE_MIN:
-                        alpha = opacity
-                        if state != FULL:
-                            alpha = opacity * wp.abs(coverage[slot, base + x])
-                        image[y, x] = image[y, x] + (t * alpha) * color
-                        t = t * (1.0 - alpha)
-                        transmittance[y, x] = t
-                        light = wp.max(light, t)
-            if light <= TRANSMITTANCE_MIN:
-                k = last
-    for y in range(row_first, row_last):
-        for x in range(x0, x1):
-            image[y, x] = image[y, x] + transmittance[y, x] * background
+    start = tile_first[tile]
+    stop = tile_stop[tile]
+    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+        t = column(1.0)
+        red = column(0.0)
+        green = column(0.0)
+        blue = column(0.0)
+        for k in range(start, stop):
+            paint = list_paint[k]
+            slot = list_slot[k]
+            share = paint[3] * t
+            if slot >= 0:
+                share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
+            red = red + paint[0] * share
+            green = green + paint[1] * share
+            blue = blue + paint[2] * share
+            t = t - share
+        image[tile, 0, x] = red + background[0] * t
+        image[tile, 1, x] = green + background[1] * t
+        image[tile, 2, x] = blue + background[2] * t
 
 
 @wp.kernel
 def composite_backward(
     # In:
     first: wp.int32,
-    lane_rows: wp.int32,
-    tiles_x: wp.int32,
+    lane_columns: wp.int32,
     tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_last: wp.array[wp.int32],  # [tile_count]
-    sort_slots: wp.array[wp.int32],  # [2 x slot_capacity]
-    slot_part: wp.array[wp.int32],  # [slot_capacity]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
-    opacity_count: wp.int32,
-    colors: wp.array[wp.vec3],  # [curve_count]
-    opacities: wp.array2d[wp.float32],  # [curve_count, opacity_count]
-    image: wp.array2d[wp.vec3],  # [height, width] of the forward pass
-    image_grad: wp.array2d[wp.vec3],  # [height, width]
+    tile_stop: wp.array[wp.int32],  # [tile_count]
+    list_slot: wp.array[wp.int32],  # [slot_capacity]
+    list_paint: wp.array[wp.vec4],  # [slot_capacity]
+    coverage: wp.array2d[column],  # [slot_capacity, TILE]
+    image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
+    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     # Out:
-    transmittance: wp.array2d[wp.float32],  # [height, width] scratch
-    behind: wp.array2d[wp.float32],  # [height, width] scratch: dot(colour still to come, image_grad)
-    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] written for every listed slot
-    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] of colour (3) and opacity
+    coverage_grad: wp.array2d[column],  # [slot_capacity, TILE] written for visible PARTIAL slots
+    slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3) and opacity by pixel row: one lane
+    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
 ):
-    """See the module; the same visits and the same stop as the forward pass."""
+    """See the module. Written for visible slots only."""
     i, lane = wp.tid()
     tile = first + i
-    x0 = TILE * (tile % tiles_x)
-    y0 = TILE * (tile / tiles_x)
-    x1 = wp.min(x0 + TILE, image.shape[1])
-    row_first = y0 + lane * lane_rows
-    row_last = wp.min(row_first + lane_rows, image.shape[0])
-    for y in range(row_first, row_last):
-        for x in range(x0, x1):
-            transmittance[y, x] = 1.0
-            behind[y, x] = wp.dot(image[y, x], image_grad[y, x])
-    light = float(1.0)
-    for k in range(tile_first[tile], tile_last[tile]):
-        slot = sort_slots[k]
-        color_sum = wp.vec3(0.0, 0.0, 0.0)
-        opacity_sum = float(0.0)
-        state = slot_seen[slot, lane]
-        if state != 0:
-            part = slot_part[slot]
-            curve = part / opacity_count
-            color = colors[curve]
-            opacity = opacities[curve, part % opacity_count]
-            if light <= TRANSMITTANCE_MIN:
-                for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
-                    coverage_grad[slot, p] = 0.0
+    start = tile_first[tile]
+    stop = tile_stop[tile]
+    one = column(1.0)
+    zero = column(0.0)
+    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+        red = image_grad[tile, 0, x]
+        green = image_grad[tile, 1, x]
+        blue = image_grad[tile, 2, x]
+        behind = wp.cw_mul(image[tile, 0, x], red)
+        behind = behind + wp.cw_mul(image[tile, 1, x], green)
+        behind = behind + wp.cw_mul(image[tile, 2, x], blue)
+        t = one
+        for k in range(start, stop):
+            paint = list_paint[k]
+            slot = list_slot[k]
+            full = slot < 0
+            covered = one
+            if full:
+                slot = -1 - slot
             else:
-                light = float(0.0)
-                for y in range(row_first, row_last):
-                    base = (y - y0) * TILE - x0
-                    for x in range(x0, x1):
-                        t = transmittance[y, x]
-                        alpha_grad = float(0.0)
-                        if t > TRANSMITTANCE_MIN:
-                            c = float(1.0)
-                            if state != FULL:
-                                c = wp.abs(coverage[slot, base + x])
-                            alpha = opacity * c
-                            g = image_grad[y, x]
-                            share = t * wp.dot(color, g)
-                            left = behind[y, x] - alpha * share
-                            alpha_grad = share - left / (1.0 - alpha)
-                            color_sum += (t * alpha) * g
-                            opacity_sum += c * alpha_grad
-                            behind[y, x] = left
-                            t = t * (1.0 - alpha)
-                            transmittance[y, x] = t
-                            light = wp.max(light, t)
-                        coverage_grad[slot, base + x] = opacity * alpha_grad
-        slot_grad[slot, lane] = wp.vec4(color_sum[0], color_sum[1], color_sum[2], opacity_sum)
+                covered = wp.abs(coverage[slot, x])
+            alpha = paint[3] * covered
+            share = wp.cw_mul(t, paint[0] * red + paint[1] * green + paint[2] * blue)
+            seen = wp.cw_mul(t, alpha)
+            behind = behind - wp.cw_mul(alpha, share)
+            # Where no light is left, only rounding is; Adam would make steps of it.
+            lit = wp.min(wp.max(LIT * (t - TRANSMITTANCE_MIN * one), zero), one)
+            alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, one - alpha))
+            t = t - seen
+            if not full:
+                coverage_grad[slot, x] = paint[3] * alpha_grad
+            red_grad = wp.cw_mul(seen, red)
+            green_grad = wp.cw_mul(seen, green)
+            blue_grad = wp.cw_mul(seen, blue)
+            opacity_grad = wp.cw_mul(covered, alpha_grad)
+            if lane_columns == 1:
+                slot_grad[slot, lane] = wp.vec4(
+                    total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
+                )
+            else:
+                if x > 0:
+                    red_grad = red_grad + slot_columns[slot, 0]
+                    green_grad = green_grad + slot_columns[slot, 1]
+                    blue_grad = blue_grad + slot_columns[slot, 2]
+                    opacity_grad = opacity_grad + slot_columns[slot, 3]
+                slot_columns[slot, 0] = red_grad
+                slot_columns[slot, 1] = green_grad
+                slot_columns[slot, 2] = blue_grad
+                slot_columns[slot, 3] = opacity_grad
 
 
 @wp.kernel
@@ -162,25 +138,41 @@ def reduce_slots(
     # In:
     first: wp.int32,
     opacity_count: wp.int32,
+    lanes: wp.int32,
     slot_first: wp.array[wp.int32],  # [part_count]
     slot_last: wp.array[wp.int32],  # [part_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    slot_columns: wp.array2d[column],  # [slot_capacity, 4]
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
     # Out:
     colors_grad: wp.array[wp.vec3],  # [curve_count] written
     opacities_grad: wp.array2d[wp.float32],  # [curve_count, opacity_count] written
 ):
-    """One thread a curve sums its slots in a fixed order: the same bits on every run."""
+    """One thread a curve sums its visible slots in a fixed order: the same bits on every run."""
     curve = first + wp.tid()
     color_total = wp.vec3(0.0, 0.0, 0.0)
     for j in range(opacity_count):
         part = curve * opacity_count + j
-        opacity_total = float(0.0)
+        red = column(0.0)
+        green = column(0.0)
+        blue = column(0.0)
+        opacity = column(0.0)
+        sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
         for slot in range(slot_first[part], slot_last[part]):
-            for lane in range(slot_grad.shape[1]):
-                g = slot_grad[slot, lane]
-                color_total += wp.vec3(g[0], g[1], g[2])
-                opacity_total += g[3]
-        opacities_grad[curve, j] = opacity_total
+            state = slot_state[slot]
+            if state & COVERED != 0 and state & HIDDEN == 0:
+                if lanes == 1:
+                    red = red + slot_columns[slot, 0]
+                    green = green + slot_columns[slot, 1]
+                    blue = blue + slot_columns[slot, 2]
+                    opacity = opacity + slot_columns[slot, 3]
+                else:
+                    for lane in range(lanes):
+                        sums = sums + slot_grad[slot, lane]
+        color_total = color_total + wp.vec3(
+            sums[0] + total(red), sums[1] + total(green), sums[2] + total(blue)
+        )
+        opacities_grad[curve, j] = sums[3] + total(opacity)
     colors_grad[curve] = color_total
 
 
@@ -188,23 +180,17 @@ def reduce_slots(
 def removal_cost(
     # In:
     first: wp.int32,
-    lane_rows: wp.int32,
-    tiles_x: wp.int32,
+    lane_columns: wp.int32,
     tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_last: wp.array[wp.int32],  # [tile_count]
-    sort_slots: wp.array[wp.int32],  # [2 x slot_capacity]
-    slot_part: wp.array[wp.int32],  # [slot_capacity]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
-    opacity_count: wp.int32,
-    colors: wp.array[wp.vec3],  # [curve_count]
-    opacities: wp.array2d[wp.float32],  # [curve_count, opacity_count]
-    image: wp.array2d[wp.vec3],  # [height, width] of the forward pass
-    target: wp.array2d[wp.vec3],  # [height, width]
+    tile_stop: wp.array[wp.int32],  # [tile_count]
+    list_slot: wp.array[wp.int32],  # [slot_capacity]
+    list_paint: wp.array[wp.vec4],  # [slot_capacity]
+    coverage: wp.array2d[column],  # [slot_capacity, TILE]
+    image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
+    target: wp.array3d[column],  # [tile_count, 3, TILE]
+    inside: wp.array2d[column],  # [tile_count, TILE] 1 for pixels of the image
     # Out:
-    transmittance: wp.array2d[wp.float32],  # [height, width] scratch
-    rest: wp.array2d[wp.vec3],  # [height, width] scratch: light still to come
-    slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels
+    slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
 ):
     """What the squared error would grow by if a part alone were taken away.
 
@@ -213,34 +199,35 @@ def removal_cost(
     """
     i, lane = wp.tid()
     tile = first + i
-    x0 = TILE * (tile % tiles_x)
-    y0 = TILE * (tile / tiles_x)
-    x1 = wp.min(x0 + TILE, image.shape[1])
-    row_first = y0 + lane * lane_rows
-    row_last = wp.min(row_first + lane_rows, image.shape[0])
-    for y in range(row_first, row_last):
-        for x in range(x0, x1):
-            transmittance[y, x] = 1.0
-            rest[y, x] = image[y, x]
-    for k in range(tile_first[tile], tile_last[tile]):
-        slot = sort_slots[k]
-        state = slot_seen[slot, lane]
-        cost = float(0.0)
-        if state != 0:
-            part = slot_part[slot]
-            color = colors[part / opacity_count]
-            opacity = opacities[part / opacity_count, part % opacity_count]
-            for y in range(row_first, row_last):
-                for x in range(x0, x1):
-                    t = transmittance[y, x]
-                    if t > TRANSMITTANCE_MIN:
-                        alpha = opacity
-                        if state != FULL:
-                            alpha = opacity * wp.abs(coverage[slot, (y - y0) * TILE + x - x0])
-                        after = t * (1.0 - alpha)
-                        left = rest[y, x] - (t * alpha) * color
-                        change = (t * alpha) * (left / after - color)
-                        cost += wp.dot(change, change + 2.0 * (image[y, x] - target[y, x]))
-                        rest[y, x] = left
-                        transmittance[y, x] = after
-        slot_cost[slot, lane] = cost
+    one = column(1.0)
+    zero = column(0.0)
+    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+        t = one
+        red = image[tile, 0, x]
+        green = image[tile, 1, x]
+        blue = image[tile, 2, x]
+        red_error = 2.0 * (red - target[tile, 0, x])
+        green_error = 2.0 * (green - target[tile, 1, x])
+        blue_error = 2.0 * (blue - target[tile, 2, x])
+        for k in range(tile_first[tile], tile_stop[tile]):
+            paint = list_paint[k]
+            slot = list_slot[k]
+            seen = paint[3] * t
+            if slot >= 0:
+                seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
+            else:
+                slot = -1 - slot
+            lit = wp.min(wp.max(LIT * (t - TRANSMITTANCE_MIN * one), zero), one)
+            t = t - seen
+            red = red - paint[0] * seen
+            green = green - paint[1] * seen
+            blue = blue - paint[2] * seen
+            share = wp.cw_div(seen, wp.max(t, TINY * one))
+            d = wp.cw_mul(share, red) - paint[0] * seen
+            cost = wp.cw_mul(d, d + red_error)
+            d = wp.cw_mul(share, green) - paint[1] * seen
+            cost = cost + wp.cw_mul(d, d + green_error)
+            d = wp.cw_mul(share, blue) - paint[2] * seen
+            cost = cost + wp.cw_mul(d, d + blue_error)
+            cost = wp.cw_mul(cost, wp.cw_mul(lit, inside[tile, x]))
+            slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)

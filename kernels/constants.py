@@ -68,5 +68,21 @@ PIECES_MIN = 3
 PIECES_MAX = 64
 """Bounds of the straight pieces of one cubic; 64 are enough for one as large as 8,000 px."""
 
-FULL = 2
-"""State of a slot that is covered throughout: compositing need not read its coverage."""
+COVERED = 1
+UNCOVERED = 2
+"""States of a slot are sums: some of its pixels are covered, some are not (wholly)."""
+
+FULL = COVERED
+PARTIAL = COVERED + UNCOVERED
+"""Only for a slot in this state is there a coverage to read; one that is FULL has coverage 1 throughout."""
+
+HIDDEN = 4
+"""Added to the state of a slot that nothing of is seen, as slots in front are opaque."""
+
+MODULE_OPTIONS = {
+    "enable_backward": False,
+    "optimization_level": 3,
+    "cpu_compiler_flags": "-march=native -mllvm=-inline-threshold=9000 -mllvm=-unroll-full-max-count=4",
+}
+"""Of every kernel module. Loops over the 16 elements of a column become vector instructions only where they
+are not unrolled before; unrolled, they also take ten times as long to compile."""

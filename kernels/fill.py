@@ -12,11 +12,16 @@ pixel's. An edge's ends take (1 - s) and s of it, s the edge's parameter at the 
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.tile import column
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 TILE = wp.constant(constants.TILE)
 FULL = wp.constant(constants.FULL)
+PARTIAL = wp.constant(constants.PARTIAL)
+UNCOVERED = wp.constant(constants.UNCOVERED)
+MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
+MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as touching it
 
 
 @wp.func
@@ -27,11 +32,24 @@ def next_vertex(i: wp.int32, part_first: wp.int32, part_last: wp.int32) -> wp.in
     return i + 1
 
 
+@wp.func
+def tile_of(x: wp.float32, wide: wp.int32) -> wp.int32:
+    """Tile of ``x`` px right of the part's tiles' left border: -1 left of them, ``wide`` right of them."""
+    return int(wp.floor(wp.clamp(x, -1.0, float(TILE * wide)) / float(TILE)))
+
+
+@wp.func
+def add_area(coverage: wp.array2d[wp.float32], slot: wp.int32, x: wp.int32, row: wp.int32, value: wp.float32):
+    """Add to the pixel ``x`` right of the left border of ``slot``, in row ``row`` of its tile."""
+    s = slot + x / TILE
+    p = TILE * (x % TILE) + row
+    coverage[s, p] = coverage[s, p] + value
+
+
 @wp.kernel
-def fill_forward(
+def fill_states(
     # In:
     first: wp.int32,
-    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
     slot_part: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [part_count]
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
@@ -39,10 +57,89 @@ def fill_forward(
     part_last: wp.array[wp.int32],  # [part_count]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] signed, in [-1, 1]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
+    slot_state: wp.array[wp.int32],  # [slot_capacity] 0, UNCOVERED, PARTIAL or FULL
+    slot_winding: wp.array[wp.int32],  # [slot_capacity] of slots that no edge touches
 ):
-    """One thread a row of tiles of a part (the thread of its leftmost slot) and lane."""
+    """One thread a row of tiles of a part (that of its leftmost slot).
+
+    Slots that an edge touches are PARTIAL; in the others the winding number is the same everywhere: that on
+    a line through the middle of the row.
+    """
+    slot = first + wp.tid()
+    part = slot_part[slot]
+    if part < 0:
+        return
+    tile_x0 = part_tiles[part, 0]
+    wide = part_tiles[part, 2] - tile_x0
+    local = slot - slot_first[part]
+    if local % wide != 0:
+        return
+    low = float(TILE * (part_tiles[part, 1] + local / wide))
+    high = low + float(TILE)
+    middle = low + MIDDLE
+    left = float(TILE * tile_x0)
+    end = slot + wide
+    for s in range(slot, end):
+        slot_state[s] = 0
+        slot_winding[s] = 0
+    winding = int(0)
+    start = part_first[part]
+    stop = part_last[part]
+    b = vertex[stop - 1]
+    for j in range(start, stop):
+        a = b
+        b = vertex[j]
+        if wp.min(a[1], b[1]) <= high and wp.max(a[1], b[1]) >= low:
+            x0 = a[0]
+            x1 = b[0]
+            if a[1] != b[1]:
+                slope = (b[0] - a[0]) / (b[1] - a[1])
+                x0 = a[0] + slope * (wp.clamp(a[1], low, high) - a[1])
+                x1 = a[0] + slope * (wp.clamp(b[1], low, high) - a[1])
+                crossing = int(0)
+                if a[1] <= middle and b[1] > middle:
+                    crossing = 1
+                elif b[1] <= middle and a[1] > middle:
+                    crossing = -1
+                if crossing != 0:
+                    s = slot + tile_of(a[0] + slope * (middle - a[1]) - left, wide)
+                    if s < slot:
+                        winding += crossing
+                    elif s < end:
+                        slot_winding[s] = slot_winding[s] + crossing
+            s0 = wp.max(slot + tile_of(wp.min(x0, x1) - MARGIN - left, wide), slot)
+            s1 = wp.min(slot + tile_of(wp.max(x0, x1) + MARGIN - left, wide), end - 1)
+            for s in range(s0, s1 + 1):
+                slot_state[s] = PARTIAL
+    for s in range(slot, end):
+        winding += slot_winding[s]
+        slot_winding[s] = winding
+        if slot_state[s] != PARTIAL:
+            slot_state[s] = UNCOVERED
+            if winding != 0:
+                slot_state[s] = FULL
+
+
+@wp.kernel
+def fill_forward(
+    # In:
+    first: wp.int32,
+    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
+    slot_part: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_first: wp.array[wp.int32],  # [part_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    slot_winding: wp.array[wp.int32],  # [slot_capacity]
+    part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
+    part_first: wp.array[wp.int32],  # [part_count] vertices
+    part_last: wp.array[wp.int32],  # [part_count]
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    # Out:
+    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] signed, in [-1, 1]; by column
+    columns: wp.array2d[column],  # [slot_capacity, TILE] the same memory
+):
+    """One thread a row of tiles of a part (that of its leftmost slot) and lane. Only slots that are PARTIAL
+    are written, and rows without a visible one are left out.
+    """
     i, lane = wp.tid()
     slot = first + i
     part = slot_part[slot]
@@ -53,6 +150,12 @@ def fill_forward(
     local = slot - slot_first[part]
     if local % wide != 0:
         return
+    seen = int(0)
+    for s in range(slot, slot + wide):
+        if slot_state[s] == PARTIAL:
+            seen = 1
+    if seen == 0:
+        return
     tile_y = part_tiles[part, 1] + local / wide
     left = float(TILE * tile_x0)
     pixels = TILE * wide
@@ -61,21 +164,26 @@ def fill_forward(
     low = float(row_first)
     high = float(row_last)
     for s in range(slot, slot + wide):
-        for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
-            coverage[s, p] = 0.0
+        if slot_state[s] & PARTIAL == PARTIAL:
+            if lane_rows == TILE:
+                for x in range(TILE):
+                    columns[s, x] = column(0.0)
+            else:
+                for x in range(TILE):
+                    coverage[s, TILE * x + lane] = 0.0
     start = part_first[part]
     stop = part_last[part]
-    touched = int(0)
+    second = vertex[stop - 1]
     for j in range(start, stop):
-        a = vertex[j]
-        b = vertex[next_vertex(j, start, stop)]
+        a = second
+        second = vertex[j]
+        b = second
         sign = float(1.0)
         if a[1] > b[1]:
-            a = vertex[next_vertex(j, start, stop)]
-            b = vertex[j]
+            b = a
+            a = second
             sign = -1.0
         if b[1] > low and a[1] < high and b[1] > a[1]:
-            touched = 1
             slope = (b[0] - a[0]) / (b[1] - a[1])
             y_top = wp.max(a[1], low)
             y_bottom = wp.min(b[1], high)
@@ -87,71 +195,56 @@ def fill_forward(
                 y_next = wp.min(float(y + 1), y_bottom)
                 dy = y_next - y_top
                 x_next = x_top + dy * slope
-                base = (y - TILE * tile_y) * TILE
+                row = y - TILE * tile_y
                 x_low = wp.max(wp.min(x_top, x_next), 0.0)
                 x_high = wp.min(wp.max(x_top, x_next), float(pixels))
-                column = int(x_low)
+                index = int(x_low)
                 height = sign * dy
                 if x_low >= x_high:
                     # Vertical, or wholly left or right of the part's tiles.
-                    if column < pixels:
-                        fraction = x_low - float(column)
-                        s = slot + column / TILE
-                        p = base + column % TILE
-                        coverage[s, p] = coverage[s, p] + height * (1.0 - fraction)
-                        column += 1
-                        if column < pixels:
-                            s = slot + column / TILE
-                            p = base + column % TILE
-                            coverage[s, p] = coverage[s, p] + height * fraction
+                    if index < pixels:
+                        fraction = x_low - float(index)
+                        add_area(coverage, slot, index, row, height * (1.0 - fraction))
+                        if index + 1 < pixels:
+                            add_area(coverage, slot, index + 1, row, height * fraction)
                 else:
                     per_x = height / wp.abs(x_next - x_top)
                     # What lies left of the part's tiles acts at their left border.
                     outside = wp.max(-wp.min(x_top, x_next), 0.0) * per_x
                     if outside != 0.0:
-                        coverage[slot, base] = coverage[slot, base] + outside
-                    x = x_low
-                    while x < x_high:
-                        edge = wp.min(float(column + 1), x_high)
-                        part_height = (edge - x) * per_x
-                        fraction = 0.5 * (x + edge) - float(column)
-                        s = slot + column / TILE
-                        p = base + column % TILE
-                        coverage[s, p] = coverage[s, p] + part_height * (1.0 - fraction)
-                        column += 1
-                        if column < pixels:
-                            s = slot + column / TILE
-                            p = base + column % TILE
-                            coverage[s, p] = coverage[s, p] + part_height * fraction
-                        x = edge
+                        add_area(coverage, slot, 0, row, outside)
+                    at = x_low
+                    while at < x_high:
+                        edge = wp.min(float(index + 1), x_high)
+                        part_height = (edge - at) * per_x
+                        fraction = 0.5 * (at + edge) - float(index)
+                        add_area(coverage, slot, index, row, part_height * (1.0 - fraction))
+                        index += 1
+                        if index < pixels:
+                            add_area(coverage, slot, index, row, part_height * fraction)
+                        at = edge
                 x_top = x_next
                 y_top = y_next
-    # Prefix sums along the rows, tile by tile.
-    for s in range(slot, slot + wide):
-        slot_seen[s, lane] = 0
-    if touched == 0:
-        return
-    for r in range(lane * lane_rows, (lane + 1) * lane_rows):
-        total = float(0.0)
+    # Prefix sums along the rows.
+    if lane_rows == TILE:
+        total = column(0.0)
+        one = column(1.0)
         for s in range(slot, slot + wide):
-            most = float(0.0)
-            least = float(1.0)
-            for p in range(r * TILE, (r + 1) * TILE):
-                total += coverage[s, p]
-                value = wp.clamp(total, -1.0, 1.0)
-                coverage[s, p] = value
-                most = wp.max(most, wp.abs(value))
-                least = wp.min(least, wp.abs(value))
-            # Rounding leaves sums of about 1e-7 outside and 1 - 1e-7 inside.
-            state = int(1)
-            if most < 1.0e-5:
-                state = 0
-            elif least > 0.99999:
-                state = FULL
-            if r == lane * lane_rows:
-                slot_seen[s, lane] = state
-            elif slot_seen[s, lane] != state:
-                slot_seen[s, lane] = 1
+            if slot_state[s] & PARTIAL == PARTIAL:
+                for x in range(TILE):
+                    total = total + columns[s, x]
+                    columns[s, x] = wp.min(wp.max(total, -one), one)
+            else:
+                total = float(slot_winding[s]) * one
+    else:
+        value = float(0.0)
+        for s in range(slot, slot + wide):
+            if slot_state[s] & PARTIAL == PARTIAL:
+                for x in range(TILE):
+                    value += coverage[s, TILE * x + lane]
+                    coverage[s, TILE * x + lane] = wp.clamp(value, -1.0, 1.0)
+            else:
+                value = float(slot_winding[s])
 
 
 @wp.kernel
@@ -165,9 +258,10 @@ def fill_backward(
     part_last: wp.array[wp.int32],  # [part_count]
     slot_first: wp.array[wp.int32],  # [part_count]
     slot_last: wp.array[wp.int32],  # [part_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] signed
+    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] signed; by x
     coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the magnitude
     # Out:
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts here
@@ -218,14 +312,14 @@ def fill_backward(
                 step_y = -1
         middle_x = a[0] + s * d[0]
         middle_y = a[1] + s * d[1]
-        column = wp.clamp(int(wp.floor(middle_x)), 0, width - 1)
+        x = wp.clamp(int(wp.floor(middle_x)), 0, width - 1)
         row = wp.clamp(int(wp.floor(middle_y)), 0, height - 1)
         while s < s_end:
             # Where the edge leaves this pixel.
             s_next = s_end
             across = int(0)
             if step_x != 0:
-                s_x = (float(column + (step_x + 1) / 2) - a[0]) * inverse_x
+                s_x = (float(x + (step_x + 1) / 2) - a[0]) * inverse_x
                 if s_x < s_next:
                     s_next = s_x
                     across = 1
@@ -235,9 +329,11 @@ def fill_backward(
                     s_next = s_y
                     across = 2
             s_next = wp.max(s_next, s)
-            slot = base_slot + (row / TILE - tile_y0) * wide + column / TILE - tile_x0
-            p = (row % TILE) * TILE + column % TILE
-            value = coverage[slot, p]
+            slot = base_slot + (row / TILE - tile_y0) * wide + x / TILE - tile_x0
+            p = TILE * (x % TILE) + row % TILE
+            value = float(0.0)
+            if slot_state[slot] == PARTIAL:
+                value = coverage[slot, p]
             if wp.abs(value) < 1.0 and value != 0.0:
                 g = coverage_grad[slot, p] * wp.sign(value) * (s_next - s)
                 move = wp.vec2(-d[1] * g, d[0] * g)
@@ -245,12 +341,12 @@ def fill_backward(
                 at_start += (1.0 - middle) * move
                 at_end += middle * move
             if across == 1:
-                column += step_x
+                x += step_x
             elif across == 2:
                 row += step_y
             else:
                 s_next = s_end
-            if column < 0 or column >= width or row < 0 or row >= height:
+            if x < 0 or x >= width or row < 0 or row >= height:
                 s_next = s_end
             s = s_next
     start_grad[i] = at_start

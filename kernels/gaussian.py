@@ -18,7 +18,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 SPREAD = wp.constant(constants.SPREAD)
 PIXEL_SIGMA = wp.constant(constants.PIXEL_SIGMA)

@@ -4,8 +4,9 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross
+from warpsplat.kernels.tile import column, total
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 EPSILON = wp.constant(constants.EPSILON)
 
@@ -14,37 +15,26 @@ EPSILON = wp.constant(constants.EPSILON)
 def l2_loss(
     # In:
     first: wp.int32,
-    image: wp.array2d[wp.vec3],  # [height, width]
-    target: wp.array2d[wp.vec3],  # [height, width]
+    lane_columns: wp.int32,
+    image: wp.array3d[column],  # [tile_count, 3, TILE]
+    target: wp.array3d[column],  # [tile_count, 3, TILE]
+    inside: wp.array2d[column],  # [tile_count, TILE] 1 for pixels of the image
+    value_count: wp.int32,  # pixels x channels
     # Out:
-    image_grad: wp.array2d[wp.vec3],  # [height, width]
-    row_loss: wp.array[wp.float32],  # [height] sums of squares
+    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
+    loss: wp.array2d[wp.float32],  # [tile_count, lanes] sums of squares
 ):
     """Mean squared error over pixels and channels (paper eq. 12, first term) and its gradient."""
-    y = first + wp.tid()
-    factor = 2.0 / (3.0 * float(image.shape[0]) * float(image.shape[1]))
-    total = float(0.0)
-    for x in range(image.shape[1]):
-        difference = image[y, x] - target[y, x]
-        image_grad[y, x] = factor * difference
-        total += wp.dot(difference, difference)
-    row_loss[y] = total
-
-
-@wp.kernel
-def sum_rows(
-    # In:
-    first: wp.int32,
-    row_loss: wp.array[wp.float32],  # [height]
-    width: wp.int32,
-    # Out:
-    loss: wp.array[wp.float32],  # [1] mean squared error
-):
-    """One thread; float64, so that the figure does not depend on the order of magnitude of the rows."""
-    total = wp.float64(0.0)
-    for y in range(row_loss.shape[0]):
-        total += wp.float64(row_loss[y])
-    loss[first + wp.tid()] = float(total / wp.float64(3 * width * row_loss.shape[0]))
+    i, lane = wp.tid()
+    tile = first + i
+    factor = 2.0 / float(value_count)
+    squares = column(0.0)
+    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+        for channel in range(3):
+            difference = wp.cw_mul(inside[tile, x], image[tile, channel, x] - target[tile, channel, x])
+            image_grad[tile, channel, x] = factor * difference
+            squares = squares + wp.cw_mul(difference, difference)
+    loss[tile, lane] = total(squares)
 
 
 @wp.func
@@ -101,4 +91,49 @@ def xing_backward(
             points_grad[curve, i0 + 1] = points_grad[curve, i0 + 1] + a_grad
             points_grad[curve, i0 + 2] = points_grad[curve, i0 + 2] - b_grad
             points_grad[curve, i3] = points_grad[curve, i3] + b_grad
+    curve_loss[curve] = total
+
+
+@wp.kernel
+def bending_backward(
+    # In:
+    first: wp.int32,
+    points: wp.array2d[wp.vec2],  # [curve_count, point_count] canvas units
+    closed: wp.int32,
+    weight: wp.float32,
+    # Out:
+    points_grad: wp.array2d[wp.vec2],  # [curve_count, point_count] added to
+    curve_loss: wp.array[wp.float32],  # [curve_count] sum over the curve's cubics, before weight
+):
+    """Bending of each cubic: (|a|^2 + |b|^2) / (1 + c), a and b the second differences of its control points
+    and c the distance of its ends. A unit of length, as a hundredth of the outline of a circle is; but large
+    where handles are long for the way that they go, as in burrs and loops. One thread a curve.
+    """
+    curve = first + wp.tid()
+    point_count = points.shape[1]
+    total = float(0.0)
+    for segment in range(point_count / 3):
+        i0 = 3 * segment
+        i3 = i0 + 3
+        if closed == 1:
+            i3 = i3 % point_count
+        p0 = points[curve, i0]
+        p1 = points[curve, i0 + 1]
+        p2 = points[curve, i0 + 2]
+        p3 = points[curve, i3]
+        a = p0 - 2.0 * p1 + p2
+        b = p1 - 2.0 * p2 + p3
+        chord = p3 - p0
+        c = wp.length(chord)
+        squares = wp.dot(a, a) + wp.dot(b, b)
+        energy = squares / (1.0 + c)
+        total += energy
+        k = 2.0 * weight / (1.0 + c)
+        stretch = wp.vec2(0.0, 0.0)
+        if c > EPSILON:
+            stretch = (weight * energy / ((1.0 + c) * c)) * chord
+        points_grad[curve, i0] = points_grad[curve, i0] + k * a + stretch
+        points_grad[curve, i0 + 1] = points_grad[curve, i0 + 1] + k * (b - 2.0 * a)
+        points_grad[curve, i0 + 2] = points_grad[curve, i0 + 2] + k * (a - 2.0 * b)
+        points_grad[curve, i3] = points_grad[curve, i3] + k * b - stretch
     curve_loss[curve] = total

@@ -22,7 +22,7 @@ from warpsplat.kernels.bezier import (
     segment_at,
 )
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 ROW_INSET = wp.constant(constants.ROW_INSET)
 ROW_GROWTH = wp.constant(constants.ROW_GROWTH)

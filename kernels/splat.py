@@ -12,9 +12,10 @@ import warp as wp
 
 from warpsplat.kernels import constants
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 TILE = wp.constant(constants.TILE)
+PARTIAL = wp.constant(constants.PARTIAL)
 Q_MAX = wp.constant(constants.Q_MAX)
 GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
 
@@ -56,8 +57,8 @@ def splat_forward(
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
     extent: wp.array[wp.vec2],  # [gaussian_capacity] px
     # Out:
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] in [0, 1]
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 where the coverage is 0 throughout
+    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] in [0, 1]; by column
+    slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
 ):
     """One thread a slot and lane: the whole tile on a CPU, one row on a GPU."""
     i, lane = wp.tid()
@@ -69,8 +70,9 @@ def splat_forward(
     tile_y = TILE * (slot_tile[slot] / tiles_x)
     row_first = tile_y + lane * lane_rows
     row_last = row_first + lane_rows
-    for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
-        coverage[slot, p] = 1.0
+    for x in range(TILE):
+        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
+            coverage[slot, TILE * x + y] = 1.0
     seen = int(0)
     for j in range(part_first[part], part_last[part]):
         m = mean[j]
@@ -95,14 +97,16 @@ def splat_forward(
                     dx = float(x0) + 0.5 - m[0]
                     g = gaussian_at(con, dx, dy)
                     ratio = wp.exp(-(con[0] * (dx + 0.5) + con[1] * dy))
-                    base = (y - tile_y) * TILE - tile_x
                     for x in range(x0, x1):
-                        coverage[slot, base + x] = coverage[slot, base + x] * (1.0 - wp.min(g, GAUSSIAN_MAX))
+                        p = TILE * (x - tile_x) + y - tile_y
+                        coverage[slot, p] = coverage[slot, p] * (1.0 - wp.min(g, GAUSSIAN_MAX))
                         g *= ratio
                         ratio *= falloff
-    for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
-        coverage[slot, p] = 1.0 - coverage[slot, p]
-    slot_seen[slot, lane] = seen
+    for x in range(TILE):
+        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
+            coverage[slot, TILE * x + y] = 1.0 - coverage[slot, TILE * x + y]
+    if seen != 0:
+        wp.atomic_or(slot_state, slot, PARTIAL)
 
 
 @wp.kernel
@@ -114,6 +118,7 @@ def splat_backward(
     gaussian_part: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [part_count]
     slot_last: wp.array[wp.int32],  # [part_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     mean: wp.array[wp.vec2],  # [gaussian_capacity]
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
@@ -168,11 +173,12 @@ def splat_backward(
                 while x < x1:
                     tile_x = x / TILE
                     slot = slot_row + tile_x
-                    base = (y % TILE) * TILE - tile_x * TILE
+                    base = y % TILE - TILE * TILE * tile_x
+                    lit = slot_state[slot] == PARTIAL
                     stop = wp.min(x1, (tile_x + 1) * TILE)
                     for xx in range(x, stop):
-                        if g < GAUSSIAN_MAX:
-                            p = base + xx
+                        if lit and g < GAUSSIAN_MAX:
+                            p = base + TILE * xx
                             h = -0.5 * coverage_grad[slot, p] * (1.0 - coverage[slot, p]) * g / (1.0 - g)
                             row_sum += h
                             row_x += h * dx

@@ -14,10 +14,12 @@ import warp as wp
 
 from warpsplat.kernels import constants
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(constants.MODULE_OPTIONS)
 
 TILE = wp.constant(constants.TILE)
-FULL = wp.constant(constants.FULL)
+COVERED = wp.constant(constants.COVERED)
+UNCOVERED = wp.constant(constants.UNCOVERED)
+PARTIAL = wp.constant(constants.PARTIAL)
 FAR = wp.constant(1.0e9)
 TINY = wp.constant(1.0e-12)
 FLAT = wp.constant(1.0e-4)
@@ -85,9 +87,9 @@ def stroke_forward(
     part_last: wp.array[wp.int32],  # [part_count]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] in [0, 1]
-    segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS] nearest segment, by its first vertex
-    slot_seen: wp.array2d[wp.int32],  # [slot_capacity, lanes] 0 empty, 1 partly covered, FULL
+    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] in [0, 1]; by column
+    segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS] nearest segment (its first vertex)
+    slot_state: wp.array[wp.int32],  # [slot_capacity] 0, UNCOVERED, PARTIAL or FULL
 ):
     """One thread a slot and lane: squared distances first, then coverage."""
     i, lane = wp.tid()
@@ -102,8 +104,9 @@ def stroke_forward(
     tile_y = TILE * (slot_tile[slot] / tiles_x)
     row_first = tile_y + lane * lane_rows
     row_last = row_first + lane_rows
-    for p in range(lane * lane_rows * TILE, (lane + 1) * lane_rows * TILE):
-        coverage[slot, p] = FAR
+    for x in range(TILE):
+        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
+            coverage[slot, TILE * x + y] = FAR
     seen = int(0)
     for j in range(part_first[part], part_last[part] - 1):
         a = vertex[j]
@@ -119,10 +122,10 @@ def stroke_forward(
             e = b - a
             inverse = 1.0 / wp.max(wp.dot(e, e), TINY)
             for y in range(y0, y1):
-                base = (y - tile_y) * TILE - tile_x
+                base = y - tile_y - TILE * tile_x
                 py = float(y) + 0.5 - a[1]
                 for x in range(x0, x1):
-                    so_far = coverage[slot, base + x]
+                    so_far = coverage[slot, base + TILE * x]
                     # Well inside the stroke it does not matter which segment is nearest.
                     if so_far > inside:
                         px = float(x) + 0.5 - a[0]
@@ -131,16 +134,16 @@ def stroke_forward(
                         ry = py - t * e[1]
                         squared = rx * rx + ry * ry
                         if squared < so_far:
-                            coverage[slot, base + x] = squared
-                            segment[slot, base + x] = j
+                            coverage[slot, base + TILE * x] = squared
+                            segment[slot, base + TILE * x] = j
     if seen == 0:
-        slot_seen[slot, lane] = 0
+        wp.atomic_or(slot_state, slot, UNCOVERED)
         return
     most = float(0.0)
     least = float(1.0)
     for y in range(row_first, row_last):
         for x in range(TILE):
-            p = (y - tile_y) * TILE + x
+            p = TILE * x + y - tile_y
             squared = coverage[slot, p]
             value = float(0.0)
             if squared < reach * reach:
@@ -156,12 +159,12 @@ def stroke_forward(
             coverage[slot, p] = value
             most = wp.max(most, value)
             least = wp.min(least, value)
-    state = int(1)
-    if most <= 0.0:
-        state = 0
-    elif least >= 1.0:
-        state = FULL
-    slot_seen[slot, lane] = state
+    state = int(0)
+    if most > 0.0:
+        state = COVERED
+    if least < 1.0:
+        state = state | UNCOVERED
+    wp.atomic_or(slot_state, slot, state)
 
 
 @wp.kernel
@@ -177,6 +180,7 @@ def stroke_backward(
     part_last: wp.array[wp.int32],  # [part_count]
     slot_first: wp.array[wp.int32],  # [part_count]
     slot_last: wp.array[wp.int32],  # [part_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS]
@@ -214,8 +218,10 @@ def stroke_backward(
             slot_row = base_slot + (y / TILE - tile_y0) * wide - tile_x0
             for x in range(x0, x1):
                 slot = slot_row + x / TILE
-                p = (y % TILE) * TILE + x % TILE
-                value = coverage[slot, p]
+                p = TILE * (x % TILE) + y % TILE
+                value = float(0.0)
+                if slot_state[slot] == PARTIAL:
+                    value = coverage[slot, p]
                 if value > 0.0 and value < 1.0:
                     if segment[slot, p] == i:
                         centre = wp.vec2(float(x) + 0.5, float(y) + 0.5)

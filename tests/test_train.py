@@ -71,7 +71,7 @@ def test_small_in_front_with_area_order(device: str) -> None:
     settings = make_settings(curves=12, iterations=30, order="area", density=Density(interval=10, stop=1.0))
     trainer = Trainer(picture(), settings, wp.get_device(device))
     for _ in range(2):
-        trainer._surgery(0.5) if trainer.renderer else trainer._enter(phases(settings, 64, 48)[0])
+        trainer._surgery(0.5) if trainer.renderer else trainer.enter(phases(settings, 64, 48)[0])
     areas = trainer.scene().areas()
     trainer.close()
     assert (np.diff(areas) <= 1e-3).all()

@@ -79,12 +79,20 @@ class Settings:
     """Newest in front, or smallest in front as in the paper."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
+    length: float = 0.0
+    """Weight of the length of fills' outlines (as in Mumford and Shah 1989) [squared error of a pixel, summed
+    over channels, per pixel of outline]: needles and loops too thin to lower the error shrink away."""
+    bending: float = 0.0
+    """Weight of the bending of the cubics, in the same unit: burrs and loops straighten that do not lower the
+    error."""
     fold_start: float = 0.2
     """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
     grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
     fold_end: float = 3.0
     through_scales: bool = True
     """Whether gradients flow through the Gaussians' scales and angles."""
+    viewer: bool = True
+    """Whether the last steps take what a viewer shows, its rounding included, for the render."""
     precision: int = 1
     """Decimals of coordinates in the file."""
     target_psnr: float | None = None

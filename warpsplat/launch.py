@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import itertools
 import os
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
 
 PIECES_PER_THREAD = 4
 """A split launch is cut finer than there are threads, so that uneven pieces balance."""
+
+
+@dataclass(frozen=True)
+class Launch:
+    """One kernel or host function, as the pieces that may run at the same time."""
+
+    stage: str
+    name: str
+    """Of the kernel or function."""
+    pieces: tuple[Callable[[], None], ...]
 
 
 class Program:
@@ -23,8 +35,11 @@ class Program:
     """
 
     def __init__(self, device: wp.Device, threads: int | None = None) -> None:
+        """``threads``: of a CPU; default all. A machine that refuses threads is served by the caller's."""
         self.device = device
-        self._stages: list[list[Callable[[], None]]] = []
+        self.launches: list[Launch] = []
+        self.stage = ""
+        """Names what is added from now on, for ``run_timed``."""
         self._threads = max(1, threads or os.cpu_count() or 1) if device.is_cpu else 1
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
 
@@ -41,10 +56,10 @@ class Program:
         shape = (dim,) if isinstance(dim, int) else tuple(dim)
         if min(shape) == 0:
             return
-        pieces = self._threads * PIECES_PER_THREAD if split and self._pool else 1
-        pieces = min(pieces, shape[0])
-        borders = [shape[0] * i // pieces for i in range(pieces + 1)]
-        stage: list[Callable[[], None]] = []
+        count = self._threads * PIECES_PER_THREAD if split and self._pool else 1
+        count = min(count, shape[0])
+        borders = [shape[0] * i // count for i in range(count + 1)]
+        pieces: list[Callable[[], None]] = []
         for start, stop in itertools.pairwise(borders):
             command = wp.launch(
                 kernel,
@@ -55,24 +70,61 @@ class Program:
                 record_cmd=True,
             )
             assert command is not None
-            stage.append(command.launch)
-        self._stages.append(stage)
+            pieces.append(command.launch)
+        self.launches.append(Launch(self.stage, kernel.key, tuple(pieces)))
 
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
         """Append a host function that launches device work (a scan, a sort)."""
-        self._stages.append([lambda: function(*arguments)])
+        self.launches.append(Launch(self.stage, function.__name__, (lambda: function(*arguments),)))
+
+    def _replay(self, launch: Launch) -> None:
+        if self._pool is None or len(launch.pieces) == 1:
+            for piece in launch.pieces:
+                piece()
+        else:
+            for future in [self._pool.submit(piece) for piece in launch.pieces]:
+                future.result()
 
     def run(self) -> None:
         """Replay all launches."""
-        for stage in self._stages:
-            if len(stage) == 1 or self._pool is None:
-                for launch in stage:
-                    launch()
-            else:
-                for future in [self._pool.submit(launch) for launch in stage]:
-                    future.result()
+        for launch in self.launches:
+            self._replay(launch)
+
+    def run_timed(self) -> dict[tuple[str, str], float]:
+        """Replay all launches, waiting for the device after each; seconds by stage and name."""
+        seconds: dict[tuple[str, str], float] = {}
+        for launch in self.launches:
+            begin = time.perf_counter()
+            self._replay(launch)
+            wp.synchronize_device(self.device)
+            spent = time.perf_counter() - begin
+            key = (launch.stage, launch.name)
+            seconds[key] = seconds.get(key, 0.0) + spent
+        return seconds
+
+    @property
+    def threads(self) -> int:
+        """CPU threads that share a split launch."""
+        return self._threads
 
     def close(self) -> None:
         """End the threads."""
         if self._pool:
             self._pool.shutdown(wait=False)
+
+
+def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
+    """One graph that replays ``programs`` without Python in between; None where that is not possible.
+
+    A CPU graph runs on one thread, so several threads are not given up for it; a GPU needs its memory pool,
+    as scans and sorts take their scratch memory from it.
+    """
+    if device.is_cpu:
+        if any(program.threads > 1 for program in programs):
+            return None
+    elif not wp.is_mempool_enabled(device):
+        return None
+    with wp.ScopedCapture(device) as captured:
+        for program in programs:
+            program.run()
+    return captured.graph

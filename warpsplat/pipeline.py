@@ -16,10 +16,9 @@ from warpsplat import __version__
 from warpsplat.config import Settings
 from warpsplat.files import write_atomically
 from warpsplat.image import load_image
-from warpsplat.kernels import constants
 from warpsplat.metrics import Score, score_svg
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.svg import write_svg
+from warpsplat.svg import export
 from warpsplat.train import Progress, Trainer
 
 
@@ -94,18 +93,14 @@ def vectorize(
     finally:
         trainer.close()
 
-    def export(scene: Scene) -> str:
-        plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
-        return write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
-
-    svg = export(scene)
+    svg = export(scene, settings, metadata)
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         # The estimate was short: leave out what shows least, as many as the excess needs.
         excess = 1 - settings.max_bytes / len(svg.encode())
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = scene.areas() * scene.opacities.max(axis=1)
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene)
+        svg = export(scene, settings, metadata)
     score = score_svg(svg, target)
     seconds = time.monotonic() - started
     return Result(

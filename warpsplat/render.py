@@ -15,9 +15,11 @@ import warp as wp
 from warpsplat.errors import CapacityError
 from warpsplat.kernels import bin as binning
 from warpsplat.kernels import composite, constants, sample
+from warpsplat.kernels.tile import column
 from warpsplat.launch import Program
-from warpsplat.parameters import Parameters
+from warpsplat.parameters import Parameters, view
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.tiles import from_tiles, tile_counts, to_tiles
 
 TILE = constants.TILE
 GROWTH = 1.5
@@ -60,20 +62,19 @@ class TileRenderer(ABC):
         self.width, self.height, self.scale = width, height, scale
         self.device = parameters.device
         self._threads = threads
-        self.tiles_x = -(-width // TILE)
-        self.tiles_y = -(-height // TILE)
-        # A GPU gives each pixel row of a tile a thread; a CPU keeps a tile in one thread's cache.
+        self.tiles_x, self.tiles_y = tile_counts(width, height)
+        # A GPU gives each row or column of a tile a thread; a CPU keeps a tile in one thread's cache.
         self.lanes = 1 if self.device.is_cpu else TILE
-        self.lane_rows = TILE // self.lanes
-        self.image = wp.zeros((height, width), dtype=wp.vec3, device=self.device)
-        self.image_grad = wp.zeros((height, width), dtype=wp.vec3, device=self.device)
-        self.transmittance = wp.zeros((height, width), dtype=wp.float32, device=self.device)
-        self.behind = wp.zeros((height, width), dtype=wp.float32, device=self.device)
+        self.lane_size = TILE // self.lanes
+        tiles = self.tiles_x * self.tiles_y
+        self.image = self.columns(tiles, 3, TILE)
+        self.image_grad = self.columns(tiles, 3, TILE)
+        self.inside = self.columns(tiles, TILE)
+        self.inside.assign(to_tiles(np.ones((height, width, 1), np.float32))[:, 0])
         self.needed_items = wp.zeros(1, dtype=wp.int32, device=self.device)
         self.needed_slots = wp.zeros(1, dtype=wp.int32, device=self.device)
         self.forward_program: Program | None = None
         self.backward_program: Program | None = None
-        tiles = self.tiles_x * self.tiles_y
         first_guess = Capacity(self.items_per_part * parameters.part_count, tiles + 8 * parameters.part_count)
         self.capacity = capacity or first_guess
         self.rebuild()
@@ -115,10 +116,25 @@ class TileRenderer(ABC):
         self.slot_part, self.slot_tile = self.ints(slots), self.ints(slots)
         self.sort_keys, self.sort_slots = self.ints(2 * slots), self.ints(2 * slots)
         self.tile_first, self.tile_last = self.ints(tiles), self.ints(tiles)
-        self.coverage = self.floats(slots, constants.TILE_PIXELS)
-        self.coverage_grad = self.floats(slots, constants.TILE_PIXELS)
-        self.slot_seen = self.ints(slots, self.lanes)
-        self.slot_grad = wp.zeros((slots, self.lanes), dtype=wp.vec4, device=self.device)
+        self.slot_state = self.ints(slots)
+        self.tile_stop, self.list_slot = self.ints(tiles), self.ints(slots)
+        self.list_paint = self.vectors(wp.vec4, slots)
+        self.coverage, self.coverage_columns = self._tile_array(slots)
+        self.coverage_grad, self.coverage_grad_columns = self._tile_array(slots)
+        # Sums over a tile: columns where a thread has the tile, else one number a lane.
+        self.slot_columns = self.columns(slots if self.lanes == 1 else 1, 4)
+        self.slot_grad = wp.zeros(
+            (1 if self.lanes == 1 else slots, self.lanes), dtype=wp.vec4, device=self.device
+        )
+
+    def columns(self, *shape: int) -> wp.array:
+        """A zeroed array of columns of a tile."""
+        return wp.zeros(shape, dtype=column, device=self.device)
+
+    def _tile_array(self, slots: int) -> tuple[wp.array, wp.array]:
+        """A tile of floats for each slot, as pixels and, in the same memory, as columns."""
+        pixels = self.floats(slots, constants.TILE_PIXELS)
+        return pixels, view(pixels, column, (slots, TILE))
 
     @abstractmethod
     def _allocate_items(self) -> None:
@@ -130,7 +146,7 @@ class TileRenderer(ABC):
 
     @abstractmethod
     def _record_coverage(self, program: Program) -> None:
-        """Items -> ``coverage`` and ``slot_seen``."""
+        """Items -> ``slot_state``, the lists of visible slots (``_record_lists``) and ``coverage``."""
 
     @abstractmethod
     def _record_coverage_backward(self, program: Program) -> None:
@@ -147,11 +163,26 @@ class TileRenderer(ABC):
         )
 
     def _record_forward(self) -> Program:
-        p = self.parameters
         program = Program(self.device, self._threads)
-        slots, parts = self.capacity.slots, p.part_count
-        tiles = self.tiles_x * self.tiles_y
+        program.stage = "sample"
         position, extent = self._record_items(program)
+        program.stage = "bin"
+        self._record_bins(program, position, extent)
+        program.stage = "forward"
+        self._record_coverage(program)
+        program.add(
+            composite.composite_forward,
+            (self.tiles_x * self.tiles_y, self.lanes),
+            [*self._composite_inputs(), wp.vec3(*(float(x) for x in self.parameters.background))],
+            [self.image],
+            split=True,
+        )
+        return program
+
+    def _record_bins(self, program: Program, position: wp.array, extent: wp.array) -> None:
+        """Items -> slots, and each tile's list of them."""
+        slots, parts = self.capacity.slots, self.parameters.part_count
+        tiles = self.tiles_x * self.tiles_y
         program.add(
             binning.part_rectangles,
             parts,
@@ -170,41 +201,46 @@ class TileRenderer(ABC):
             binning.fill_slots,
             slots,
             [self.front_ends, self.slot_first, self.slot_last, self.part_tiles, self.tiles_x],
-            [self.slot_part, self.slot_tile, self.sort_keys, self.sort_slots],
+            [self.slot_part, self.slot_tile, self.slot_state, self.sort_keys, self.sort_slots],
         )
         program.call(wp.utils.radix_sort_pairs, self.sort_keys, self.sort_slots, slots)
         program.add(binning.clear_ranges, tiles, [], [self.tile_first, self.tile_last])
         program.add(binning.tile_ranges, slots, [self.sort_keys, slots], [self.tile_first, self.tile_last])
-        self._record_coverage(program)
+
+    def _record_lists(self, program: Program) -> None:
+        """``slot_state`` -> each tile's list of visible slots."""
+        p = self.parameters
         program.add(
-            composite.composite_forward,
-            (tiles, self.lanes),
-            [*self._composite_inputs(), wp.vec3(*(float(x) for x in p.background))],
-            [self.image, self.transmittance],
+            binning.list_visible,
+            self.tiles_x * self.tiles_y,
+            [self.sort_slots, self.slot_part, p.opacity_count, p.colors, p.opacities]
+            + [self.tile_first, self.tile_last],
+            [self.slot_state, self.tile_stop, self.list_slot, self.list_paint],
             split=True,
         )
-        return program
 
     def _composite_inputs(self) -> list[object]:
-        p = self.parameters
-        lists = [self.tile_first, self.tile_last, self.sort_slots, self.slot_part, self.slot_seen]
-        return [self.lane_rows, self.tiles_x, *lists, self.coverage, p.opacity_count, p.colors, p.opacities]
+        lists = [self.tile_first, self.tile_stop, self.list_slot, self.list_paint]
+        return [self.lane_size, *lists, self.coverage_columns]
 
     def _record_backward(self) -> Program:
         p = self.parameters
         program = Program(self.device, self._threads)
+        program.stage = "backward"
         program.add(
             composite.composite_backward,
             (self.tiles_x * self.tiles_y, self.lanes),
             [*self._composite_inputs(), self.image, self.image_grad],
-            [self.transmittance, self.behind, self.coverage_grad, self.slot_grad],
+            [self.coverage_grad_columns, self.slot_columns, self.slot_grad],
             split=True,
         )
         program.add(
             composite.reduce_slots,
             p.curve_count,
-            [p.opacity_count, self.slot_first, self.slot_last, self.slot_grad],
+            [p.opacity_count, self.lanes, self.slot_first, self.slot_last, self.slot_state]
+            + [self.slot_columns, self.slot_grad],
             [p.colors_grad, p.opacities_grad],
+            split=True,
         )
         self._record_coverage_backward(program)
         return program
@@ -219,20 +255,27 @@ class TileRenderer(ABC):
         assert self.backward_program
         self.backward_program.run()
 
+    def read_image(self) -> FloatArray:
+        """``image`` on the host: sRGB in [0, 1], shape (height, width, 3)."""
+        return from_tiles(self.image.numpy(), self.width, self.height)
+
+    def write_image_grad(self, gradient: FloatArray) -> None:
+        """Set ``image_grad`` from the host, shape (height, width, 3)."""
+        self.image_grad.assign(to_tiles(gradient))
+
     def removal_costs(self, target: wp.array) -> FloatArray:
         """What the mean squared error against ``target`` would grow by without each curve, after ``forward``.
 
-        ``target``: vec3, (height, width). Shape of the result: (curve,); for an opacity per segment, the sum.
+        ``target``: tiles as ``image``. Shape of the result: (curve,); for an opacity per segment, the sum.
         Allocates and copies to the host: for use between steps.
         """
-        rest = wp.zeros_like(self.image)
         cost = self.floats(self.capacity.slots, self.lanes)
         program = Program(self.device, self._threads)
         program.add(
             composite.removal_cost,
             (self.tiles_x * self.tiles_y, self.lanes),
-            [*self._composite_inputs(), self.image, target],
-            [self.transmittance, rest, cost],
+            [*self._composite_inputs(), self.image, target, self.inside],
+            [cost],
             split=True,
         )
         program.run()
@@ -289,13 +332,16 @@ def make_renderer(
     capacity: Capacity | None = None,
     through_scales: bool = True,
     fold: float = 0.0,
+    length: float = 0.0,
 ) -> TileRenderer:
-    """``exact`` or ``splat``; the last two arguments are the splats' (see SplatRenderer)."""
+    """``exact`` or ``splat``; ``length`` is for the one, ``through_scales`` and ``fold`` for the other."""
     from warpsplat.render_exact import ExactRenderer
     from warpsplat.render_splat import SplatRenderer
 
     if name == "exact":
-        return ExactRenderer(parameters, width, height, scale, threads=threads, capacity=capacity)
+        return ExactRenderer(
+            parameters, width, height, scale, threads=threads, capacity=capacity, length=length
+        )
     return SplatRenderer(
         parameters,
         width,
@@ -328,6 +374,6 @@ def render(
     made = make_renderer(renderer, Parameters(scene, target), width, height, scale, threads=threads)
     try:
         made.forward_complete()
-        return np.asarray(made.image.numpy(), np.float32)
+        return made.read_image()
     finally:
         made.close()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants, fill, flatten, stroke
@@ -14,13 +16,20 @@ class ExactRenderer(TileRenderer):
 
     items_per_part = 48
 
+    def __init__(self, *arguments: Any, length: float = 0.0, **options: Any) -> None:
+        """``length``: weight of the outlines' length [squared error of a pixel, per pixel of the canvas]."""
+        self._length = length
+        super().__init__(*arguments, **options)
+
     def _allocate_items(self) -> None:
         parts, vertices = self.parameters.part_count, self.capacity.items
         self.part_pieces = self.ints(parts)
         self.vertex_part = self.ints(vertices)
         self.vertex, self.extent = self.vectors(wp.vec2, vertices), self.vectors(wp.vec2, vertices)
         self.start_grad, self.end_grad = self.vectors(wp.vec2, vertices), self.vectors(wp.vec2, vertices)
-        if self.parameters.kind == "open":
+        if self._closed:
+            self.slot_winding = self.ints(self.capacity.slots)
+        else:
             self.segment = self.ints(self.capacity.slots, constants.TILE_PIXELS)
             self.half_grad = self.floats(vertices)
 
@@ -51,27 +60,32 @@ class ExactRenderer(TileRenderer):
         p = self.parameters
         shape = (self.capacity.slots, self.lanes)
         if self._closed:
+            rows = [self.slot_part, self.slot_first]
+            outline = [self.part_tiles, self.part_first, self.part_last, self.vertex]
+            states = [self.slot_state, self.slot_winding]
+            program.add(fill.fill_states, self.capacity.slots, [*rows, *outline], states, split=True)
+            self._record_lists(program)
             program.add(
                 fill.fill_forward,
                 shape,
-                [self.lane_rows, self.slot_part, self.slot_first, self.part_tiles]
-                + [self.part_first, self.part_last, self.vertex],
-                [self.coverage, self.slot_seen],
+                [self.lane_size, *rows, *states, *outline],
+                [self.coverage, self.coverage_columns],
                 split=True,
             )
         else:
             program.add(
                 stroke.stroke_forward,
                 shape,
-                [self.lane_rows, self.slot_part, self.slot_tile, self.tiles_x, p.opacity_count, p.widths]
+                [self.lane_size, self.slot_part, self.slot_tile, self.tiles_x, p.opacity_count, p.widths]
                 + [self.scale, self.part_first, self.part_last, self.vertex],
-                [self.coverage, self.segment, self.slot_seen],
+                [self.coverage, self.segment, self.slot_state],
                 split=True,
             )
+            self._record_lists(program)
 
     def _record_coverage_backward(self, program: Program) -> None:
         p, vertices = self.parameters, self.capacity.items
-        slots = [self.slot_first, self.slot_last, self.part_tiles, self.vertex]
+        slots = [self.slot_first, self.slot_last, self.slot_state, self.part_tiles, self.vertex]
         if self._closed:
             program.add(
                 fill.fill_backward,
@@ -95,6 +109,14 @@ class ExactRenderer(TileRenderer):
                 p.curve_count,
                 [p.opacity_count, self.scale, self.part_first, self.part_last, self.half_grad],
                 [p.widths_grad],
+            )
+        if self._closed and self._length > 0:
+            program.add(
+                flatten.length_backward,
+                vertices,
+                [self.part_first, self.part_last, self.vertex_part, self.vertex]
+                + [self._length * self.scale / (3 * self.width * self.height)],
+                [self.start_grad, self.end_grad],
             )
         program.add(
             flatten.flatten_backward,

@@ -83,11 +83,12 @@ class SplatRenderer(TileRenderer):
         program.add(
             splat.splat_forward,
             (self.capacity.slots, self.lanes),
-            [self.lane_rows, self.slot_part, self.slot_tile, self.tiles_x]
+            [self.lane_size, self.slot_part, self.slot_tile, self.tiles_x]
             + [self.part_first, self.part_last, self.mean, self.conic, self.extent],
-            [self.coverage, self.slot_seen],
+            [self.coverage, self.slot_state],
             split=True,
         )
+        self._record_lists(program)
 
     def _record_coverage_backward(self, program: Program) -> None:
         p, gaussians = self.parameters, self.capacity.items
@@ -95,7 +96,8 @@ class SplatRenderer(TileRenderer):
         program.add(
             splat.splat_backward,
             gaussians,
-            [self.width, self.height, self.gaussian_part, self.slot_first, self.slot_last, self.part_tiles]
+            [self.width, self.height, self.gaussian_part, self.slot_first, self.slot_last]
+            + [self.slot_state, self.part_tiles]
             + [self.mean, self.conic, self.extent, self.coverage, self.coverage_grad],
             [self.mean_grad, self.conic_grad],
             split=True,

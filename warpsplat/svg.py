@@ -13,7 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from warpsplat import __version__
+from warpsplat.config import Settings
 from warpsplat.errors import ImageError
+from warpsplat.kernels import constants
 from warpsplat.scene import FloatArray, Kind, Scene
 
 NAMESPACE = "http://www.w3.org/2000/svg"
@@ -109,6 +111,12 @@ def write_svg(scene: Scene, *, precision: int = 1, metadata: str = "", opacity_s
         f'<rect width="{scene.width}" height="{scene.height}" fill="{hex_color(scene.background)}"/>\n'
         f"{group}\n{shapes}\n</g>\n</svg>\n"
     )
+
+
+def export(scene: Scene, settings: Settings, metadata: str = "") -> str:
+    """The file that ``settings`` ask for."""
+    plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
+    return write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
 
 
 def read_metadata(text: str) -> str:

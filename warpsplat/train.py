@@ -15,10 +15,14 @@ from warpsplat.config import Settings
 from warpsplat.density import densify, least_seen, prune_mask
 from warpsplat.initialize import grid_scene
 from warpsplat.kernels import adam, loss
-from warpsplat.launch import Program
+from warpsplat.kernels.tile import column
+from warpsplat.launch import Program, capture
+from warpsplat.metrics import on_white, render_svg
 from warpsplat.parameters import Parameters
 from warpsplat.render import TileRenderer, make_renderer
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.svg import export
+from warpsplat.tiles import to_tiles
 
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
@@ -92,10 +96,11 @@ class Trainer:
             scene = grid_scene(settings, target, self.rng)
         self.parameters = Parameters(scene, device)
         self.clock = wp.zeros(1, dtype=wp.int32, device=device)
-        self.loss = wp.zeros(1, dtype=wp.float32, device=device)
+        self.loss: wp.array | None = None
         self.renderer: TileRenderer | None = None
         self.measure: Program | None = None
         self.update: Program | None = None
+        self.graph: wp.Graph | None = None
         self.overflows = 0
         self.step = 0
         self.interrupted = False
@@ -106,15 +111,15 @@ class Trainer:
         """The current scene, on the host."""
         return self.parameters.scene()
 
-    def _enter(self, phase: Phase) -> None:
+    def enter(self, phase: Phase) -> None:
+        """Go on at the size of ``phase``."""
         small = self.target
         if (phase.width, phase.height) != (self.width, self.height):
             size = (phase.width, phase.height)
             small = np.asarray(cv2.resize(self.target, size, interpolation=cv2.INTER_AREA), np.float32)
         self.small = np.ascontiguousarray(small, np.float32)
         self.scale = phase.width / self.width
-        self.device_target: wp.array = wp.array(self.small, dtype=wp.vec3, device=self.device)
-        self.row_loss = wp.zeros(phase.height, dtype=wp.float32, device=self.device)
+        self.device_target: wp.array = wp.array(to_tiles(self.small), dtype=column, device=self.device)
         self._record(phase.width, phase.height, None)
 
     def _record(self, width: int, height: int, previous: TileRenderer | None) -> None:
@@ -131,16 +136,38 @@ class Trainer:
             threads=self.threads,
             through_scales=s.through_scales,
             fold=s.fold_start * (s.fold_end / s.fold_start) ** (self.step / s.iterations),
+            length=s.length,
             capacity=previous.capacity if previous else None,
         )
         if previous is None:
             self.renderer.forward_complete()
-        self.measure = self._record_loss()
         self.update = self._record_update()
+        self._assemble()
+
+    def _assemble(self) -> None:
+        """Join renderer, loss and update into a step: one graph where the device has graphs."""
+        assert self.renderer and self.update
+        self.measure = self._record_loss()
+        self.graph = capture(self.device, self.programs())
+
+    def programs(self) -> list[Program]:
+        """The recorded launches of a step, in order."""
+        r = self.renderer
+        assert r and r.forward_program and r.backward_program and self.measure and self.update
+        return [r.forward_program, self.measure, r.backward_program, self.update]
+
+    def advance(self) -> None:
+        """One step: render, loss, adjoint, update. Nothing is allocated or read back."""
+        if self.graph:
+            wp.capture_launch(self.graph)
+        else:
+            for program in self.programs():
+                program.run()
 
     def _record_update(self) -> Program:
         p, s = self.parameters, self.settings
         program = Program(self.device, 1)
+        program.stage = "update"
         curve_loss = wp.zeros(p.curve_count, dtype=wp.float32, device=self.device)
         program.add(
             loss.xing_backward,
@@ -148,6 +175,13 @@ class Trainer:
             [p.points, int(p.kind == "closed"), s.xing],
             [p.points_grad, curve_loss],
         )
+        if s.bending > 0:
+            program.add(
+                loss.bending_backward,
+                p.curve_count,
+                [p.points, int(p.kind == "closed"), s.bending / (3 * self.width * self.height)],
+                [p.points_grad, curve_loss],
+            )
         program.add(adam.advance, p.curve_count, [], [p.ages, self.clock])
         # A step is counted in pixels of the finest training size, whatever the size of the image.
         unit = self.width / phases(s, self.width, self.height)[-1].width
@@ -173,9 +207,18 @@ class Trainer:
     def _record_loss(self) -> Program:
         assert self.renderer
         r = self.renderer
-        program = Program(self.device, 1)
-        program.add(loss.l2_loss, r.height, [r.image, self.device_target], [r.image_grad, self.row_loss])
-        program.add(loss.sum_rows, 1, [self.row_loss, r.width], [self.loss])
+        program = Program(self.device, self.threads)
+        program.stage = "loss"
+        shape = (r.tiles_x * r.tiles_y, r.lanes)
+        if self.loss is None or self.loss.shape != shape:
+            self.loss = r.floats(*shape)
+        program.add(
+            loss.l2_loss,
+            shape,
+            [r.lane_size, r.image, self.device_target, r.inside, 3 * r.width * r.height],
+            [r.image_grad, self.loss],
+            split=True,
+        )
         return program
 
     def _surgery(self, progress: float) -> None:
@@ -189,16 +232,32 @@ class Trainer:
         gone = least_seen(doomed, round(s.density.replace * len(scene)), seen)
         keep = np.setdiff1d(np.arange(len(scene)), gone)
         if len(gone):
-            added = densify(s, scene, self.small, self.renderer.image.numpy(), len(gone), self.rng)
+            added = densify(s, scene, self.small, self.renderer.read_image(), len(gone), self.rng)
             self.parameters.rearrange(keep, added)
         if s.order == "area":
             scene = self.scene()
             self.parameters.rearrange(np.argsort(-scene.areas(), kind="stable"), scene.take(np.arange(0)))
         self._record(self.renderer.width, self.renderer.height, self.renderer)
 
+    def _look(self) -> None:
+        """Take what the file shows for the render in the steps to come.
+
+        A viewer rounds coordinates, colours and, at each translucent layer, pixels. The difference changes
+        little from step to step, so it is measured now and then and taken off the target: the loss is that of
+        the file, its gradient that of the render (a straight-through estimator, Bengio et al. 2013).
+        """
+        assert self.renderer
+        self.renderer.forward_complete()
+        size = {"width": self.renderer.width, "height": self.renderer.height}
+        shown = on_white(render_svg(export(self.scene(), self.settings), **size)) / 255
+        aim = self.small - (shown - self.renderer.read_image())
+        self.device_target.assign(to_tiles(np.asarray(aim, np.float32)))
+
     def psnr(self) -> float:
-        """Of the render in the last step, at its size [dB]. Reads one number back from the device."""
-        return -10 * math.log10(max(float(self.loss.numpy()[0]), 1e-12))
+        """Of the render in the last step, at its size [dB]. Reads a number a tile back from the device."""
+        assert self.renderer and self.loss
+        squares = float(self.loss.numpy().sum(dtype=np.float64))
+        return -10 * math.log10(max(squares / (3 * self.renderer.width * self.renderer.height), 1e-12))
 
     def close(self) -> None:
         """End the threads of the recorded launches."""
@@ -214,7 +273,7 @@ class Trainer:
         self._deadline = time.monotonic() + seconds
         plan = phases(self.settings, self.width, self.height)
         for phase in plan:
-            self._enter(phase)
+            self.enter(phase)
             assert self.renderer and self.measure
             begin = time.monotonic()
             for _ in range(TIMED_STEPS):
@@ -251,17 +310,14 @@ class Trainer:
             phase = plan[0] if self.step < s.coarse * s.iterations else plan[-1]
             if phase is not current:
                 current = phase
-                self._enter(phase)
-            assert self.renderer and self.measure and self.update
-            self.renderer.forward()
-            self.measure.run()
-            self.renderer.backward()
-            self.update.run()
+                self.enter(phase)
+            assert self.renderer
+            self.advance()
             self.step += 1
             if self.step % CHECK_INTERVAL == 0 or self.step == s.iterations:
                 if self.renderer.grow():
                     self.overflows += 1
-                    self.measure = self._record_loss()
+                    self._assemble()
                 if report:
                     report(Progress(self.step, s.iterations, self.psnr(), time.monotonic() - started))
                 if s.target_psnr and phase is plan[-1] and self.psnr() >= s.target_psnr + TARGET_MARGIN:
@@ -274,6 +330,8 @@ class Trainer:
                 self._resize((time.monotonic() - started) / (self.step * self._costs[0]))
             if due and self.step < s.density.stop * s.iterations:
                 self._surgery(self.step / self.settings.iterations)
+            elif due and s.viewer and phase is plan[-1]:
+                self._look()
             if s.time_budget and time.monotonic() > self._deadline:
                 break
         return self.scene()

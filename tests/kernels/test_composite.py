@@ -11,11 +11,14 @@ from tests import reference
 from tests.kernels.helpers import relative_error, renderer_for
 from tests.kernels.test_splat import coverage_images
 from tests.scenes import random_scene
-from warpsplat.kernels import adam, loss
+from warpsplat.kernels import adam, constants, loss
+from warpsplat.kernels.constants import TILE
+from warpsplat.kernels.tile import column
 from warpsplat.parameters import Parameters
 from warpsplat.render import render
 from warpsplat.render_exact import ExactRenderer
 from warpsplat.scene import Kind
+from warpsplat.tiles import from_tiles, to_tiles
 
 
 @pytest.mark.parametrize("opaque", [False, True])
@@ -34,10 +37,10 @@ def test_blending_and_adjoint(device: str, opaque: bool) -> None:
     image = reference.composite(
         covers, p["colors"], p["opacities"], torch.tensor(scene.background.astype(np.float64))
     )
-    np.testing.assert_allclose(renderer.image.numpy(), image.detach().numpy(), atol=2e-4)
+    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-4)
     weights = np.random.default_rng(2).normal(size=image.shape)
     (image * torch.tensor(weights)).sum().backward()
-    renderer.image_grad.assign(wp.array(weights.astype(np.float32), dtype=wp.vec3, device=device))
+    renderer.write_image_grad(weights.astype(np.float32))
     renderer.backward()
     got = renderer.parameters.gradients()
     for name in ("colors", "opacities"):
@@ -48,12 +51,12 @@ def test_blending_and_adjoint(device: str, opaque: bool) -> None:
     # The gradient of the coverage itself.
     parts, tiles = renderer.slot_part.numpy(), renderer.slot_tile.numpy()
     grads = renderer.coverage_grad.numpy()
-    for slot in np.flatnonzero((parts >= 0) & (renderer.slot_seen.numpy().max(axis=1) > 0)):
+    for slot in np.flatnonzero((parts >= 0) & (renderer.slot_state.numpy() == constants.PARTIAL)):
         y, x = divmod(int(tiles[slot]), renderer.tiles_x)
         gradient = covers[parts[slot]].grad
         assert gradient is not None
         block = gradient[16 * y : 16 * y + 16, 16 * x : 16 * x + 16].numpy()
-        mine = grads[slot].reshape(16, 16)[: block.shape[0], : block.shape[1]]
+        mine = grads[slot].reshape(16, 16).T[: block.shape[0], : block.shape[1]]
         # behind / (1 - alpha): what float32 leaves of a difference, magnified 250 times by an opaque shape.
         np.testing.assert_allclose(mine, block, atol=3e-2 if opaque else 2e-4)
         assert np.abs(mine - block).mean() < 1e-4
@@ -65,7 +68,7 @@ def test_removal_costs_match_brute_force(device: str, kind: Kind) -> None:
     target = np.random.default_rng(0).uniform(size=(scene.height, scene.width, 3)).astype(np.float32)
     renderer = ExactRenderer(Parameters(scene, wp.get_device(device)), scene.width, scene.height, 1.0)
     renderer.forward_complete()
-    got = renderer.removal_costs(wp.array(target, dtype=wp.vec3, device=device))
+    got = renderer.removal_costs(wp.array(to_tiles(target), dtype=column, device=device))
     whole = np.mean((render(scene, device=device) - target) ** 2)
     for i in range(len(scene)):
         without = render(scene.take(np.delete(np.arange(len(scene)), i)), device=device)
@@ -75,17 +78,20 @@ def test_removal_costs_match_brute_force(device: str, kind: Kind) -> None:
 def test_l2(device: str) -> None:
     rng = np.random.default_rng(3)
     a, b = (rng.uniform(size=(13, 21, 3)).astype(np.float32) for _ in range(2))
-    image, target = (wp.array(x, dtype=wp.vec3, device=device) for x in (a, b))
-    grad = wp.zeros((13, 21), dtype=wp.vec3, device=device)
-    rows, total = wp.zeros(13, dtype=float, device=device), wp.zeros(1, dtype=float, device=device)
-    wp.launch(loss.l2_loss, 13, inputs=[0, image, target], outputs=[grad, rows], device=device)
-    wp.launch(loss.sum_rows, 1, inputs=[0, rows, 21], outputs=[total], device=device)
+    image, target = (wp.array(to_tiles(x), dtype=column, device=device) for x in (a, b))
+    # What lies in the padding of the tiles must not count.
+    image.assign(np.where(to_tiles(np.ones_like(a)) > 0, image.numpy(), 9).astype(np.float32))
+    inside = wp.array(to_tiles(np.ones((13, 21, 1), np.float32))[:, 0], dtype=column, device=device)
+    grad, sums = wp.zeros_like(image), wp.zeros((2, 1), dtype=float, device=device)
+    inputs = [0, TILE, image, target, inside, a.size]
+    wp.launch(loss.l2_loss, (2, 1), inputs=inputs, outputs=[grad, sums], device=device)
     x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
     value = torch.nn.functional.mse_loss(x, torch.tensor(b, dtype=torch.float64))
     value.backward()
-    assert total.numpy()[0] == pytest.approx(float(value.detach()), rel=1e-6)
+    assert sums.numpy().sum() / a.size == pytest.approx(float(value.detach()), rel=1e-6)
     assert x.grad is not None
-    np.testing.assert_allclose(grad.numpy(), x.grad.numpy(), rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(from_tiles(grad.numpy(), 21, 13), x.grad.numpy(), rtol=1e-5, atol=1e-9)
+    assert grad.numpy()[to_tiles(np.ones_like(a)) == 0].max() == 0
 
 
 @pytest.mark.parametrize("kind", ["closed", "open"])
@@ -158,3 +164,11 @@ def test_adam_keeps_bounds_and_ignores_what_is_not_finite(device: str) -> None:
     inputs = [0, grad, ages, clock, 10, 5.0, 1.0, 0.0, 1.0]
     wp.launch(adam.adam_update, (1, 2), inputs=inputs, outputs=[value, m1, m2], device=device)
     np.testing.assert_array_equal(value.numpy(), [[1.0, 0.5]])
+
+
+def test_tiles_and_back() -> None:
+    image = np.random.default_rng(0).uniform(size=(37, 50, 3)).astype(np.float32)
+    tiles = to_tiles(image)
+    assert tiles.shape == (4 * 3, 3, TILE, TILE)
+    assert tiles[4 + 1, 2, 5, 3] == image[16 + 3, 16 + 5, 2]
+    np.testing.assert_array_equal(from_tiles(tiles, 50, 37), image)

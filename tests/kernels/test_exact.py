@@ -13,6 +13,7 @@ import warp as wp
 from tests import reference, reference_exact
 from tests.kernels.helpers import relative_error
 from tests.scenes import disc, random_scene
+from warpsplat.kernels import constants
 from warpsplat.kernels.stroke import half_plane, half_plane_slope
 from warpsplat.metrics import on_white, psnr, render_svg
 from warpsplat.parameters import Parameters
@@ -43,10 +44,10 @@ def compare(scene: Scene, device: str, scale: float = 1.0, tolerance: float = 1e
     p = reference.tensors(scene)
     pieces = [int(n) for n in renderer.part_pieces.numpy()]
     image = reference_exact.render(scene, p, pieces, renderer.width, renderer.height, scale)
-    np.testing.assert_allclose(renderer.image.numpy(), image.detach().numpy(), atol=2e-4)
+    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-4)
     weights = np.random.default_rng(1).normal(size=(*image.shape,))
     (image * torch.tensor(weights)).sum().backward()
-    renderer.image_grad.assign(wp.array(weights.astype(np.float32), dtype=wp.vec3, device=device))
+    renderer.write_image_grad(weights.astype(np.float32))
     renderer.backward()
     got = renderer.parameters.gradients()
     for name in ("points", "colors", "opacities") + (("widths",) if scene.kind == "open" else ()):
@@ -81,7 +82,7 @@ def test_finite_differences(device: str, kind: Kind) -> None:
     rng = np.random.default_rng(0)
     weights = cv2.GaussianBlur(rng.normal(size=(36, 40, 3)), (0, 0), 2.0)
     renderer = exact(scene, device)
-    renderer.image_grad.assign(wp.array(weights.astype(np.float32), dtype=wp.vec3, device=device))
+    renderer.write_image_grad(weights.astype(np.float32))
     renderer.backward()
     gradient = renderer.parameters.gradients()["points"].astype(np.float64)
     step = 0.02
@@ -90,7 +91,7 @@ def test_finite_differences(device: str, kind: Kind) -> None:
         values = []
         for sign in (1, -1):
             moved = replace(scene, points=(scene.points + sign * step * direction).astype(np.float32))
-            values.append((exact(moved, device).image.numpy().astype(np.float64) * weights).sum())
+            values.append((exact(moved, device).read_image().astype(np.float64) * weights).sum())
         numeric = (values[0] - values[1]) / (2 * step)
         scale = np.abs(gradient * direction).sum()
         assert abs(numeric - (gradient * direction).sum()) < 0.01 * scale
@@ -153,8 +154,8 @@ def test_degenerate_shapes_do_no_harm(device: str, kind: Kind) -> None:
     points[3, :, 0] = 16.0
     points[4] = np.nan
     renderer = exact(replace(scene, points=points), device)
-    assert np.isfinite(renderer.image.numpy()).all()
-    renderer.image_grad.fill_(wp.vec3(1.0, -1.0, 0.5))
+    assert np.isfinite(renderer.read_image()).all()
+    renderer.write_image_grad(np.broadcast_to(np.float32([1, -1, 0.5]), (renderer.height, renderer.width, 3)))
     renderer.backward()
     for name, gradient in renderer.parameters.gradients().items():
         assert np.isfinite(gradient[:4]).all(), name
@@ -168,7 +169,7 @@ def test_same_bits_for_any_number_of_threads(device: str, kind: Kind) -> None:
         renderer = exact(scene, device, threads=threads)
         renderer.image_grad.assign(renderer.image)
         renderer.backward()
-        outcomes.append([renderer.image.numpy(), *renderer.parameters.gradients().values()])
+        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
     for other in outcomes[1:]:
         for a, b in zip(outcomes[0], other, strict=True):
             np.testing.assert_array_equal(a, b)
@@ -178,10 +179,10 @@ def test_overflow_is_counted_and_mended(device: str) -> None:
     scene = random_scene("closed", count=10)
     renderer = exact(scene, device, capacity=Capacity(50, 9))
     assert renderer.capacity.items >= renderer.needed_items.numpy()[0] > 50
-    np.testing.assert_array_equal(renderer.image.numpy(), render(scene, device=device))
+    np.testing.assert_array_equal(renderer.read_image(), render(scene, device=device))
 
 
 def test_full_tiles_take_the_short_path(device: str) -> None:
     renderer = exact(disc(60, 120, 60), device)
-    states = renderer.slot_seen.numpy()[renderer.slot_part.numpy() >= 0]
-    assert {0, 1, 2} <= set(np.unique(states))
+    states = renderer.slot_state.numpy()[renderer.slot_part.numpy() >= 0]
+    assert set(np.unique(states)) == {constants.FULL, constants.UNCOVERED, constants.PARTIAL}

@@ -69,12 +69,12 @@ def test_adjoint_of_positions(device: str, kind: Kind, chain_cubics: int, opacit
     total.backward()
     # Run the recorded adjoint with the splat stage's output replaced.
     assert renderer.backward_program
-    stages = renderer.backward_program._stages  # composite, reduce, splat, differences, positions ...
+    launches = renderer.backward_program.launches  # composite, reduce, splat, differences, positions ...
     renderer.backward()
     renderer.mean_grad.assign(wp.array(mean_grad, dtype=wp.vec2, device=device))
-    for stage in stages[4:]:
-        for launch in stage:
-            launch()
+    for launch in launches[4:]:
+        for piece in launch.pieces:
+            piece()
     got = renderer.parameters.gradients()
     assert p["points"].grad is not None
     assert relative_error(got["points"], p["points"].grad.numpy()) < 1e-4
@@ -114,8 +114,8 @@ def test_degenerate_shapes_do_no_harm(device: str, kind: Kind) -> None:
     points[1, 1:4] = points[1, 0]
     points[2, :, 1] = 7.0
     renderer = renderer_for(replace(scene, points=points), device, fold=1.0)
-    assert np.isfinite(renderer.image.numpy()).all()
-    renderer.image_grad.fill_(wp.vec3(1.0, -1.0, 0.5))
+    assert np.isfinite(renderer.read_image()).all()
+    renderer.write_image_grad(np.broadcast_to(np.float32([1, -1, 0.5]), (renderer.height, renderer.width, 3)))
     renderer.backward()
     for name, gradient in renderer.parameters.gradients().items():
         assert np.isfinite(gradient).all(), name

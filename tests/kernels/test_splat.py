@@ -29,7 +29,7 @@ def coverage_images(renderer: SplatRenderer) -> np.ndarray:
     coverage = renderer.coverage.numpy()
     for slot in np.flatnonzero(parts >= 0):
         y, x = divmod(int(tiles[slot]), renderer.tiles_x)
-        block = coverage[slot].reshape(TILE, TILE)
+        block = coverage[slot].reshape(TILE, TILE).T
         images[parts[slot], TILE * y : TILE * (y + 1), TILE * x : TILE * (x + 1)] = block
     return images
 
@@ -47,7 +47,14 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
         splat.splat_backward,
         dim=renderer.capacity.items,
         inputs=[0, renderer.width, renderer.height, renderer.gaussian_part, renderer.slot_first]
-        + [renderer.slot_last, renderer.part_tiles, renderer.mean, renderer.conic, renderer.extent]
+        + [
+            renderer.slot_last,
+            renderer.slot_state,
+            renderer.part_tiles,
+            renderer.mean,
+            renderer.conic,
+            renderer.extent,
+        ]
         + [renderer.coverage, renderer.coverage_grad],
         outputs=[renderer.mean_grad, renderer.conic_grad],
         device=device,
@@ -65,7 +72,7 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
         for slot in range(renderer.slot_first.numpy()[part], renderer.slot_last.numpy()[part]):
             y, x = divmod(int(tiles[slot]), renderer.tiles_x)
             block = cover[TILE * y : TILE * (y + 1), TILE * x : TILE * (x + 1)]
-            weights = torch.tensor(coverage_grad[slot].reshape(TILE, TILE))[
+            weights = torch.tensor(coverage_grad[slot].reshape(TILE, TILE).T)[
                 : block.shape[0], : block.shape[1]
             ]
             total = total + (block * weights).sum()
@@ -111,14 +118,14 @@ def test_overflow_is_counted_and_mended(device: str) -> None:
     parameters = Parameters(scene, wp.get_device(device))
     small = SplatRenderer(parameters, scene.width, scene.height, 1.0, capacity=Capacity(700, 9))
     small.forward()
-    assert np.isfinite(small.image.numpy()).all()
+    assert np.isfinite(small.read_image()).all()
     assert small.needed_items.numpy()[0] > 700
     assert small.grow()
     small.forward()
     assert small.grow() or small.capacity.slots >= small.needed_slots.numpy()[0]
     small.forward_complete()
     assert not small.grow()
-    np.testing.assert_array_equal(small.image.numpy(), whole)
+    np.testing.assert_array_equal(small.read_image(), whole)
 
 
 def test_a_scene_past_the_limits_is_refused(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,7 +142,7 @@ def test_same_bits_for_any_number_of_threads(device: str, kind: Kind) -> None:
         renderer = renderer_for(scene, device, threads=threads, fold=0.5)
         renderer.image_grad.assign(renderer.image)
         renderer.backward()
-        outcomes.append([renderer.image.numpy(), *renderer.parameters.gradients().values()])
+        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
     for other in outcomes[1:]:
         for a, b in zip(outcomes[0], other, strict=True):
             np.testing.assert_array_equal(a, b)
@@ -182,7 +189,7 @@ def test_invisible_and_outside_shapes_change_nothing(device: str) -> None:
     away = replace(scene, points=scene.points + np.float32(500))
     renderer = renderer_for(away, device)
     assert renderer.needed_slots.numpy()[0] == 0
-    renderer.image_grad.fill_(1.0)
+    renderer.write_image_grad(np.ones((renderer.height, renderer.width, 3), np.float32))
     renderer.backward()
     assert not any(g.any() for g in renderer.parameters.gradients().values())
 

@@ -1,0 +1,174 @@
+"""Times the stages of a training step on a stated random scene."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+import warp as wp
+
+from warpsplat.config import Density, Rates, Settings
+from warpsplat.initialize import circle_outlines, empty_scene
+from warpsplat.scene import OPEN_SEGMENTS, FloatArray, Kind, Scene
+from warpsplat.train import Phase, Trainer
+
+STAGES = ("sample", "bin", "forward", "loss", "backward", "update")
+
+RADIUS = (0.05, 0.1)
+"""Range of the shapes' radii over the width of the canvas."""
+
+LARGE = 2000
+"""Canvases wider than this [px] get shapes of half that radius."""
+
+HALF_WIDTH = 1.5
+"""Of the strokes [px]."""
+
+JITTER = 0.2
+"""Standard deviation of the control points' distance from the centre, over the radius."""
+
+SMOOTH = 8.0
+"""Standard deviation of the blur of the random target image [px]."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of repeated timings [ms]."""
+
+    median: float
+    low: float
+    high: float
+
+    @staticmethod
+    def of(seconds: list[float]) -> Spread:
+        """Median, lowest and highest."""
+        return Spread(*(round(1e3 * f(seconds), 3) for f in (statistics.median, min, max)))
+
+
+def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float, seed: int) -> Scene:
+    """Shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
+    rng = np.random.default_rng(seed)
+    empty = empty_scene(Settings(kind=kind, curves=curves), np.zeros((height, width, 3), np.float32))
+    centres = rng.uniform(0, [width, height], (curves, 2))
+    radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > LARGE else 1.0)
+    if kind == "closed":
+        circles = circle_outlines(np.zeros((curves, 2)), np.ones(curves), 2)
+        offsets = circles * (1 + JITTER * rng.normal(size=(curves, circles.shape[1], 1)))
+    else:
+        angle = rng.uniform(0, np.pi, curves)
+        along = np.linspace(-1, 1, 3 * OPEN_SEGMENTS + 1)
+        direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        offsets = along[None, :, None] * direction[:, None] + JITTER * rng.normal(
+            size=(curves, len(along), 2)
+        )
+    return replace(
+        empty,
+        points=np.asarray(centres[:, None] + radii[:, None, None] * offsets, np.float32),
+        colors=rng.uniform(0, 1, (curves, 3)).astype(np.float32),
+        opacities=np.full((curves, 1), opacity, np.float32),
+        widths=np.full(curves, 0.0 if kind == "closed" else 2 * HALF_WIDTH, np.float32),
+    )
+
+
+def bench_target(width: int, height: int, seed: int) -> FloatArray:
+    """Smooth noise: sRGB in [0, 1], shape (height, width, 3)."""
+    noise = np.random.default_rng(seed).uniform(0, 1, (height, width, 3)).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(noise, (0, 0), SMOOTH), np.float32)
+
+
+def peak_memory(device: wp.Device) -> int | None:
+    """Largest memory so far [bytes]: of the process, or of the device's pool; None where it is not known."""
+    if device.is_cuda:
+        return int(wp.get_mempool_used_mem_high(device)) if wp.is_mempool_enabled(device) else None
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 1 if sys.platform == "darwin" else 1024
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def bench(
+    *,
+    curves: int,
+    width: int,
+    height: int,
+    kind: Kind,
+    renderer: Any,
+    device: wp.Device,
+    opacity: float = 0.9,
+    threads: int | None = None,
+    repeats: int = 20,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Time ``repeats`` steps after a warm-up. The scene stays as it is: all rates are 0.
+
+    Returns:
+        ``step``, ``forward_backward`` and each of ``stages`` as median, low and high [ms]; counts; memory.
+    """
+    still = Rates(points=0.0, colors=0.0, opacities=0.0, widths=0.0)
+    settings = Settings(
+        kind=kind, curves=curves, renderer=renderer, rates=still, density=Density(interval=0), iterations=1000
+    )
+    scene = bench_scene(kind, curves, width, height, opacity, seed)
+    trainer = Trainer(bench_target(width, height, seed), settings, device, threads=threads, scene=scene)
+    try:
+        trainer.enter(Phase(width, height))
+        assert trainer.renderer
+        steps: list[float] = []
+        both: list[float] = []
+        kernels: list[dict[tuple[str, str], float]] = []
+        for i in range(repeats + 3):
+            times = [_timed(device, trainer.advance)]
+            times.append(_timed(device, trainer.renderer.forward) + _timed(device, trainer.renderer.backward))
+            parts: dict[tuple[str, str], float] = {}
+            for program in trainer.programs():
+                for key, value in program.run_timed().items():
+                    parts[key] = parts.get(key, 0.0) + value
+            if i >= 3:
+                steps.append(times[0])
+                both.append(times[1])
+                kernels.append(parts)
+        pairs = int(trainer.renderer.needed_slots.numpy()[0])
+        items = int(trainer.renderer.needed_items.numpy()[0])
+        used = trainer.programs()[0].threads
+    finally:
+        trainer.close()
+    stages = {
+        s: Spread.of([sum(v for k, v in part.items() if k[0] == s) for part in kernels]) for s in STAGES
+    }
+    step = Spread.of(steps)
+    return {
+        "kind": kind,
+        "renderer": renderer,
+        "device": str(device),
+        "threads": used,
+        "curves": curves,
+        "width": width,
+        "height": height,
+        "opacity": opacity,
+        "pairs": pairs,
+        "samples": items,
+        "step": asdict(step),
+        "forward_backward": asdict(Spread.of(both)),
+        "stages": {name: asdict(spread) for name, spread in stages.items()},
+        "kernels": {
+            f"{stage}/{name}": asdict(Spread.of([part[(stage, name)] for part in kernels]))
+            for stage, name in kernels[0]
+        },
+        "megapixels_per_s": round(width * height / 1e3 / step.median, 3),
+        "us_per_curve": round(1e3 * step.median / curves, 3),
+        "ns_per_pixel": round(1e6 * step.median / (width * height), 3),
+        "peak_memory": peak_memory(device),
+    }
+
+
+def _timed(device: wp.Device, function: Any) -> float:
+    begin = time.perf_counter()
+    function()
+    wp.synchronize_device(device)
+    return time.perf_counter() - begin
