@@ -1,4 +1,4 @@
-"""L2 and Xing losses with their gradients."""
+"""Losses with their gradients: L2 and SSIM of the image, Xing and bending of the curves."""
 
 import warp as wp
 
@@ -8,7 +8,11 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+TILE = wp.constant(constants.TILE)
 EPSILON = wp.constant(constants.EPSILON)
+WINDOW = wp.constant(8)
+C1 = wp.constant(0.01 * 0.01)
+C2 = wp.constant(0.03 * 0.03)
 
 
 @wp.kernel
@@ -35,6 +39,96 @@ def l2_loss(
             image_grad[tile, channel, x] = factor * difference
             squares = squares + wp.cw_mul(difference, difference)
     loss[tile, lane] = total(squares)
+
+
+@wp.kernel
+def ssim_backward(
+    # In:
+    first: wp.int32,
+    image: wp.array3d[column],  # [tile_count, 3, TILE]
+    target: wp.array3d[column],  # [tile_count, 3, TILE]
+    inside: wp.array2d[column],  # [tile_count, TILE] 1 for pixels of the image
+    clock: wp.array[wp.int32],  # [1] steps so far
+    weight: wp.float32,
+    value_count: wp.int32,  # pixels x channels
+    # Out:
+    image_grad: wp.array3d[column],  # [tile_count, 3, TILE] added to
+    similarity: wp.array2d[wp.float32],  # [tile_count, 3] sum over windows of SSIM x pixels
+):
+    """``weight`` x (1 - SSIM) (Wang et al. 2004, eq. 13) with windows of 8x8 px that do not overlap.
+
+    Within such a window the gradient is a + b x + c y, x and y the pixel's values: a window costs no more
+    than its sums. The windows lie inside a tile and move by half their size from step to step, cut where the
+    tile ends, so that no grid is left in the image. One thread a tile and channel.
+    """
+    i, channel = wp.tid()
+    tile = first + i
+    phase = clock[0] % 4
+    shift_x = (phase % 2) * (WINDOW / 2)
+    shift_y = (phase / 2) * (WINDOW / 2)
+    factor = weight / float(value_count)
+    sum_all = float(0.0)
+    x0 = int(0)
+    while x0 < TILE:
+        x1 = wp.min((x0 + shift_x) / WINDOW * WINDOW + WINDOW - shift_x, TILE)
+        n = column(0.0)
+        sx = column(0.0)
+        sy = column(0.0)
+        sxx = column(0.0)
+        syy = column(0.0)
+        sxy = column(0.0)
+        for x in range(x0, x1):
+            mask = inside[tile, x]
+            u = wp.cw_mul(mask, image[tile, channel, x])
+            v = wp.cw_mul(mask, target[tile, channel, x])
+            n = n + mask
+            sx = sx + u
+            sy = sy + v
+            sxx = sxx + wp.cw_mul(u, u)
+            syy = syy + wp.cw_mul(v, v)
+            sxy = sxy + wp.cw_mul(u, v)
+        a = column(0.0)
+        b = column(0.0)
+        c = column(0.0)
+        y0 = int(0)
+        while y0 < TILE:
+            y1 = wp.min((y0 + shift_y) / WINDOW * WINDOW + WINDOW - shift_y, TILE)
+            count = float(0.0)
+            mx = float(0.0)
+            my = float(0.0)
+            xx = float(0.0)
+            yy = float(0.0)
+            xy = float(0.0)
+            for y in range(y0, y1):
+                count += n[y]
+                mx += sx[y]
+                my += sy[y]
+                xx += sxx[y]
+                yy += syy[y]
+                xy += sxy[y]
+            if count > 0.0:
+                mx /= count
+                my /= count
+                a1 = 2.0 * mx * my + C1
+                a2 = 2.0 * (xy / count - mx * my) + C2
+                b1 = mx * mx + my * my + C1
+                b2 = xx / count - mx * mx + yy / count - my * my + C2
+                s = a1 * a2 / (b1 * b2)
+                sum_all += s * count
+                slope_x = -2.0 * s / b2
+                slope_y = 2.0 * a1 / (b1 * b2)
+                offset = 2.0 * (my * a2 / b2 - mx * s) / b1 - slope_x * mx - slope_y * my
+                for y in range(y0, y1):
+                    a[y] = factor * offset
+                    b[y] = factor * slope_x
+                    c[y] = factor * slope_y
+            y0 = y1
+        for x in range(x0, x1):
+            gradient = a + wp.cw_mul(b, image[tile, channel, x]) + wp.cw_mul(c, target[tile, channel, x])
+            gradient = wp.cw_mul(inside[tile, x], gradient)
+            image_grad[tile, channel, x] = image_grad[tile, channel, x] - gradient
+        x0 = x1
+    similarity[tile, channel] = sum_all
 
 
 @wp.func

@@ -219,3 +219,12 @@ def xing(scene: Scene, points: torch.Tensor) -> torch.Tensor:
             s12, s13 = sine(edges[0], edges[1]), sine(edges[0], edges[2])
             total = total + (torch.relu(-s13) if s12 >= 0 else torch.relu(s13))
     return total / (len(points) * count)
+
+
+def ssim(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    """SSIM of one window (Wang et al. 2004, eq. 13), x and y [pixel, channel] -> [channel]."""
+    mx, my = x.mean(0), y.mean(0)
+    vx, vy = ((x - mx) ** 2).mean(0), ((y - my) ** 2).mean(0)
+    covariance = ((x - mx) * (y - my)).mean(0)
+    c1, c2 = 0.01**2, 0.03**2
+    return (2 * mx * my + c1) * (2 * covariance + c2) / ((mx**2 + my**2 + c1) * (vx + vy + c2))

@@ -7,7 +7,7 @@ import pytest
 
 from tests.scenes import random_scene
 from warpsplat.config import Density, make_settings
-from warpsplat.density import densify, duplicates, least_seen, opacity_threshold, prune_mask
+from warpsplat.density import curves_at, densify, duplicates, least_seen, opacity_threshold, prune_mask
 from warpsplat.initialize import circle_outlines, empty_scene, grid_scene
 from warpsplat.scene import Kind, Scene
 
@@ -110,7 +110,23 @@ def test_densify_always_gives_the_count_asked_for() -> None:
 @pytest.mark.parametrize("count", [1, 7, 50])
 def test_first_curves_cover_the_canvas(kind: Kind, count: int) -> None:
     target = np.random.default_rng(0).uniform(size=(40, 70, 3)).astype(np.float32)
-    scene = grid_scene(make_settings(kind=kind, curves=count), target, np.random.default_rng(0))
+    scene = grid_scene(make_settings(kind=kind), target, count, np.random.default_rng(0))
     assert len(scene) == count
     assert 0.8 < scene.areas().sum() / (40 * 70) < 1.8
     assert np.isfinite(scene.points).all()
+
+
+def test_the_number_of_curves_grows_to_all() -> None:
+    settings = make_settings(curves=90, iterations=1000)
+    counts = [curves_at(settings, step) for step in range(0, 1000, 25)]
+    assert counts[0] == 30
+    assert counts == sorted(counts)
+    assert counts[19] < 90
+    assert set(counts[20:]) == {90}
+
+
+@pytest.mark.parametrize("iterations", [1, 30, 60, 100])
+def test_short_runs_have_all_curves_at_the_last_turn(iterations: int) -> None:
+    settings = make_settings(curves=90, iterations=iterations)
+    turns = [s for s in range(25, iterations + 1, 25) if s < settings.density.stop * iterations]
+    assert curves_at(settings, turns[-1] if turns else 0) == 90

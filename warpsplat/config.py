@@ -27,14 +27,18 @@ class Rates:
     opacities: float = 0.04
     widths: float = 0.15
     """[px of the finest training size]"""
-    final: float = 0.1
+    final: float = 0.2
     """Fraction of each rate that is left at the end."""
 
 
 @dataclass(frozen=True)
 class Density:
-    """Pruning and densification (paper section 3.4); the count of curves stays constant."""
+    """Pruning and densification (paper section 3.4), and growth from few curves to all."""
 
+    start: float = 1 / 3
+    """Fraction of the curves at the start: the first ones settle as large shapes."""
+    grown: float = 0.5
+    """Fraction of the run at which all curves are there; until then their number grows geometrically."""
     interval: int = 25
     """Steps between two turns."""
     stop: float = 0.75
@@ -77,12 +81,14 @@ class Settings:
     """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
+    ssim: float = 0.01
+    """Weight of 1 - SSIM beside the mean squared error."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
     length: float = 0.0
     """Weight of the length of fills' outlines (as in Mumford and Shah 1989) [squared error of a pixel, summed
     over channels, per pixel of outline]: needles and loops too thin to lower the error shrink away."""
-    bending: float = 0.0
+    bending: float = 3e-4
     """Weight of the bending of the cubics, in the same unit: burrs and loops straighten that do not lower the
     error."""
     fold_start: float = 0.2

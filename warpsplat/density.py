@@ -25,6 +25,18 @@ def opacity_threshold(density: Density, progress: float) -> float:
     return density.opacity_start + t * (density.opacity_end - density.opacity_start)
 
 
+def curves_at(settings: Settings, step: int) -> int:
+    """Curves that a run should have after the turn at ``step``; at 0, those to start with.
+
+    All of them from ``grown`` on, and at the last turn in any case.
+    """
+    density, steps = settings.density, settings.iterations
+    if density.interval <= 0 or step + density.interval >= min(density.stop, 1.0) * steps:
+        return settings.curves
+    missing = 1.0 - step / (density.grown * steps) if density.grown > 0 else 0.0
+    return max(1, round(settings.curves * density.start ** max(missing, 0.0)))
+
+
 def duplicates(scene: Scene, density: Density) -> BoolArray:
     """Curves with a neighbour further in front of nearly their colour and box."""
     boxes = scene.bounds()

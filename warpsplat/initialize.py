@@ -11,8 +11,8 @@ import numpy.typing as npt
 from warpsplat.config import Settings
 from warpsplat.scene import OPEN_SEGMENTS, FloatArray, Scene
 
-OPACITY = 0.9
-"""Opacity of a new curve: the least that hides what it should replace, with room to move both ways."""
+OPACITY = 0.98
+"""Opacity of a new curve: it hides what it should replace, and may still become translucent."""
 
 COVER = 1.3
 """Area of the first shapes over the area of the canvas: circles on a grid that leave few gaps."""
@@ -115,11 +115,10 @@ def pixel_of(centres: Floats, target: FloatArray) -> tuple[npt.NDArray[np.intp],
     return column, row
 
 
-def grid_scene(settings: Settings, target: FloatArray, rng: np.random.Generator) -> Scene:
-    """``settings.curves`` shapes that cover the canvas, large ones at the back left to the optimiser."""
+def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.random.Generator) -> Scene:
+    """``count`` shapes that cover the canvas."""
     template = empty_scene(settings, target)
     height, width = target.shape[:2]
-    count = settings.curves
     rows = max(1, min(count, round(np.sqrt(count * height / width))))
     per_row = np.full(rows, count // rows)
     per_row[: count % rows] += 1

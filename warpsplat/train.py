@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 
 from warpsplat.config import Settings
-from warpsplat.density import densify, least_seen, prune_mask
+from warpsplat.density import curves_at, densify, least_seen, prune_mask
 from warpsplat.initialize import grid_scene
 from warpsplat.kernels import adam, loss
 from warpsplat.kernels.tile import column
@@ -92,8 +92,9 @@ class Trainer:
         self.target, self.settings, self.device, self.threads = target, settings, device, threads
         self.height, self.width = target.shape[:2]
         self.rng = np.random.default_rng(settings.seed)
+        self.given = scene is not None
         if scene is None:
-            scene = grid_scene(settings, target, self.rng)
+            scene = grid_scene(settings, target, curves_at(settings, 0), self.rng)
         self.parameters = Parameters(scene, device)
         self.clock = wp.zeros(1, dtype=wp.int32, device=device)
         self.loss: wp.array | None = None
@@ -219,6 +220,15 @@ class Trainer:
             [r.image_grad, self.loss],
             split=True,
         )
+        if self.settings.ssim > 0:
+            program.add(
+                loss.ssim_backward,
+                (shape[0], 3),
+                [r.image, self.device_target, r.inside, self.clock, self.settings.ssim]
+                + [3 * r.width * r.height],
+                [r.image_grad, r.floats(shape[0], 3)],
+                split=True,
+            )
         return program
 
     def _surgery(self, progress: float) -> None:
@@ -231,8 +241,9 @@ class Trainer:
         seen = self.renderer.removal_costs(self.device_target)
         gone = least_seen(doomed, round(s.density.replace * len(scene)), seen)
         keep = np.setdiff1d(np.arange(len(scene)), gone)
-        if len(gone):
-            added = densify(s, scene, self.small, self.renderer.read_image(), len(gone), self.rng)
+        count = max(len(scene), 0 if self.given else curves_at(s, self.step)) - len(keep)
+        if count:
+            added = densify(s, scene, self.small, self.renderer.read_image(), count, self.rng)
             self.parameters.rearrange(keep, added)
         if s.order == "area":
             scene = self.scene()
@@ -328,7 +339,8 @@ class Trainer:
             due = s.density.interval > 0 and self.step % s.density.interval == 0
             if due and s.time_budget and phase is plan[0]:
                 self._resize((time.monotonic() - started) / (self.step * self._costs[0]))
-            if due and self.step < s.density.stop * s.iterations:
+            growing = not self.given and self.parameters.curve_count < s.curves
+            if due and (growing or self.step < s.density.stop * s.iterations):
                 self._surgery(self.step / self.settings.iterations)
             elif due and s.viewer and phase is plan[-1]:
                 self._look()

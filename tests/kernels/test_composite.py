@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -92,6 +95,57 @@ def test_l2(device: str) -> None:
     assert x.grad is not None
     np.testing.assert_allclose(from_tiles(grad.numpy(), 21, 13), x.grad.numpy(), rtol=1e-5, atol=1e-9)
     assert grad.numpy()[to_tiles(np.ones_like(a)) == 0].max() == 0
+
+
+@pytest.mark.parametrize("phase", [0, 1, 2, 3])
+def test_ssim(device: str, phase: int) -> None:
+    """Window by window, over an image that ends inside a tile."""
+    rng = np.random.default_rng(phase)
+    a, b = (rng.uniform(size=(27, 37, 3)).astype(np.float32) for _ in range(2))
+    image, target = (wp.array(to_tiles(x), dtype=column, device=device) for x in (a, b))
+    inside = wp.array(to_tiles(np.ones((27, 37, 1), np.float32))[:, 0], dtype=column, device=device)
+    clock = wp.array([4 + phase], dtype=int, device=device)
+    grad, sums = wp.zeros_like(image), wp.zeros((6, 3), dtype=float, device=device)
+    inputs = [0, image, target, inside, clock, 0.3, a.size]
+    wp.launch(loss.ssim_backward, (6, 3), inputs=inputs, outputs=[grad, sums], device=device)
+    x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
+    y = torch.tensor(b, dtype=torch.float64)
+    borders = [[0, 8, 16, 24, 32, 40], [0, 4, 12, 16, 20, 28, 32, 36, 44]]
+    columns, rows = borders[phase % 2], borders[phase // 2]
+    total = torch.zeros((), dtype=torch.float64)
+    for x0, x1 in itertools.pairwise(columns):
+        for y0, y1 in itertools.pairwise(rows):
+            u, v = x[y0:y1, x0:x1].reshape(-1, 3), y[y0:y1, x0:x1].reshape(-1, 3)
+            if len(u):
+                total = total + len(u) * reference.ssim(u, v).sum()
+    (-0.3 * total / a.size).backward()
+    assert sums.numpy().sum() == pytest.approx(float(total.detach()), rel=1e-5)
+    assert x.grad is not None
+    assert relative_error(from_tiles(grad.numpy(), 37, 27), x.grad.numpy()) < 1e-4
+    assert not grad.numpy()[to_tiles(np.ones_like(a)) == 0].any()
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+def test_bending(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, count=6, seed=6)
+    points = scene.points.copy()
+    points[0] = points[0, 0]
+    p = renderer_for(replace(scene, points=points), device).parameters
+    p.points_grad.zero_()
+    per_curve = wp.zeros(len(scene), dtype=float, device=device)
+    inputs = [0, p.points, int(kind == "closed"), 0.7]
+    outputs = [p.points_grad, per_curve]
+    wp.launch(loss.bending_backward, len(scene), inputs=inputs, outputs=outputs, device=device)
+    x = torch.tensor(points, dtype=torch.float64, requires_grad=True)
+    chain = torch.cat([x, x[:, :1]], dim=1) if kind == "closed" else x
+    p0, p1, p2, p3 = (chain[:, j : j + 3 * (points.shape[1] // 3) : 3] for j in range(4))
+    a, b = p0 - 2 * p1 + p2, p1 - 2 * p2 + p3
+    chord = ((p3 - p0).square().sum(-1) + 1e-24).sqrt()
+    energy = (a.square().sum(-1) + b.square().sum(-1)) / (1 + chord)
+    (0.7 * energy.sum()).backward()
+    np.testing.assert_allclose(per_curve.numpy(), energy.sum(1).detach().numpy(), rtol=1e-4, atol=1e-9)
+    assert x.grad is not None
+    assert relative_error(p.gradients()["points"], x.grad.numpy()) < 1e-4
 
 
 @pytest.mark.parametrize("kind", ["closed", "open"])
