@@ -18,10 +18,13 @@ FAILED = 5
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("jobs", type=click.Path(path_type=Path))
 @click.option("--device", help="Overrides the file's device.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]")
 @click.option("-v", "--verbose", count=True, help="Say more, on stderr.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object at the end.")
-def command(jobs: Path, device: str | None, verbose: int, quiet: bool, as_json: bool) -> None:
+def command(
+    jobs: Path, device: str | None, threads: int | None, verbose: int, quiet: bool, as_json: bool
+) -> None:
     r"""Vectorize the images that the YAML file JOBS lists.
 
     \b
@@ -66,6 +69,7 @@ def command(jobs: Path, device: str | None, verbose: int, quiet: bool, as_json: 
                     job.output,
                     job.settings,
                     chosen,
+                    threads=threads,
                     verbose=verbose,
                     quiet=quiet,
                     interrupt=interrupt,

@@ -12,20 +12,20 @@ import click
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(as_json: bool) -> None:
     """Show the version, the devices and where compiled kernels are kept."""
-    import os
     import platform
 
     import warp as wp
 
     from warpsplat import __version__
     from warpsplat.device import choose_device, start_warp
+    from warpsplat.launch import available_cores
 
     start_warp()
     values: dict[str, Any] = {
         "warpsplat": __version__,
         "warp": wp.__version__,
         "python": platform.python_version(),
-        "cpu_threads": os.cpu_count(),
+        "cpu_threads": available_cores(),
         "devices": [{"name": str(d), "description": d.name} for d in wp.get_devices()],
         "default_device": str(choose_device("auto")),
         "kernel_cache": str(wp.config.kernel_cache_dir),

@@ -27,6 +27,7 @@ def command(
     image: Path,
     output: Path,
     device: str,
+    threads: int | None,
     verbose: int,
     quiet: bool,
     as_json: bool,
@@ -50,7 +51,9 @@ def command(
     chosen = choose_device(device)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as report:
-        result, before = refine(text, target, settings, chosen, name=str(svg), report=report, stop=interrupt)
+        result, before = refine(
+            text, target, settings, chosen, name=str(svg), threads=threads, report=report, stop=interrupt
+        )
     write_atomically(output, result.svg.encode())
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if as_json:

@@ -83,6 +83,7 @@ def run_file(
     settings: Settings,
     device: wp.Device,
     *,
+    threads: int | None = None,
     verbose: int = 0,
     quiet: bool = False,
     interrupt: Interrupt | None = None,
@@ -92,4 +93,6 @@ def run_file(
     if verbose:
         click.echo(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
-        return vectorize_file(source, output, settings, device, report=report, stop=interrupt)
+        return vectorize_file(
+            source, output, settings, device, threads=threads, report=report, stop=interrupt
+        )

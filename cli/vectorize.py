@@ -41,6 +41,7 @@ def command(
     image: Path,
     output: Path | None,
     device: str,
+    threads: int | None,
     verbose: int,
     quiet: bool,
     as_json: bool,
@@ -64,7 +65,9 @@ def command(
     from warpsplat.device import choose_device, start_warp
 
     start_warp()
-    result = run_file(image, output, settings, choose_device(device), verbose=verbose, quiet=quiet)
+    result = run_file(
+        image, output, settings, choose_device(device), threads=threads, verbose=verbose, quiet=quiet
+    )
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
     if as_json:
         click.echo(json.dumps(values))

@@ -12,7 +12,6 @@ from warpsplat.kernels.bezier import cubic_weights, find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-EPSILON = wp.constant(constants.EPSILON)
 FLATNESS = wp.constant(constants.FLATNESS)
 FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
 PIECES_MIN = wp.constant(constants.PIECES_MIN)
@@ -97,35 +96,6 @@ def flatten_forward(
     if closed == 0:
         reach = 0.5 * scale * widths[curve] + 1.0
     extent[i] = wp.vec2(reach, reach)
-
-
-@wp.kernel
-def length_backward(
-    # In:
-    first: wp.int32,
-    part_first: wp.array[wp.int32],  # [part_count]
-    part_last: wp.array[wp.int32],  # [part_count]
-    vertex_part: wp.array[wp.int32],  # [capacity] -1: unused
-    vertex: wp.array[wp.vec2],  # [capacity] px
-    weight: wp.float32,  # of a pixel of outline in the loss
-    # Out:
-    start_grad: wp.array[wp.vec2],  # [capacity] added to
-    end_grad: wp.array[wp.vec2],  # [capacity] added to
-):
-    """Gradient of ``weight`` times the length of the outlines: each edge pulls its ends together."""
-    i = first + wp.tid()
-    part = vertex_part[i]
-    if part < 0:
-        return
-    j = i + 1
-    if j == part_last[part]:
-        j = part_first[part]
-    edge = vertex[j] - vertex[i]
-    length = wp.length(edge)
-    if length > EPSILON:
-        pull = (weight / length) * edge
-        start_grad[i] = start_grad[i] - pull
-        end_grad[i] = end_grad[i] + pull
 
 
 @wp.kernel

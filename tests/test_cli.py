@@ -319,3 +319,44 @@ def test_physical_units(tmp_path: Path) -> None:
     assert run("render", svg, "-o", tmp_path / "a.png") == 0
     with Image.open(tmp_path / "a.png") as picture:
         assert picture.size == (96, 48)
+
+
+def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--curves", 6, "--size", "48x32", "--repeats", 2, "--threads", 2, "--device", "cpu")
+    assert run("bench", *options, "--json") == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["threads"] == 2
+    assert values["pairs"] > 6
+    assert set(values["stages"]) == {"sample", "bin", "forward", "loss", "backward", "update"}
+    step = values["step"]
+    assert 0 < step["low"] <= step["median"] <= step["high"]
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+@pytest.mark.parametrize("renderer", ["exact", "splat"])
+def test_bench_for_people(kind: str, renderer: str, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--kind", kind, "--renderer", renderer)
+    assert run("bench", *options, "-v") == 0
+    shown = capsys.readouterr().out
+    assert "megapixels/s" in shown
+    assert "composite_backward" in shown
+
+
+@pytest.mark.parametrize("size", ["0x10", "10", "16x", "99999x99999", "axb"])
+def test_bench_refuses_odd_sizes(size: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("bench", "--size", size) == 2
+    assert "not a size" in one_line(capsys.readouterr().err)
+
+
+def test_the_number_of_threads_changes_nothing(image: Path, tmp_path: Path) -> None:
+    made = []
+    for threads in (1, 3):
+        output = tmp_path / f"{threads}.svg"
+        assert run("vectorize", image, "-o", output, *QUICK, "--iterations", 60, "--threads", threads) == 0
+        made.append(output.read_bytes())
+    assert made[0] == made[1]
+
+
+def test_threads_must_be_positive(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("vectorize", image, "--threads", 0) == 2
+    assert "--threads" in one_line(capsys.readouterr().err)

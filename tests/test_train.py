@@ -73,7 +73,6 @@ def test_small_in_front_with_area_order(device: str) -> None:
     for _ in range(2):
         trainer._surgery(0.5) if trainer.renderer else trainer.enter(phases(settings, 64, 48)[0])
     areas = trainer.scene().areas()
-    trainer.close()
     assert (np.diff(areas) <= 1e-3).all()
 
 

@@ -116,28 +116,25 @@ def bench(
     )
     scene = bench_scene(kind, curves, width, height, opacity, seed)
     trainer = Trainer(bench_target(width, height, seed), settings, device, threads=threads, scene=scene)
-    try:
-        trainer.enter(Phase(width, height))
-        assert trainer.renderer
-        steps: list[float] = []
-        both: list[float] = []
-        kernels: list[dict[tuple[str, str], float]] = []
-        for i in range(repeats + 3):
-            times = [_timed(device, trainer.advance)]
-            times.append(_timed(device, trainer.renderer.forward) + _timed(device, trainer.renderer.backward))
-            parts: dict[tuple[str, str], float] = {}
-            for program in trainer.programs():
-                for key, value in program.run_timed().items():
-                    parts[key] = parts.get(key, 0.0) + value
-            if i >= 3:
-                steps.append(times[0])
-                both.append(times[1])
-                kernels.append(parts)
-        pairs = int(trainer.renderer.needed_slots.numpy()[0])
-        items = int(trainer.renderer.needed_items.numpy()[0])
-        used = trainer.programs()[0].threads
-    finally:
-        trainer.close()
+    trainer.enter(Phase(width, height))
+    assert trainer.renderer
+    steps: list[float] = []
+    both: list[float] = []
+    kernels: list[dict[tuple[str, str], float]] = []
+    for i in range(repeats + 3):
+        times = [_timed(device, trainer.advance)]
+        times.append(_timed(device, trainer.renderer.forward) + _timed(device, trainer.renderer.backward))
+        parts: dict[tuple[str, str], float] = {}
+        for program in trainer.programs():
+            for key, value in program.run_timed().items():
+                parts[key] = parts.get(key, 0.0) + value
+        if i >= 3:
+            steps.append(times[0])
+            both.append(times[1])
+            kernels.append(parts)
+    pairs = int(trainer.renderer.needed_slots.numpy()[0])
+    items = int(trainer.renderer.needed_items.numpy()[0])
+    used = trainer.programs()[0].threads
     stages = {
         s: Spread.of([sum(v for k, v in part.items() if k[0] == s) for part in kernels]) for s in STAGES
     }
@@ -146,6 +143,7 @@ def bench(
         "kind": kind,
         "renderer": renderer,
         "device": str(device),
+        "device_name": device.name,
         "threads": used,
         "curves": curves,
         "width": width,

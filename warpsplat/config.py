@@ -85,12 +85,9 @@ class Settings:
     """Weight of 1 - SSIM beside the mean squared error."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
-    length: float = 0.0
-    """Weight of the length of fills' outlines (as in Mumford and Shah 1989) [squared error of a pixel, summed
-    over channels, per pixel of outline]: needles and loops too thin to lower the error shrink away."""
     bending: float = 3e-4
-    """Weight of the bending of the cubics, in the same unit: burrs and loops straighten that do not lower the
-    error."""
+    """Weight of the bending of the cubics [squared error of a pixel, summed over channels, per pixel]: burrs
+    and loops that do not lower the error straighten."""
     fold_start: float = 0.2
     """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
     grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import itertools
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +16,20 @@ import warp as wp
 
 PIECES_PER_THREAD = 4
 """A split launch is cut finer than there are threads, so that uneven pieces balance."""
+
+
+def available_cores() -> int:
+    """CPU cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # macOS, Windows
+        return os.cpu_count() or 1
+
+
+@functools.cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Helpers of the caller's own thread, kept for the next program."""
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix="warpsplat")
 
 
 @dataclass(frozen=True)
@@ -35,13 +51,13 @@ class Program:
     """
 
     def __init__(self, device: wp.Device, threads: int | None = None) -> None:
-        """``threads``: of a CPU; default all. A machine that refuses threads is served by the caller's."""
+        """``threads``: of a CPU; default all. Where no thread can be started, the caller's does the work."""
         self.device = device
         self.launches: list[Launch] = []
         self.stage = ""
         """Names what is added from now on, for ``run_timed``."""
-        self._threads = max(1, threads or os.cpu_count() or 1) if device.is_cpu else 1
-        self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
+        self.threads = max(1, threads or available_cores()) if device.is_cpu else 1
+        """CPU threads that share a split launch."""
 
     def add(
         self,
@@ -56,7 +72,7 @@ class Program:
         shape = (dim,) if isinstance(dim, int) else tuple(dim)
         if min(shape) == 0:
             return
-        count = self._threads * PIECES_PER_THREAD if split and self._pool else 1
+        count = self.threads * PIECES_PER_THREAD if split and self.threads > 1 else 1
         count = min(count, shape[0])
         borders = [shape[0] * i // count for i in range(count + 1)]
         pieces: list[Callable[[], None]] = []
@@ -78,12 +94,20 @@ class Program:
         self.launches.append(Launch(self.stage, function.__name__, (lambda: function(*arguments),)))
 
     def _replay(self, launch: Launch) -> None:
-        if self._pool is None or len(launch.pieces) == 1:
-            for piece in launch.pieces:
+        pieces = iter(launch.pieces)
+
+        def work() -> None:
+            # Taking from a shared iterator is atomic: who is done with a piece takes the next.
+            for piece in pieces:
                 piece()
-        else:
-            for future in [self._pool.submit(piece) for piece in launch.pieces]:
-                future.result()
+
+        helpers: list[Future[None]] = []
+        with contextlib.suppress(RuntimeError):  # no more threads
+            for _ in range(min(self.threads, len(launch.pieces)) - 1):
+                helpers.append(_pool(self.threads).submit(work))
+        work()
+        for helper in helpers:
+            helper.result()
 
     def run(self) -> None:
         """Replay all launches."""
@@ -101,16 +125,6 @@ class Program:
             key = (launch.stage, launch.name)
             seconds[key] = seconds.get(key, 0.0) + spent
         return seconds
-
-    @property
-    def threads(self) -> int:
-        """CPU threads that share a split launch."""
-        return self._threads
-
-    def close(self) -> None:
-        """End the threads."""
-        if self._pool:
-            self._pool.shutdown(wait=False)
 
 
 def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:

@@ -86,12 +86,9 @@ def vectorize(
     if settings.max_bytes:
         settings = replace(settings, curves=affordable_curves(settings))
     trainer = Trainer(target, settings, device, threads=threads, scene=scene)
-    try:
-        if settings.time_budget:
-            trainer.size_to(settings.time_budget - TAIL_SECONDS - (time.monotonic() - started))
-        scene = trainer.run(report, stop)
-    finally:
-        trainer.close()
+    if settings.time_budget:
+        trainer.size_to(settings.time_budget - TAIL_SECONDS - (time.monotonic() - started))
+    scene = trainer.run(report, stop)
 
     svg = export(scene, settings, metadata)
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:

@@ -81,17 +81,10 @@ class TileRenderer(ABC):
 
     def rebuild(self) -> None:
         """Allocate the arrays for the current capacity and record the launches."""
-        self.close()
         self._allocate()
         self._allocate_items()
         self.forward_program = self._record_forward()
         self.backward_program = self._record_backward()
-
-    def close(self) -> None:
-        """End the threads of the recorded launches."""
-        for program in (self.forward_program, self.backward_program):
-            if program:
-                program.close()
 
     def ints(self, *shape: int) -> wp.array:
         """A zeroed int32 array."""
@@ -279,7 +272,6 @@ class TileRenderer(ABC):
             split=True,
         )
         program.run()
-        program.close()
         parts = self.slot_part.numpy()
         used = parts >= 0
         totals = np.bincount(
@@ -332,16 +324,13 @@ def make_renderer(
     capacity: Capacity | None = None,
     through_scales: bool = True,
     fold: float = 0.0,
-    length: float = 0.0,
 ) -> TileRenderer:
-    """``exact`` or ``splat``; ``length`` is for the one, ``through_scales`` and ``fold`` for the other."""
+    """``exact`` or ``splat``; the last two arguments are the splats' (see SplatRenderer)."""
     from warpsplat.render_exact import ExactRenderer
     from warpsplat.render_splat import SplatRenderer
 
     if name == "exact":
-        return ExactRenderer(
-            parameters, width, height, scale, threads=threads, capacity=capacity, length=length
-        )
+        return ExactRenderer(parameters, width, height, scale, threads=threads, capacity=capacity)
     return SplatRenderer(
         parameters,
         width,
@@ -372,8 +361,5 @@ def render(
     target = wp.get_device(device)
     width, height = max(1, round(scene.width * scale)), max(1, round(scene.height * scale))
     made = make_renderer(renderer, Parameters(scene, target), width, height, scale, threads=threads)
-    try:
-        made.forward_complete()
-        return made.read_image()
-    finally:
-        made.close()
+    made.forward_complete()
+    return made.read_image()

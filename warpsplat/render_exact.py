@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import warp as wp
 
 from warpsplat.kernels import constants, fill, flatten, stroke
@@ -15,11 +13,6 @@ class ExactRenderer(TileRenderer):
     """Fills by signed area, strokes by distance, both of flattened curves."""
 
     items_per_part = 48
-
-    def __init__(self, *arguments: Any, length: float = 0.0, **options: Any) -> None:
-        """``length``: weight of the outlines' length [squared error of a pixel, per pixel of the canvas]."""
-        self._length = length
-        super().__init__(*arguments, **options)
 
     def _allocate_items(self) -> None:
         parts, vertices = self.parameters.part_count, self.capacity.items
@@ -109,14 +102,6 @@ class ExactRenderer(TileRenderer):
                 p.curve_count,
                 [p.opacity_count, self.scale, self.part_first, self.part_last, self.half_grad],
                 [p.widths_grad],
-            )
-        if self._closed and self._length > 0:
-            program.add(
-                flatten.length_backward,
-                vertices,
-                [self.part_first, self.part_last, self.vertex_part, self.vertex]
-                + [self._length * self.scale / (3 * self.width * self.height)],
-                [self.start_grad, self.end_grad],
             )
         program.add(
             flatten.flatten_backward,

@@ -27,6 +27,9 @@ from warpsplat.tiles import to_tiles
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
 
+LOOK_INTERVAL = 25
+"""Steps between two looks at the file as a viewer shows it."""
+
 TIMED_STEPS = 4
 """Steps timed at each size to fit a run into a time."""
 
@@ -126,8 +129,6 @@ class Trainer:
     def _record(self, width: int, height: int, previous: TileRenderer | None) -> None:
         """Record the launches of a step anew: the arrays they use have changed."""
         s = self.settings
-        if self.renderer:
-            self.renderer.close()
         self.renderer = make_renderer(
             s.renderer,
             self.parameters,
@@ -137,7 +138,6 @@ class Trainer:
             threads=self.threads,
             through_scales=s.through_scales,
             fold=s.fold_start * (s.fold_end / s.fold_start) ** (self.step / s.iterations),
-            length=s.length,
             capacity=previous.capacity if previous else None,
         )
         if previous is None:
@@ -270,11 +270,6 @@ class Trainer:
         squares = float(self.loss.numpy().sum(dtype=np.float64))
         return -10 * math.log10(max(squares / (3 * self.renderer.width * self.renderer.height), 1e-12))
 
-    def close(self) -> None:
-        """End the threads of the recorded launches."""
-        if self.renderer:
-            self.renderer.close()
-
     def size_to(self, seconds: float) -> None:
         """Choose the number of iterations so that ``run`` ends about ``seconds`` from now.
 
@@ -336,14 +331,15 @@ class Trainer:
             if stop and stop():
                 self.interrupted = True
                 break
+            last = phase is plan[-1] and self.step >= s.density.stop * s.iterations
+            if s.viewer and last and self.step % LOOK_INTERVAL == 0:
+                self._look()
             due = s.density.interval > 0 and self.step % s.density.interval == 0
             if due and s.time_budget and phase is plan[0]:
                 self._resize((time.monotonic() - started) / (self.step * self._costs[0]))
             growing = not self.given and self.parameters.curve_count < s.curves
             if due and (growing or self.step < s.density.stop * s.iterations):
                 self._surgery(self.step / self.settings.iterations)
-            elif due and s.viewer and phase is plan[-1]:
-                self._look()
             if s.time_budget and time.monotonic() > self._deadline:
                 break
         return self.scene()
