@@ -23,6 +23,7 @@ class ExactRenderer(TileRenderer):
         if self._closed:
             self.slot_winding = self.ints(self.capacity.slots)
         else:
+            self.slot_near = self.ints(self.capacity.slots, self.lanes)
             self.segment = self.ints(self.capacity.slots, constants.TILE_PIXELS)
             self.half_grad = self.floats(vertices)
 
@@ -69,9 +70,9 @@ class ExactRenderer(TileRenderer):
             program.add(
                 stroke.stroke_forward,
                 shape,
-                [self.lane_size, self.slot_part, self.slot_tile, self.tiles_x, p.opacity_count, p.widths]
-                + [self.scale, self.part_first, self.part_last, self.vertex],
-                [self.coverage, self.segment, self.slot_state],
+                [self.lane_size, self.slot_part, self.slot_first, p.opacity_count, p.widths, self.scale]
+                + [self.part_tiles, self.part_first, self.part_last, self.vertex],
+                [self.coverage, self.coverage_columns, self.segment, self.slot_state, self.slot_near],
                 split=True,
             )
             self._record_lists(program)
@@ -93,7 +94,7 @@ class ExactRenderer(TileRenderer):
                 stroke.stroke_backward,
                 vertices,
                 [self.width, self.height, p.opacity_count, p.widths, self.scale, self.vertex_part]
-                + [self.part_last, *slots, self.segment, self.coverage, self.coverage_grad],
+                + [self.part_first, self.part_last, *slots, self.segment, self.coverage, self.coverage_grad],
                 [self.start_grad, self.end_grad, self.half_grad],
                 split=True,
             )
