@@ -76,8 +76,6 @@ def gaussians_forward(
     runs: wp.int32,  # stretches of columns without neighbours in one another: the segments of a stroke
     mean: wp.array[wp.vec2],  # [capacity] px
     # Out:
-    gaussian_scale: wp.array[wp.vec2],  # [capacity] px, standard deviations along and across the row
-    gaussian_angle: wp.array[wp.float32],  # [capacity] rad
     conic: wp.array[wp.vec3],  # [capacity] (a, b, c) of q = a dx^2 + 2 b dx dy + c dy^2, px^-2
     extent: wp.array[wp.vec2],  # [capacity] px, half size of the box where q <= Q_MAX
 ):
@@ -105,8 +103,6 @@ def gaussians_forward(
     cc = e[0] * e[0]
     ss = e[1] * e[1]
     cs = e[0] * e[1]
-    gaussian_scale[i] = wp.vec2(wp.sqrt(variance_x), wp.sqrt(variance_y))
-    gaussian_angle[i] = wp.atan2(e[1], e[0])
     conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
     extent[i] = wp.vec2(
         wp.sqrt(Q_MAX * (cc * variance_x + ss * variance_y)),

@@ -3,14 +3,12 @@
 Inside a part all Gaussians share colour and opacity, so their order does not matter:
 coverage = 1 - prod_i (1 - g_i), g_i = min(exp(-q_i / 2), GAUSSIAN_MAX), cut at q > Q_MAX (paper eq. 9 with
 the opacity taken out of the product: it multiplies the coverage once, as fill-opacity does in the file).
-
-Along a row of pixels q is quadratic in x, so g follows from its left neighbour by two multiplications:
-g(x + 1) = g(x) r(x), r(x + 1) = r(x) exp(-a). An exp a pixel would cost several times as much on a CPU.
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -18,103 +16,104 @@ TILE = wp.constant(constants.TILE)
 PARTIAL = wp.constant(constants.PARTIAL)
 Q_MAX = wp.constant(constants.Q_MAX)
 GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
+STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 
 
 @wp.func
-def first_pixel(x: wp.float32) -> wp.int32:
-    """First pixel whose centre is at or right of ``x``."""
-    return int(wp.ceil(x - 0.5))
+def rows_of_tile() -> column:
+    """Distance of each row's centre from the top of a tile [px]."""
+    rows = column(0.0)
+    for r in range(TILE):
+        rows[r] = float(r) + 0.5
+    return rows
 
 
 @wp.func
-def chord(con: wp.vec3, dy: wp.float32) -> wp.vec2:
-    """Interval of dx with q(dx, dy) <= Q_MAX; empty (low > high) where the row misses the ellipse."""
-    b_dy = con[1] * dy
-    discriminant = b_dy * b_dy - con[0] * (con[2] * dy * dy - Q_MAX)
-    if discriminant <= 0.0:
-        return wp.vec2(1.0, -1.0)
-    root = wp.sqrt(discriminant)
-    return wp.vec2((-b_dy - root) / con[0], (-b_dy + root) / con[0])
+def gaussian_column(con: wp.vec3, dx: wp.float32, dy: column) -> column:
+    """exp(-q / 2) at offsets (dx, dy) [px] from the mean, 0 beyond Q_MAX.
 
-
-@wp.func
-def gaussian_at(con: wp.vec3, dx: wp.float32, dy: wp.float32) -> wp.float32:
-    """exp(-q / 2) at the offset (dx, dy) [px] from the mean."""
-    return wp.exp(-0.5 * (con[0] * dx * dx + 2.0 * con[1] * dx * dy + con[2] * dy * dy))
+    exp(z) = exp(z / 64)^64 with five terms of the series: a relative error of 3e-6, and vector instructions.
+    """
+    one = column(1.0)
+    zero = column(0.0)
+    q = wp.cw_mul(dy, con[2] * dy + (2.0 * con[1] * dx) * one) + (con[0] * dx * dx) * one
+    within = wp.min(wp.max(STEEP * (Q_MAX * one - q), zero), one)
+    u = (-0.5 / 64.0) * wp.min(q, Q_MAX * one)
+    e = one + wp.cw_mul(u, one + wp.cw_mul(u, 0.5 * one + wp.cw_mul(u, (1.0 / 6.0) * one + (1.0 / 24.0) * u)))
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    return wp.cw_mul(within, e)
 
 
 @wp.kernel
 def splat_forward(
     # In:
     first: wp.int32,
-    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
+    lanes: wp.int32,  # each takes every lanes-th column
     slot_part: wp.array[wp.int32],  # [slot_capacity] -1: unused
-    slot_tile: wp.array[wp.int32],  # [slot_capacity]
-    tiles_x: wp.int32,
+    slot_first: wp.array[wp.int32],  # [part_count]
+    part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     part_first: wp.array[wp.int32],  # [part_count]
     part_last: wp.array[wp.int32],  # [part_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
     extent: wp.array[wp.vec2],  # [gaussian_capacity] px
     # Out:
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] in [0, 1]; by column
+    coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
     slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
 ):
-    """One thread a slot and lane: the whole tile on a CPU, one row on a GPU."""
+    """One thread a row of tiles of a part (that of its leftmost slot) and lane."""
     i, lane = wp.tid()
     slot = first + i
     part = slot_part[slot]
     if part < 0:
         return
-    tile_x = TILE * (slot_tile[slot] % tiles_x)
-    tile_y = TILE * (slot_tile[slot] / tiles_x)
-    row_first = tile_y + lane * lane_rows
-    row_last = row_first + lane_rows
-    for x in range(TILE):
-        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
-            coverage[slot, TILE * x + y] = 1.0
-    seen = int(0)
+    wide = part_tiles[part, 2] - part_tiles[part, 0]
+    local = slot - slot_first[part]
+    if local % wide != 0:
+        return
+    left = TILE * part_tiles[part, 0]
+    right = left + TILE * wide
+    top = float(TILE * (part_tiles[part, 1] + local / wide))
+    one = column(1.0)
+    rows = rows_of_tile()
+    x = left + lane
+    while x < right:
+        coverage[slot + (x - left) / TILE, (x - left) % TILE] = one
+        x += lanes
     for j in range(part_first[part], part_last[part]):
         m = mean[j]
         e = extent[j]
-        if (
-            m[0] + e[0] >= float(tile_x)
-            and m[0] - e[0] <= float(tile_x + TILE)
-            and m[1] + e[1] >= float(row_first)
-            and m[1] - e[1] <= float(row_last)
-        ):
-            con = conic[j]
-            falloff = wp.exp(-con[0])
-            y0 = wp.max(row_first, first_pixel(m[1] - e[1]))
-            y1 = wp.min(row_last, first_pixel(m[1] + e[1]))
-            for y in range(y0, y1):
-                dy = float(y) + 0.5 - m[1]
-                span = chord(con, dy)
-                x0 = wp.max(tile_x, first_pixel(m[0] + span[0]))
-                x1 = wp.min(tile_x + TILE, first_pixel(m[0] + span[1]))
-                if x0 < x1:
-                    seen = 1
-                    dx = float(x0) + 0.5 - m[0]
-                    g = gaussian_at(con, dx, dy)
-                    ratio = wp.exp(-(con[0] * (dx + 0.5) + con[1] * dy))
-                    for x in range(x0, x1):
-                        p = TILE * (x - tile_x) + y - tile_y
-                        coverage[slot, p] = coverage[slot, p] * (1.0 - wp.min(g, GAUSSIAN_MAX))
-                        g *= ratio
-                        ratio *= falloff
-    for x in range(TILE):
-        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
-            coverage[slot, TILE * x + y] = 1.0 - coverage[slot, TILE * x + y]
-    if seen != 0:
-        wp.atomic_or(slot_state, slot, PARTIAL)
+        if m[1] + e[1] >= top and m[1] - e[1] <= top + float(TILE):
+            x = wp.max(left, int(wp.ceil(wp.max(m[0] - e[0], -1.0) - 0.5)))
+            stop = wp.min(right, int(wp.floor(wp.min(m[0] + e[0], 1.0e8) + 0.5)))
+            x += (lane + lanes - x % lanes) % lanes
+            if x < stop:
+                con = conic[j]
+                dy = rows + (top - m[1]) * one
+                while x < stop:
+                    s = slot + (x - left) / TILE
+                    slot_state[s] = PARTIAL
+                    g = gaussian_column(con, float(x) + 0.5 - m[0], dy)
+                    g = wp.min(g, GAUSSIAN_MAX * one)
+                    k = (x - left) % TILE
+                    coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
+                    x += lanes
+    x = left + lane
+    while x < right:
+        s = slot + (x - left) / TILE
+        coverage[s, (x - left) % TILE] = one - coverage[s, (x - left) % TILE]
+        x += lanes
 
 
 @wp.kernel
 def splat_backward(
     # In:
     first: wp.int32,
-    width: wp.int32,  # px
-    height: wp.int32,  # px
     gaussian_part: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [part_count]
     slot_last: wp.array[wp.int32],  # [part_count]
@@ -123,8 +122,8 @@ def splat_backward(
     mean: wp.array[wp.vec2],  # [gaussian_capacity]
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
     extent: wp.array[wp.vec2],  # [gaussian_capacity]
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
-    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
+    coverage: wp.array2d[column],  # [slot_capacity, TILE]
+    coverage_grad: wp.array2d[column],  # [slot_capacity, TILE]
     # Out:
     mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
     conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] written
@@ -145,54 +144,41 @@ def splat_backward(
         m = mean[i]
         e = extent[i]
         con = conic[i]
-        falloff = wp.exp(-con[0])
-        tiles_x0 = part_tiles[part, 0]
-        tiles_y0 = part_tiles[part, 1]
-        tiles_wide = part_tiles[part, 2] - tiles_x0
-        y0 = wp.max(0, first_pixel(wp.max(m[1] - e[1], 0.0)))
-        y1 = wp.min(height, first_pixel(wp.min(m[1] + e[1], float(height) + 1.0)))
-        sum_x = float(0.0)
-        sum_y = float(0.0)
-        sum_xx = float(0.0)
-        sum_xy = float(0.0)
-        sum_yy = float(0.0)
-        for y in range(y0, y1):
-            dy = float(y) + 0.5 - m[1]
-            span = chord(con, dy)
-            x0 = wp.max(0, first_pixel(wp.max(m[0] + span[0], 0.0)))
-            x1 = wp.min(width, first_pixel(wp.min(m[0] + span[1], float(width) + 1.0)))
-            if x0 < x1:
-                dx = float(x0) + 0.5 - m[0]
-                g = gaussian_at(con, dx, dy)
-                ratio = wp.exp(-(con[0] * (dx + 0.5) + con[1] * dy))
-                row_sum = float(0.0)
-                row_x = float(0.0)
-                row_xx = float(0.0)
-                slot_row = start + (y / TILE - tiles_y0) * tiles_wide - tiles_x0
-                x = x0
-                while x < x1:
-                    tile_x = x / TILE
-                    slot = slot_row + tile_x
-                    base = y % TILE - TILE * TILE * tile_x
-                    lit = slot_state[slot] == PARTIAL
-                    stop = wp.min(x1, (tile_x + 1) * TILE)
-                    for xx in range(x, stop):
-                        if lit and g < GAUSSIAN_MAX:
-                            p = base + TILE * xx
-                            h = -0.5 * coverage_grad[slot, p] * (1.0 - coverage[slot, p]) * g / (1.0 - g)
-                            row_sum += h
-                            row_x += h * dx
-                            row_xx += h * dx * dx
-                        g *= ratio
-                        ratio *= falloff
-                        dx += 1.0
-                    x = stop
-                sum_x += row_x
-                sum_y += row_sum * dy
-                sum_xx += row_xx
-                sum_xy += row_x * dy
-                sum_yy += row_sum * dy * dy
-        con_grad = wp.vec3(sum_xx, 2.0 * sum_xy, sum_yy)
-        x_grad = -2.0 * wp.vec2(con[0] * sum_x + con[1] * sum_y, con[1] * sum_x + con[2] * sum_y)
+        wide = part_tiles[part, 2] - part_tiles[part, 0]
+        left = TILE * part_tiles[part, 0]
+        x_first = wp.max(left, int(wp.ceil(wp.max(m[0] - e[0], -1.0) - 0.5)))
+        x_last = wp.min(left + TILE * wide, int(wp.floor(wp.min(m[0] + e[0], 1.0e8) + 0.5)))
+        y_first = wp.max(part_tiles[part, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / TILE)
+        y_last = wp.min(part_tiles[part, 3], int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / TILE + 1)
+        one = column(1.0)
+        zero = column(0.0)
+        rows = rows_of_tile()
+        sum_x = zero
+        sum_y = zero
+        sum_xx = zero
+        sum_xy = zero
+        sum_yy = zero
+        for tile_y in range(y_first, y_last):
+            dy = rows + (float(TILE * tile_y) - m[1]) * one
+            slot_row = start + (tile_y - part_tiles[part, 1]) * wide
+            for x in range(x_first, x_last):
+                s = slot_row + (x - left) / TILE
+                if slot_state[s] == PARTIAL:
+                    k = (x - left) % TILE
+                    dx = float(x) + 0.5 - m[0]
+                    g = gaussian_column(con, dx, dy)
+                    below = wp.min(wp.max(STEEP * (GAUSSIAN_MAX * one - g), zero), one)
+                    h = wp.cw_mul(wp.cw_mul(coverage_grad[s, k], one - coverage[s, k]), wp.cw_mul(below, g))
+                    h = -0.5 * wp.cw_div(h, one - wp.min(g, GAUSSIAN_MAX * one))
+                    h_dy = wp.cw_mul(h, dy)
+                    sum_x = sum_x + dx * h
+                    sum_y = sum_y + h_dy
+                    sum_xx = sum_xx + (dx * dx) * h
+                    sum_xy = sum_xy + dx * h_dy
+                    sum_yy = sum_yy + wp.cw_mul(h_dy, dy)
+        con_grad = wp.vec3(total(sum_xx), 2.0 * total(sum_xy), total(sum_yy))
+        sx = total(sum_x)
+        sy = total(sum_y)
+        x_grad = -2.0 * wp.vec2(con[0] * sx + con[1] * sy, con[1] * sx + con[2] * sy)
     mean_grad[i] = x_grad
     conic_grad[i] = con_grad

@@ -40,8 +40,7 @@ class SplatRenderer(TileRenderer):
         self.part_columns, self.part_rows = self.ints(parts), self.ints(parts)
         self.part_reach, self.part_sign = self.floats(parts), self.floats(parts)
         self.gaussian_part, self.gaussian_across = self.ints(gaussians), self.floats(gaussians)
-        self.mean, self.gaussian_scale = vectors(wp.vec2, gaussians), vectors(wp.vec2, gaussians)
-        self.gaussian_angle = self.floats(gaussians)
+        self.mean = vectors(wp.vec2, gaussians)
         self.conic, self.extent = vectors(wp.vec3, gaussians), vectors(wp.vec2, gaussians)
         self.mean_grad, self.conic_grad = vectors(wp.vec2, gaussians), vectors(wp.vec3, gaussians)
         self.along_grad, self.across_grad = vectors(wp.vec2, gaussians), vectors(wp.vec2, gaussians)
@@ -74,7 +73,7 @@ class SplatRenderer(TileRenderer):
             gaussian.gaussians_forward,
             gaussians,
             [*self._grid_inputs(), self.mean],
-            [self.gaussian_scale, self.gaussian_angle, self.conic, self.extent],
+            [self.conic, self.extent],
             split=True,
         )
         return self.mean, self.extent
@@ -83,9 +82,9 @@ class SplatRenderer(TileRenderer):
         program.add(
             splat.splat_forward,
             (self.capacity.slots, self.lanes),
-            [self.lane_size, self.slot_part, self.slot_tile, self.tiles_x]
+            [self.lanes, self.slot_part, self.slot_first, self.part_tiles]
             + [self.part_first, self.part_last, self.mean, self.conic, self.extent],
-            [self.coverage, self.slot_state],
+            [self.coverage_columns, self.slot_state],
             split=True,
         )
         self._record_lists(program)
@@ -96,9 +95,8 @@ class SplatRenderer(TileRenderer):
         program.add(
             splat.splat_backward,
             gaussians,
-            [self.width, self.height, self.gaussian_part, self.slot_first, self.slot_last]
-            + [self.slot_state, self.part_tiles]
-            + [self.mean, self.conic, self.extent, self.coverage, self.coverage_grad],
+            [self.gaussian_part, self.slot_first, self.slot_last, self.slot_state, self.part_tiles]
+            + [self.mean, self.conic, self.extent, self.coverage_columns, self.coverage_grad_columns],
             [self.mean_grad, self.conic_grad],
             split=True,
         )
