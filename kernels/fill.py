@@ -253,7 +253,8 @@ def fill_backward(
     first: wp.int32,
     width: wp.int32,  # px
     height: wp.int32,  # px
-    vertex_part: wp.array[wp.int32],  # [vertex_capacity] -1: unused
+    vertex_part: wp.array[wp.int32],  # [vertex_capacity]
+    part_ends: wp.array[wp.int32],  # [part_count] end of each part's vertices
     part_first: wp.array[wp.int32],  # [part_count]
     part_last: wp.array[wp.int32],  # [part_count]
     slot_first: wp.array[wp.int32],  # [part_count]
@@ -269,9 +270,9 @@ def fill_backward(
 ):
     """One thread an edge, walking the pixels that it crosses."""
     i = first + wp.tid()
-    part = vertex_part[i]
-    if part < 0:
+    if i >= part_ends[part_ends.shape[0] - 1]:
         return
+    part = vertex_part[i]
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     base_slot = slot_first[part]

@@ -2,13 +2,13 @@
 
 A cubic split into n equal steps of t leaves its curve by at most max |B''| / (8 n^2), and |B''| is at most 6
 times the larger second difference of its control points (Sederberg, Computer Aided Geometric Design, 10.6).
-All cubics of a curve get the n of its worst one. The n is taken as a constant by the adjoint.
+The n is taken as a constant by the adjoint.
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import cubic_weights, find_range
+from warpsplat.kernels.bezier import cubic_weights
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -27,29 +27,30 @@ def plan_flatten(
     opacity_count: wp.int32,
     scale: wp.float32,  # render pixels per canvas unit
     # Out:
-    part_pieces: wp.array[wp.int32],  # [part_count] straight pieces a cubic
+    cubic_first: wp.array2d[wp.int32],  # [part_count, cubics + 1] first vertex of each cubic in its part
     part_vertices: wp.array[wp.int32],  # [part_count] vertices; an open part has one more than pieces
 ):
-    """Pieces from the second differences, so that the polyline is FLATNESS px from the curve at most."""
+    """Pieces of each cubic, so that the polyline is FLATNESS px from the curve at most."""
     part = first + wp.tid()
     curve = part / opacity_count
     point_count = points.shape[1]
     cubics = point_count / 3 / opacity_count
-    base = (part % opacity_count) * cubics
-    worst = float(0.0)
-    for cubic in range(base, base + cubics):
-        p1 = points[curve, 3 * cubic + 1]
-        p2 = points[curve, 3 * cubic + 2]
-        p3 = points[curve, (3 * cubic + 3) % point_count]
-        worst = wp.max(worst, wp.length(points[curve, 3 * cubic] - 2.0 * p1 + p2))
-        worst = wp.max(worst, wp.length(p1 - 2.0 * p2 + p3))
     flatness = FLATNESS
     if closed == 0:
         flatness = FLATNESS_STROKE
-    pieces = wp.ceil(wp.sqrt(0.75 * scale * worst / flatness))
-    count = wp.clamp(int(wp.min(pieces, 1.0e6)), PIECES_MIN, PIECES_MAX)
-    part_pieces[part] = count
-    part_vertices[part] = cubics * count + 1 - closed
+    vertices = int(0)
+    for cubic in range(cubics):
+        start = 3 * ((part % opacity_count) * cubics + cubic)
+        p0 = points[curve, start]
+        p1 = points[curve, start + 1]
+        p2 = points[curve, start + 2]
+        p3 = points[curve, (start + 3) % point_count]
+        worst = wp.max(wp.length(p0 - 2.0 * p1 + p2), wp.length(p1 - 2.0 * p2 + p3))
+        pieces = wp.ceil(wp.sqrt(0.75 * scale * worst / flatness))
+        cubic_first[part, cubic] = vertices
+        vertices += wp.clamp(int(wp.min(pieces, 1.0e6)), PIECES_MIN, PIECES_MAX)
+    cubic_first[part, cubics] = vertices
+    part_vertices[part] = vertices + 1 - closed
 
 
 @wp.kernel
@@ -61,41 +62,39 @@ def flatten_forward(
     closed: wp.int32,
     opacity_count: wp.int32,
     scale: wp.float32,
-    part_ends: wp.array[wp.int32],  # [part_count]
     part_first: wp.array[wp.int32],  # [part_count]
     part_last: wp.array[wp.int32],  # [part_count]
-    part_pieces: wp.array[wp.int32],  # [part_count]
+    cubic_first: wp.array2d[wp.int32],  # [part_count, cubics + 1]
     # Out:
-    vertex_part: wp.array[wp.int32],  # [capacity] -1: unused
+    vertex_part: wp.array[wp.int32],  # [capacity] those beyond the last part's are left as they are
     vertex: wp.array[wp.vec2],  # [capacity] px
     extent: wp.array[wp.vec2],  # [capacity] px; how far the shape may reach beyond the vertex
 ):
-    """B(k / n) of each cubic of a part, in order."""
-    i = first + wp.tid()
-    part = find_range(part_ends, part_ends.shape[0], i)
-    vertex_part[i] = -1
-    if part >= part_ends.shape[0]:
-        return
-    if i >= part_last[part]:
+    """B(k / n) of a cubic, one thread a part and cubic."""
+    i, cubic = wp.tid()
+    part = first + i
+    if part_last[part] == part_first[part]:
         return
     curve = part / opacity_count
-    point_count = points.shape[1]
-    cubics = point_count / 3 / opacity_count
-    pieces = part_pieces[part]
-    local = i - part_first[part]
-    cubic = wp.min(local / pieces, cubics - 1)
-    t = float(local - cubic * pieces) / float(pieces)
-    weights = cubic_weights(t)
-    position = wp.vec2(0.0, 0.0)
+    cubics = cubic_first.shape[1] - 1
     start = 3 * ((part % opacity_count) * cubics + cubic)
-    for j in range(4):
-        position += weights[j] * points[curve, (start + j) % point_count]
-    vertex_part[i] = part
-    vertex[i] = scale * position
+    p0 = scale * points[curve, start]
+    p1 = scale * points[curve, start + 1]
+    p2 = scale * points[curve, start + 2]
+    p3 = scale * points[curve, (start + 3) % points.shape[1]]
     reach = float(0.0)
     if closed == 0:
         reach = 0.5 * scale * widths[curve] + 1.0
-    extent[i] = wp.vec2(reach, reach)
+    base = part_first[part] + cubic_first[part, cubic]
+    pieces = cubic_first[part, cubic + 1] - cubic_first[part, cubic]
+    count = pieces
+    if closed == 0 and cubic == cubics - 1:
+        count += 1
+    for k in range(count):
+        weights = cubic_weights(float(k) / float(pieces))
+        vertex_part[base + k] = part
+        vertex[base + k] = weights[0] * p0 + weights[1] * p1 + weights[2] * p2 + weights[3] * p3
+        extent[base + k] = wp.vec2(reach, reach)
 
 
 @wp.kernel
@@ -107,7 +106,7 @@ def flatten_backward(
     scale: wp.float32,
     part_first: wp.array[wp.int32],  # [part_count]
     part_last: wp.array[wp.int32],  # [part_count]
-    part_pieces: wp.array[wp.int32],  # [part_count]
+    cubic_first: wp.array2d[wp.int32],  # [part_count, cubics + 1]
     start_grad: wp.array[wp.vec2],  # [capacity] of the first vertex of the edge that starts at a vertex
     end_grad: wp.array[wp.vec2],  # [capacity] of the second vertex of that edge
     # Out:
@@ -116,15 +115,11 @@ def flatten_backward(
     """A gather, one thread a control point: Bernstein weights times the gradients of its cubics' vertices."""
     i, point = wp.tid()
     curve = first + i
-    point_count = points_grad.shape[1]
-    cubics = point_count / 3 / opacity_count
+    cubics = cubic_first.shape[1] - 1
     total = wp.vec2(0.0, 0.0)
     for opacity in range(opacity_count):
         part = curve * opacity_count + opacity
-        start = part_first[part]
-        count = part_last[part] - start
-        if count > 0:
-            pieces = part_pieces[part]
+        if part_last[part] > part_first[part]:
             index = point - 3 * opacity * cubics
             for side in range(2):
                 # The cubic in which the point is number 0 to 2, and the one before it, which it may end.
@@ -133,13 +128,12 @@ def flatten_backward(
                 if closed == 1:
                     cubic = (cubic + cubics) % cubics
                 if cubic >= 0 and cubic < cubics and j <= 3:
-                    for k in range(pieces + 1):
-                        # An edge belongs to the cubic in which it lies; its two ends are weighed there.
-                        t = float(k) / float(pieces)
-                        weight = cubic_weights(t)[j]
-                        local = cubic * pieces + k
-                        if k < pieces:
-                            total += weight * start_grad[start + local]
-                        if k > 0:
-                            total += weight * end_grad[start + local - 1]
+                    base = part_first[part] + cubic_first[part, cubic]
+                    pieces = cubic_first[part, cubic + 1] - cubic_first[part, cubic]
+                    # An edge belongs to the cubic in which it lies; its two ends are weighed there.
+                    before = cubic_weights(0.0)[j]
+                    for k in range(pieces):
+                        after = cubic_weights(float(k + 1) / float(pieces))[j]
+                        total += before * start_grad[base + k] + after * end_grad[base + k]
+                        before = after
     points_grad[curve, point] = scale * total

@@ -273,7 +273,8 @@ def stroke_backward(
     opacity_count: wp.int32,
     widths: wp.array[wp.float32],  # [curve_count] canvas units
     scale: wp.float32,
-    vertex_part: wp.array[wp.int32],  # [vertex_capacity] -1: unused
+    vertex_part: wp.array[wp.int32],  # [vertex_capacity]
+    part_ends: wp.array[wp.int32],  # [part_count] end of each part's vertices
     part_first: wp.array[wp.int32],  # [part_count]
     part_last: wp.array[wp.int32],  # [part_count]
     slot_first: wp.array[wp.int32],  # [part_count]
@@ -291,9 +292,9 @@ def stroke_backward(
 ):
     """One thread a segment, over the border pixels whose nearest segment it is."""
     i = first + wp.tid()
-    part = vertex_part[i]
-    if part < 0:
+    if i >= part_ends[part_ends.shape[0] - 1]:
         return
+    part = vertex_part[i]
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     of_half = float(0.0)

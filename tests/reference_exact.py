@@ -8,11 +8,11 @@ from tests.reference import bezier, composite, pixel_centres
 from warpsplat.scene import Scene
 
 
-def polyline(points: torch.Tensor, pieces: int, closed: bool) -> torch.Tensor:
-    """Vertices of a flattened curve; a closed one ends where it begins."""
+def polyline(points: torch.Tensor, pieces: list[int], closed: bool) -> torch.Tensor:
+    """Vertices of a flattened curve, ``pieces`` of each cubic; a closed one ends where it begins."""
     chain = torch.cat([points, points[:1]]) if closed else points
-    cubics = (len(chain) - 1) // 3
-    return bezier(chain, torch.linspace(0, cubics, cubics * pieces + 1))
+    steps = [cubic + torch.arange(n) / n for cubic, n in enumerate(pieces)]
+    return bezier(chain, torch.cat([*steps, torch.tensor([float(len(pieces))])]))
 
 
 def ramp_integral(u: torch.Tensor) -> torch.Tensor:
@@ -68,7 +68,7 @@ def stroke_coverage(vertices: torch.Tensor, half: torch.Tensor, width: int, heig
 
 
 def render(
-    scene: Scene, p: dict[str, torch.Tensor], pieces: list[int], width: int, height: int, scale: float
+    scene: Scene, p: dict[str, torch.Tensor], pieces: list[list[int]], width: int, height: int, scale: float
 ) -> torch.Tensor:
     """The image, [height, width, 3]; ``pieces`` per part."""
     opacity_count = scene.opacities.shape[1]

@@ -25,7 +25,7 @@ class Rates:
     colors: float = 0.02
     """[sRGB, 0 to 1]"""
     opacities: float = 0.04
-    widths: float = 0.15
+    widths: float = 0.3
     """[px of the finest training size]"""
     final: float = 0.2
     """Fraction of each rate that is left at the end."""
@@ -81,7 +81,7 @@ class Settings:
     """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
-    ssim: float = 0.01
+    ssim: float = 0.005
     """Weight of 1 - SSIM beside the mean squared error."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""

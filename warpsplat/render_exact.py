@@ -16,7 +16,8 @@ class ExactRenderer(TileRenderer):
 
     def _allocate_items(self) -> None:
         parts, vertices = self.parameters.part_count, self.capacity.items
-        self.part_pieces = self.ints(parts)
+        cubics = self.parameters.point_count // 3 // self.parameters.opacity_count
+        self.cubic_first = self.ints(parts, cubics + 1)
         self.vertex_part = self.ints(vertices)
         self.vertex, self.extent = self.vectors(wp.vec2, vertices), self.vectors(wp.vec2, vertices)
         self.start_grad, self.end_grad = self.vectors(wp.vec2, vertices), self.vectors(wp.vec2, vertices)
@@ -32,19 +33,19 @@ class ExactRenderer(TileRenderer):
         return int(self.parameters.kind == "closed")
 
     def _record_items(self, program: Program) -> tuple[wp.array, wp.array]:
-        p, vertices = self.parameters, self.capacity.items
+        p = self.parameters
         program.add(
             flatten.plan_flatten,
             p.part_count,
             [p.points, self._closed, p.opacity_count, self.scale],
-            [self.part_pieces, self.part_items],
+            [self.cubic_first, self.part_items],
         )
         self._record_ranges(program)
         program.add(
             flatten.flatten_forward,
-            vertices,
+            (p.part_count, self.cubic_first.shape[1] - 1),
             [p.points, p.widths, self._closed, p.opacity_count, self.scale]
-            + [self.part_ends, self.part_first, self.part_last, self.part_pieces],
+            + [self.part_first, self.part_last, self.cubic_first],
             [self.vertex_part, self.vertex, self.extent],
             split=True,
         )
@@ -84,7 +85,8 @@ class ExactRenderer(TileRenderer):
             program.add(
                 fill.fill_backward,
                 vertices,
-                [self.width, self.height, self.vertex_part, self.part_first, self.part_last, *slots]
+                [self.width, self.height, self.vertex_part, self.part_ends]
+                + [self.part_first, self.part_last, *slots]
                 + [self.coverage, self.coverage_grad],
                 [self.start_grad, self.end_grad],
                 split=True,
@@ -93,7 +95,15 @@ class ExactRenderer(TileRenderer):
             program.add(
                 stroke.stroke_backward,
                 vertices,
-                [self.width, self.height, p.opacity_count, p.widths, self.scale, self.vertex_part]
+                [
+                    self.width,
+                    self.height,
+                    p.opacity_count,
+                    p.widths,
+                    self.scale,
+                    self.vertex_part,
+                    self.part_ends,
+                ]
                 + [self.part_first, self.part_last, *slots, self.segment, self.coverage, self.coverage_grad],
                 [self.start_grad, self.end_grad, self.half_grad],
                 split=True,
@@ -107,7 +117,7 @@ class ExactRenderer(TileRenderer):
         program.add(
             flatten.flatten_backward,
             (p.curve_count, p.point_count),
-            [self._closed, p.opacity_count, self.scale, self.part_first, self.part_last, self.part_pieces]
+            [self._closed, p.opacity_count, self.scale, self.part_first, self.part_last, self.cubic_first]
             + [self.start_grad, self.end_grad],
             [p.points_grad],
             split=True,
