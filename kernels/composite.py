@@ -19,7 +19,7 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 COVERED = wp.constant(constants.COVERED)
 HIDDEN = wp.constant(constants.HIDDEN)
 TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
-LIT = wp.constant(1.0e9)  # takes a transmittance a bit above TRANSMITTANCE_MIN to 1
+STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
 
 
@@ -75,11 +75,14 @@ def composite_backward(
     image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     # Out:
-    coverage_grad: wp.array2d[column],  # [slot_capacity, TILE] written for visible PARTIAL slots
+    coverage_grad: wp.array2d[column],  # [slot_capacity, TILE] of visible PARTIAL slots; may be ``coverage``
     slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3) and opacity by pixel row: one lane
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
 ):
-    """See the module. Written for visible slots only."""
+    """See the module. The gradient is that of the signed coverage, 0 where it is clamped (at 0, 1 and -1).
+
+    It may take the place of the coverage: half the memory, and this stage waits for memory.
+    """
     i, lane = wp.tid()
     tile = first + i
     start = tile_first[tile]
@@ -99,20 +102,25 @@ def composite_backward(
             slot = list_slot[k]
             full = slot < 0
             covered = one
+            signed = one
             if full:
                 slot = -1 - slot
             else:
-                covered = wp.abs(coverage[slot, x])
+                signed = coverage[slot, x]
+                covered = wp.abs(signed)
             alpha = paint[3] * covered
             share = wp.cw_mul(t, paint[0] * red + paint[1] * green + paint[2] * blue)
             seen = wp.cw_mul(t, alpha)
             behind = behind - wp.cw_mul(alpha, share)
             # Where no light is left, only rounding is; Adam would make steps of it.
-            lit = wp.min(wp.max(LIT * (t - TRANSMITTANCE_MIN * one), zero), one)
+            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
             alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, one - alpha))
             t = t - seen
             if not full:
-                coverage_grad[slot, x] = paint[3] * alpha_grad
+                # The sign of the coverage, 0 at 0 and at both ends.
+                slope = wp.min(wp.max(STEEP * signed, -one), one)
+                slope = wp.cw_mul(slope, wp.min(STEEP * (one - covered), one))
+                coverage_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
             red_grad = wp.cw_mul(seen, red)
             green_grad = wp.cw_mul(seen, green)
             blue_grad = wp.cw_mul(seen, blue)
@@ -217,7 +225,7 @@ def removal_cost(
                 seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
             else:
                 slot = -1 - slot
-            lit = wp.min(wp.max(LIT * (t - TRANSMITTANCE_MIN * one), zero), one)
+            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
             t = t - seen
             red = red - paint[0] * seen
             green = green - paint[1] * seen

@@ -262,8 +262,7 @@ def fill_backward(
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] signed; by x
-    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the magnitude
+    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the signed coverage; by column
     # Out:
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts here
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
@@ -332,11 +331,8 @@ def fill_backward(
             s_next = wp.max(s_next, s)
             slot = base_slot + (row / TILE - tile_y0) * wide + x / TILE - tile_x0
             p = TILE * (x % TILE) + row % TILE
-            value = float(0.0)
             if slot_state[slot] == PARTIAL:
-                value = coverage[slot, p]
-            if wp.abs(value) < 1.0 and value != 0.0:
-                g = coverage_grad[slot, p] * wp.sign(value) * (s_next - s)
+                g = coverage_grad[slot, p] * (s_next - s)
                 move = wp.vec2(-d[1] * g, d[0] * g)
                 middle = 0.5 * (s + s_next)
                 at_start += (1.0 - middle) * move

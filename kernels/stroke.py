@@ -283,8 +283,7 @@ def stroke_backward(
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS]
-    coverage: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
-    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS]
+    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] by column
     # Out:
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the segment that starts here
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
@@ -323,24 +322,23 @@ def stroke_backward(
             for x in range(x0, x1):
                 slot = slot_row + x / TILE
                 p = TILE * (x % TILE) + y % TILE
-                value = float(0.0)
+                g = float(0.0)
                 if slot_state[slot] == PARTIAL:
-                    value = coverage[slot, p]
-                if value > 0.0 and value < 1.0:
-                    if segment[slot, p] == i:
-                        centre = wp.vec2(float(x) + 0.5, float(y) + 0.5)
-                        t = nearest(centre, a, b)
-                        r = centre - (1.0 - t) * a - t * b
-                        distance = wp.length(r)
-                        n = direction(r, distance)
-                        inner = half_plane_slope(half - distance, n)
-                        outer = half_plane_slope(half + distance, n)
-                        g = coverage_grad[slot, p]
-                        of_half += g * (inner + outer)
-                        if distance >= 1.0e-6:
-                            move = (g * (inner - outer)) * n
-                            at_start += (1.0 - t) * move
-                            at_end += t * move
+                    g = coverage_grad[slot, p]
+                # No gradient, no segment: the array is kept only where the coverage is neither 0 nor 1.
+                if g != 0.0 and segment[slot, p] == i:
+                    centre = wp.vec2(float(x) + 0.5, float(y) + 0.5)
+                    t = nearest(centre, a, b)
+                    r = centre - (1.0 - t) * a - t * b
+                    distance = wp.length(r)
+                    n = direction(r, distance)
+                    inner = half_plane_slope(half - distance, n)
+                    outer = half_plane_slope(half + distance, n)
+                    of_half += g * (inner + outer)
+                    if distance >= 1.0e-6:
+                        move = (g * (inner - outer)) * n
+                        at_start += (1.0 - t) * move
+                        at_end += t * move
     start_grad[i] = at_start
     end_grad[i] = at_end
     half_grad[i] = of_half

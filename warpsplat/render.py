@@ -48,6 +48,9 @@ class TileRenderer(ABC):
     items_per_part: int
     """First guess of the need."""
 
+    coverage_kept = True
+    """Whether the adjoint of the coverage needs the coverage; if not, its gradient takes its place."""
+
     def __init__(
         self,
         parameters: Parameters,
@@ -113,7 +116,9 @@ class TileRenderer(ABC):
         self.tile_stop, self.list_slot = self.ints(tiles), self.ints(slots)
         self.list_paint = self.vectors(wp.vec4, slots)
         self.coverage, self.coverage_columns = self._tile_array(slots)
-        self.coverage_grad, self.coverage_grad_columns = self._tile_array(slots)
+        self.coverage_grad, self.coverage_grad_columns = self.coverage, self.coverage_columns
+        if self.coverage_kept:
+            self.coverage_grad, self.coverage_grad_columns = self._tile_array(slots)
         # Sums over a tile: columns where a thread has the tile, else one number a lane.
         self.slot_columns = self.columns(slots if self.lanes == 1 else 1, 4)
         self.slot_grad = wp.zeros(
@@ -195,6 +200,7 @@ class TileRenderer(ABC):
             slots,
             [self.front_ends, self.slot_first, self.slot_last, self.part_tiles, self.tiles_x],
             [self.slot_part, self.slot_tile, self.slot_state, self.sort_keys, self.sort_slots],
+            split=True,
         )
         program.call(wp.utils.radix_sort_pairs, self.sort_keys, self.sort_slots, slots)
         program.add(binning.clear_ranges, tiles, [], [self.tile_first, self.tile_last])

@@ -14,6 +14,8 @@ class ExactRenderer(TileRenderer):
 
     items_per_part = 48
 
+    coverage_kept = False
+
     def _allocate_items(self) -> None:
         parts, vertices = self.parameters.part_count, self.capacity.items
         cubics = self.parameters.point_count // 3 // self.parameters.opacity_count
@@ -86,8 +88,7 @@ class ExactRenderer(TileRenderer):
                 fill.fill_backward,
                 vertices,
                 [self.width, self.height, self.vertex_part, self.part_ends]
-                + [self.part_first, self.part_last, *slots]
-                + [self.coverage, self.coverage_grad],
+                + [self.part_first, self.part_last, *slots, self.coverage_grad],
                 [self.start_grad, self.end_grad],
                 split=True,
             )
@@ -95,16 +96,9 @@ class ExactRenderer(TileRenderer):
             program.add(
                 stroke.stroke_backward,
                 vertices,
-                [
-                    self.width,
-                    self.height,
-                    p.opacity_count,
-                    p.widths,
-                    self.scale,
-                    self.vertex_part,
-                    self.part_ends,
-                ]
-                + [self.part_first, self.part_last, *slots, self.segment, self.coverage, self.coverage_grad],
+                [self.width, self.height, p.opacity_count, p.widths, self.scale]
+                + [self.vertex_part, self.part_ends]
+                + [self.part_first, self.part_last, *slots, self.segment, self.coverage_grad],
                 [self.start_grad, self.end_grad, self.half_grad],
                 split=True,
             )

@@ -170,12 +170,13 @@ class Trainer:
         program = Program(self.device, 1)
         program.stage = "update"
         curve_loss = wp.zeros(p.curve_count, dtype=wp.float32, device=self.device)
-        program.add(
-            loss.xing_backward,
-            p.curve_count,
-            [p.points, int(p.kind == "closed"), s.xing],
-            [p.points_grad, curve_loss],
-        )
+        if s.xing > 0:
+            program.add(
+                loss.xing_backward,
+                p.curve_count,
+                [p.points, int(p.kind == "closed"), s.xing],
+                [p.points_grad, curve_loss],
+            )
         if s.bending > 0:
             program.add(
                 loss.bending_backward,
