@@ -32,17 +32,17 @@ ROW_INSET = 0.45
 """Distance [px] from the path of the outermost row of Gaussians. A row's half-coverage line lies outside
 the row; with this inset it lies on the path, so the splat covers what the exported path will cover."""
 
-ROW_GROWTH = 0.45
+ROW_GROWTH = 0.65
 """Distance between rows as a fraction of the distance to the boundary: small enough that the Gaussians of
 an inner row end at the path."""
 
-COLUMN_SPACING = 3.0
+COLUMN_SPACING = 5.0
 """Largest distance [px] between samples along a curve."""
 
-COLUMN_DENSITY = 4.0
+COLUMN_DENSITY = 3.5
 """Samples along a curve of length L [px]: at least this times sqrt(L). A Gaussian is straight, so on a bend
 of radius R its ends leave the curve by SPREAD^2 h^2 / R for a spacing h; with R about L / 3 this keeps it
-under a fifth of a pixel."""
+under a quarter of a pixel."""
 
 COLUMNS_MIN = 8
 """Fewest samples along a curve, however small it is."""
@@ -57,7 +57,7 @@ PLATEAU = 0.985
 """Mean coverage well inside a splatted shape (its Gaussians overlap to a little less than 1). A solid path
 with this fraction of the opacity looks like the splat."""
 
-FLATNESS = 0.03
+FLATNESS = 0.04
 """Largest distance [px] of a flattened curve from the curve. Coarser pieces are fitted to the image by the
 optimiser and then missing in the file, whose curves are smooth (docs/experiments.md)."""
 
