@@ -72,16 +72,16 @@ def composite_backward(
     list_slot: wp.array[wp.int32],  # [slot_capacity]
     list_paint: wp.array[wp.vec4],  # [slot_capacity]
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
+    product: wp.int32,  # 1: a coverage is 1 - exp(-s); 0: it is |s|, clamped at 1
     image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     # Out:
-    coverage_grad: wp.array2d[column],  # [slot_capacity, TILE] of visible PARTIAL slots; may be ``coverage``
+    sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
     slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3) and opacity by pixel row: one lane
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
 ):
-    """See the module. The gradient is that of the signed coverage, 0 where it is clamped (at 0, 1 and -1).
-
-    It may take the place of the coverage: half the memory, and this stage waits for memory.
+    """See the module. The gradient of s takes the place of the coverage, which is not needed any more: this
+    stage waits for memory.
     """
     i, lane = wp.tid()
     tile = first + i
@@ -117,10 +117,12 @@ def composite_backward(
             alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, one - alpha))
             t = t - seen
             if not full:
-                # The sign of the coverage, 0 at 0 and at both ends.
-                slope = wp.min(wp.max(STEEP * signed, -one), one)
-                slope = wp.cw_mul(slope, wp.min(STEEP * (one - covered), one))
-                coverage_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
+                # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.
+                slope = one - covered
+                if product == 0:
+                    slope = wp.min(STEEP * slope, one)
+                    slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
+                sum_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
             red_grad = wp.cw_mul(seen, red)
             green_grad = wp.cw_mul(seen, green)
             blue_grad = wp.cw_mul(seen, blue)

@@ -262,7 +262,7 @@ def fill_backward(
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
-    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the signed coverage; by column
+    sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the area, not clamped; by column
     # Out:
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts here
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
@@ -332,7 +332,7 @@ def fill_backward(
             slot = base_slot + (row / TILE - tile_y0) * wide + x / TILE - tile_x0
             p = TILE * (x % TILE) + row % TILE
             if slot_state[slot] == PARTIAL:
-                g = coverage_grad[slot, p] * (s_next - s)
+                g = sum_grad[slot, p] * (s_next - s)
                 move = wp.vec2(-d[1] * g, d[0] * g)
                 middle = 0.5 * (s + s_next)
                 at_start += (1.0 - middle) * move

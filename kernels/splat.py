@@ -122,15 +122,14 @@ def splat_backward(
     mean: wp.array[wp.vec2],  # [gaussian_capacity]
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
     extent: wp.array[wp.vec2],  # [gaussian_capacity]
-    coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    coverage_grad: wp.array2d[column],  # [slot_capacity, TILE]
+    sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
     # Out:
     mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
     conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] written
 ):
     """A gather, one thread a Gaussian, over the pixels it reaches.
 
-    d coverage / d g = (1 - coverage) / (1 - g) and dg / dq = -g / 2 below the clamp; with h = dL/dq:
+    s = -sum_i log(1 - g_i), ds / dg = 1 / (1 - g) and dg / dq = -g / 2 below the clamp; with h = dL/dq:
     dL/d(a, b, c) = sum h (dx^2, 2 dx dy, dy^2), dL/d mean = -sum 2 h (a dx + b dy, b dx + c dy).
     """
     i = first + wp.tid()
@@ -168,7 +167,7 @@ def splat_backward(
                     dx = float(x) + 0.5 - m[0]
                     g = gaussian_column(con, dx, dy)
                     below = wp.min(wp.max(STEEP * (GAUSSIAN_MAX * one - g), zero), one)
-                    h = wp.cw_mul(wp.cw_mul(coverage_grad[s, k], one - coverage[s, k]), wp.cw_mul(below, g))
+                    h = wp.cw_mul(sum_grad[s, k], wp.cw_mul(below, g))
                     h = -0.5 * wp.cw_div(h, one - wp.min(g, GAUSSIAN_MAX * one))
                     h_dy = wp.cw_mul(h, dy)
                     sum_x = sum_x + dx * h

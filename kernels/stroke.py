@@ -283,7 +283,7 @@ def stroke_backward(
     part_tiles: wp.array2d[wp.int32],  # [part_count, 4]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS]
-    coverage_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] by column
+    sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] 0 where the coverage is 0 or 1
     # Out:
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the segment that starts here
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
@@ -324,7 +324,7 @@ def stroke_backward(
                 p = TILE * (x % TILE) + y % TILE
                 g = float(0.0)
                 if slot_state[slot] == PARTIAL:
-                    g = coverage_grad[slot, p]
+                    g = sum_grad[slot, p]
                 # No gradient, no segment: the array is kept only where the coverage is neither 0 nor 1.
                 if g != 0.0 and segment[slot, p] == i:
                     centre = wp.vec2(float(x) + 0.5, float(y) + 0.5)

@@ -48,8 +48,8 @@ class TileRenderer(ABC):
     items_per_part: int
     """First guess of the need."""
 
-    coverage_kept = True
-    """Whether the adjoint of the coverage needs the coverage; if not, its gradient takes its place."""
+    product: int
+    """1 where a coverage is 1 - exp(-s), 0 where it is |s|, clamped at 1."""
 
     def __init__(
         self,
@@ -115,10 +115,9 @@ class TileRenderer(ABC):
         self.slot_state = self.ints(slots)
         self.tile_stop, self.list_slot = self.ints(tiles), self.ints(slots)
         self.list_paint = self.vectors(wp.vec4, slots)
-        self.coverage, self.coverage_columns = self._tile_array(slots)
-        self.coverage_grad, self.coverage_grad_columns = self.coverage, self.coverage_columns
-        if self.coverage_kept:
-            self.coverage_grad, self.coverage_grad_columns = self._tile_array(slots)
+        # A tile of floats for each slot, as pixels and, in the same memory, as columns.
+        self.coverage = self.floats(slots, constants.TILE_PIXELS)
+        self.coverage_columns = view(self.coverage, column, (slots, TILE))
         # Sums over a tile: columns where a thread has the tile, else one number a lane.
         self.slot_columns = self.columns(slots if self.lanes == 1 else 1, 4)
         self.slot_grad = wp.zeros(
@@ -128,11 +127,6 @@ class TileRenderer(ABC):
     def columns(self, *shape: int) -> wp.array:
         """A zeroed array of columns of a tile."""
         return wp.zeros(shape, dtype=column, device=self.device)
-
-    def _tile_array(self, slots: int) -> tuple[wp.array, wp.array]:
-        """A tile of floats for each slot, as pixels and, in the same memory, as columns."""
-        pixels = self.floats(slots, constants.TILE_PIXELS)
-        return pixels, view(pixels, column, (slots, TILE))
 
     @abstractmethod
     def _allocate_items(self) -> None:
@@ -148,7 +142,7 @@ class TileRenderer(ABC):
 
     @abstractmethod
     def _record_coverage_backward(self, program: Program) -> None:
-        """``coverage_grad`` -> gradients of points and widths."""
+        """The gradient of s, now in ``coverage`` -> gradients of points and widths."""
 
     def _record_ranges(self, program: Program) -> None:
         """``part_items`` -> ``part_first``, ``part_last``."""
@@ -229,8 +223,8 @@ class TileRenderer(ABC):
         program.add(
             composite.composite_backward,
             (self.tiles_x * self.tiles_y, self.lanes),
-            [*self._composite_inputs(), self.image, self.image_grad],
-            [self.coverage_grad_columns, self.slot_columns, self.slot_grad],
+            [*self._composite_inputs(), self.product, self.image, self.image_grad],
+            [self.coverage_columns, self.slot_columns, self.slot_grad],
             split=True,
         )
         program.add(

@@ -14,7 +14,7 @@ class ExactRenderer(TileRenderer):
 
     items_per_part = 48
 
-    coverage_kept = False
+    product = 0
 
     def _allocate_items(self) -> None:
         parts, vertices = self.parameters.part_count, self.capacity.items
@@ -88,7 +88,7 @@ class ExactRenderer(TileRenderer):
                 fill.fill_backward,
                 vertices,
                 [self.width, self.height, self.vertex_part, self.part_ends]
-                + [self.part_first, self.part_last, *slots, self.coverage_grad],
+                + [self.part_first, self.part_last, *slots, self.coverage],
                 [self.start_grad, self.end_grad],
                 split=True,
             )
@@ -98,7 +98,7 @@ class ExactRenderer(TileRenderer):
                 vertices,
                 [self.width, self.height, p.opacity_count, p.widths, self.scale]
                 + [self.vertex_part, self.part_ends]
-                + [self.part_first, self.part_last, *slots, self.segment, self.coverage_grad],
+                + [self.part_first, self.part_last, *slots, self.segment, self.coverage],
                 [self.start_grad, self.end_grad, self.half_grad],
                 split=True,
             )

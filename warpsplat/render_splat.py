@@ -19,6 +19,7 @@ class SplatRenderer(TileRenderer):
     """
 
     items_per_part = 64
+    product = 1
 
     def __init__(
         self,
@@ -96,7 +97,7 @@ class SplatRenderer(TileRenderer):
             splat.splat_backward,
             gaussians,
             [self.gaussian_part, self.slot_first, self.slot_last, self.slot_state, self.part_tiles]
-            + [self.mean, self.conic, self.extent, self.coverage_columns, self.coverage_grad_columns],
+            + [self.mean, self.conic, self.extent, self.coverage_columns],
             [self.mean_grad, self.conic_grad],
             split=True,
         )

@@ -45,13 +45,13 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
     # Compositing leaves no gradient in the padding of the tiles.
     inside = renderer.inside.numpy().reshape(-1, TILE_PIXELS)
     coverage_grad *= inside[np.minimum(renderer.slot_tile.numpy(), len(inside) - 1)]
-    renderer.coverage_grad.assign(coverage_grad)
+    renderer.coverage.assign(coverage_grad * (1 - renderer.coverage.numpy()))
     wp.launch(
         splat.splat_backward,
         dim=renderer.capacity.items,
         inputs=[0, renderer.gaussian_part, renderer.slot_first, renderer.slot_last, renderer.slot_state]
         + [renderer.part_tiles, renderer.mean, renderer.conic, renderer.extent]
-        + [renderer.coverage_columns, renderer.coverage_grad_columns],
+        + [renderer.coverage_columns],
         outputs=[renderer.mean_grad, renderer.conic_grad],
         device=device,
     )
