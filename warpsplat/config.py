@@ -85,7 +85,7 @@ class Settings:
     """Weight of 1 - SSIM beside the mean squared error."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
-    bending: float = 3e-4
+    bending: float = 5e-4
     """Weight of the bending of the cubics [squared error of a pixel, summed over channels, per pixel]: burrs
     and loops that do not lower the error straighten."""
     fold_start: float = 0.2
