@@ -87,7 +87,8 @@ def vectorize(
         settings = replace(settings, curves=affordable_curves(settings))
     trainer = Trainer(target, settings, device, threads=threads, scene=scene)
     if settings.time_budget:
-        trainer.size_to(settings.time_budget - TAIL_SECONDS - (time.monotonic() - started))
+        tail = TAIL_SECONDS + TAIL_PER_PIXEL * target.shape[0] * target.shape[1]
+        trainer.size_to(settings.time_budget - tail - (time.monotonic() - started))
     scene = trainer.run(report, stop)
 
     svg = export(scene, settings, metadata)
@@ -112,8 +113,9 @@ def vectorize(
     )
 
 
-TAIL_SECONDS = 0.5
-"""Of a time budget: what exporting and scoring take."""
+TAIL_SECONDS = 0.3
+TAIL_PER_PIXEL = 1.5e-6
+"""Of a time budget: what the last step, exporting and scoring take [s]."""
 
 
 def affordable_curves(settings: Settings) -> int:
