@@ -13,6 +13,12 @@ Conventions, here once:
   column``. Columns run along the curve, rows across it.
 * A *slot* is one (part, tile) pair. The slots of a part are the tiles of its bounding rectangle, row by
   row, parts from the front to the back, so that the slot of a pixel is found by arithmetic.
+* Pixels lie by tiles, and in a tile by columns: an image is [tile, channel, column], a coverage [slot,
+  column], each element a vector of the 16 pixels from top to bottom (``tile.column``). Kernels that go pixel
+  by pixel have the same memory as [slot, 16 x column + row].
+* The state of a slot says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there is
+  a coverage to read; HIDDEN ones are on no list.
+* A CPU gives a thread a whole tile (one lane); a GPU has 16 lanes a tile, each a row or a column.
 * Gradients are named after their value with ``_grad``. No kernel adds floats atomically: each output
   element has one writer, so results are the same bits on every run of one device, and a launch may be cut
   into pieces (``first`` is the index of a piece's first thread) that run on different CPU threads.
@@ -22,5 +28,6 @@ Data flow of a step (forward, then its adjoint in reverse order)::
     points, widths  --sample-->  grid positions  --gaussian-->  mean, conic, extent
                     --bin-->     slots sorted by tile, front to back
                     --splat-->   coverage per slot and pixel (1 - product of 1 - g)
+    points          --flatten--> vertices, --bin-->, --fill--> or --stroke--> coverage
                     --composite--> image    --loss-->  image_grad    --adam--> new parameters
 """
