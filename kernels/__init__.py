@@ -16,8 +16,8 @@ Conventions, here once:
 * Pixels lie by tiles, and in a tile by columns: an image is [tile, channel, column], a coverage [slot,
   column], each element a vector of the 16 pixels from top to bottom (``tile.column``). Kernels that go pixel
   by pixel have the same memory as [slot, 16 x column + row].
-* The state of a slot says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there is
-  a coverage to read; HIDDEN ones are on no list.
+* The state of a slot says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there
+  is a coverage to read; HIDDEN ones are on no list.
 * A CPU gives a thread a whole tile (one lane); a GPU has 16 lanes a tile, each a row or a column.
 * Gradients are named after their value with ``_grad``. No kernel adds floats atomically: each output
   element has one writer, so results are the same bits on every run of one device, and a launch may be cut

@@ -30,6 +30,11 @@ ITEM_LIMIT = 16_000_000
 """Most Gaussians or vertices (about 120 bytes each) before a scene is refused."""
 
 
+def lanes_on(device: wp.Device) -> int:
+    """Threads a tile: a GPU gives each row or column one; a CPU keeps a tile in one thread's cache."""
+    return 1 if device.is_cpu else TILE
+
+
 @dataclass(frozen=True)
 class Capacity:
     """Sizes of the arrays whose need depends on the scene."""
@@ -66,8 +71,7 @@ class TileRenderer(ABC):
         self.device = parameters.device
         self._threads = threads
         self.tiles_x, self.tiles_y = tile_counts(width, height)
-        # A GPU gives each row or column of a tile a thread; a CPU keeps a tile in one thread's cache.
-        self.lanes = 1 if self.device.is_cpu else TILE
+        self.lanes = lanes_on(self.device)
         self.lane_size = TILE // self.lanes
         tiles = self.tiles_x * self.tiles_y
         self.image = self.columns(tiles, 3, TILE)

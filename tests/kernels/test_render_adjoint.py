@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
+import warp as wp
 
 from tests.kernels.helpers import reference_image, relative_error, renderer_for
 from tests.scenes import random_scene
+from warpsplat.kernels.tile import column
+from warpsplat.parameters import Parameters
+from warpsplat.render import make_renderer
 from warpsplat.scene import Kind
+from warpsplat.tiles import to_tiles
 
 CASES = [
     ("closed", 1, 1, 1.0),
@@ -40,3 +47,26 @@ def test_image_and_gradients(
         gradient = p[name].grad
         assert gradient is not None
         assert relative_error(got[name], gradient.numpy()) < 1e-3, name
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+@pytest.mark.parametrize("name", ["exact", "splat"])
+def test_sixteen_lanes_do_what_one_does(
+    device: str, kind: Kind, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The division of a tile among a GPU's threads, on any device."""
+    scene = random_scene(kind, count=30, width=90, height=70, seed=4)
+    scene = replace(scene, points=(1.5 * scene.points).astype(np.float32))
+    weights = np.random.default_rng(0).normal(size=(70, 90, 3)).astype(np.float32)
+    target = wp.array(to_tiles(np.abs(weights)), dtype=column, device=device)
+    outcomes = []
+    for lanes in (1, 16):
+        monkeypatch.setattr("warpsplat.render.lanes_on", lambda _, lanes=lanes: lanes)
+        renderer = make_renderer(name, Parameters(scene, wp.get_device(device)), 90, 70, 1.0)
+        renderer.forward_complete()
+        costs = renderer.removal_costs(target)
+        renderer.write_image_grad(weights)
+        renderer.backward()
+        outcomes.append([renderer.read_image(), costs, *renderer.parameters.gradients().values()])
+    for one, many in zip(*outcomes, strict=True):
+        assert relative_error(many, one) < 2e-5
