@@ -41,7 +41,7 @@ def command(
     settings from the same image, is not made again.
     """
     from warpsplat.batch import load_jobs
-    from warpsplat.cli.run import Interrupt, run_file
+    from warpsplat.cli.run import MISSED, Interrupt, run_file
     from warpsplat.cli.vectorize import summary
     from warpsplat.device import choose_device, start_warp
 
@@ -97,3 +97,5 @@ def command(
         sys.exit(130)
     if failed:
         sys.exit(FAILED)
+    if any(r.get("missed") for r in results):
+        sys.exit(MISSED)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +38,7 @@ def command(
     widths move. A result that is no better is not taken.
     """
     settings = make_settings(**given)
-    from warpsplat.cli.run import Interrupt, progress_bar
+    from warpsplat.cli.run import Interrupt, leave, progress_bar
     from warpsplat.cli.vectorize import summary
     from warpsplat.device import choose_device, start_warp
     from warpsplat.files import check_output, write_atomically
@@ -60,5 +59,4 @@ def command(
         click.echo(json.dumps(values))
     elif not quiet:
         click.echo(f"{summary(output, values)} (before: {before:.2f} dB)")
-    if result.stopped:
-        sys.exit(130)
+    leave(result)

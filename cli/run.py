@@ -17,6 +17,10 @@ from warpsplat.pipeline import Result, vectorize_file
 from warpsplat.train import Progress
 
 
+MISSED = 6
+"""Exit code when the file is written but a goal was missed."""
+
+
 class Interrupt:
     """Turns the first Ctrl-C into a wish to stop; a second one ends the program at once."""
 
@@ -96,3 +100,13 @@ def run_file(
         return vectorize_file(
             source, output, settings, device, threads=threads, report=report, stop=interrupt
         )
+
+
+def leave(result: Result) -> None:
+    """Name missed goals and end the program with the code for it, if there is one to give."""
+    for goal in result.missed:
+        click.echo(f"warpsplat: goal missed: {goal}", err=True)
+    if result.stopped:
+        sys.exit(130)
+    if result.missed:
+        sys.exit(MISSED)

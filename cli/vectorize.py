@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,6 @@ import click
 
 from warpsplat.cli.options import quality_options, run_options, settings_from
 from warpsplat.errors import ImageError
-
-MISSED = 6
-"""Exit code when the file is written but a goal was missed."""
 
 
 def summary(output: Path, values: dict[str, Any]) -> str:
@@ -61,7 +57,7 @@ def command(
     from warpsplat.files import check_output
 
     check_output(output, image)
-    from warpsplat.cli.run import run_file
+    from warpsplat.cli.run import leave, run_file
     from warpsplat.device import choose_device, start_warp
 
     start_warp()
@@ -73,9 +69,4 @@ def command(
         click.echo(json.dumps(values))
     elif not quiet:
         click.echo(summary(output, values))
-    for goal in result.missed:
-        click.echo(f"warpsplat: goal missed: {goal}", err=True)
-    if result.stopped:
-        sys.exit(130)
-    if result.missed:
-        sys.exit(MISSED)
+    leave(result)

@@ -173,3 +173,10 @@ def test_examples_are_valid(tmp_path: Path) -> None:
         copy = tmp_path / file.name
         copy.write_text(file.read_text())
         assert load_jobs(copy)
+
+
+def test_missed_goals_have_their_exit_code(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "jobs: [{images: in/a.png, curves: 3, iterations: 3, target-psnr: 90, output: out, device: cpu}]"
+    assert run("batch", write(folder, text)) == 6
+    assert "goal missed: target-psnr 90 dB" in capsys.readouterr().err
+    assert (folder / "out/a.svg").exists()
