@@ -16,7 +16,6 @@ from warpsplat.config import Settings
 from warpsplat.pipeline import Result, vectorize_file
 from warpsplat.train import Progress
 
-
 MISSED = 6
 """Exit code when the file is written but a goal was missed."""
 
