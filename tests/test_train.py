@@ -11,8 +11,11 @@ import warp as wp
 
 from warpsplat.config import Density, Renderer, make_settings
 from warpsplat.image import load_image
+from warpsplat.metrics import on_white, psnr, render_svg
 from warpsplat.pipeline import vectorize
+from warpsplat.render import Capacity
 from warpsplat.scene import FloatArray, Kind
+from warpsplat.svg import export
 from warpsplat.train import Progress, Trainer, phases
 
 CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
@@ -148,3 +151,20 @@ def test_max_bytes_is_kept(device: str) -> None:
         assert len(result.scene) >= limit // 300 - 1
     tiny = vectorize(picture(), replace(settings, max_bytes=50), wp.get_device(device))
     assert "max-bytes 50" in tiny.missed[0]
+
+
+def test_a_look_at_the_file_that_outgrows_the_arrays(device: str) -> None:
+    """The step is recorded anew, and its loss is then that of the file."""
+    settings = make_settings(curves=20, iterations=100)
+    trainer = Trainer(picture(), settings, wp.get_device(device), threads=1)
+    trainer.enter(phases(settings, 64, 48)[-1])
+    assert trainer.renderer
+    trainer.renderer.capacity = Capacity(40, 9)
+    trainer.renderer.rebuild()
+    before = trainer.graph
+    trainer._look()
+    assert trainer.graph is not before
+    assert trainer.renderer.capacity.slots > 9
+    shown = on_white(render_svg(export(trainer.scene(), settings)))
+    trainer.advance()
+    assert trainer.psnr() == pytest.approx(psnr(shown, picture().astype(np.float64) * 255), abs=0.01)

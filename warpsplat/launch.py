@@ -54,6 +54,8 @@ class Program:
         """``threads``: of a CPU; default all. Where no thread can be started, the caller's does the work."""
         self.device = device
         self.launches: list[Launch] = []
+        # Recorded launches hold addresses only.
+        self._arrays: list[tuple[Sequence[Any], Sequence[Any]]] = []
         self.stage = ""
         """Names what is added from now on, for ``run_timed``."""
         self.threads = max(1, threads or available_cores()) if device.is_cpu else 1
@@ -75,6 +77,7 @@ class Program:
         count = self.threads * PIECES_PER_THREAD if split and self.threads > 1 else 1
         count = min(count, shape[0])
         borders = [shape[0] * i // count for i in range(count + 1)]
+        self._arrays.append((inputs, outputs))
         pieces: list[Callable[[], None]] = []
         for start, stop in itertools.pairwise(borders):
             command = wp.launch(

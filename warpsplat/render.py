@@ -310,11 +310,14 @@ class TileRenderer(ABC):
         self.rebuild()
         return True
 
-    def forward_complete(self) -> None:
-        """Render, growing until everything fits."""
+    def forward_complete(self) -> bool:
+        """Render, growing until everything fits; whether it had to grow, and so has other arrays now."""
         self.forward()
+        grown = False
         while self.grow():
+            grown = True
             self.forward()
+        return grown
 
 
 def make_renderer(

@@ -167,7 +167,7 @@ class Trainer:
 
     def _record_update(self) -> Program:
         p, s = self.parameters, self.settings
-        program = Program(self.device, 1)
+        program = Program(self.device, self.threads)
         program.stage = "update"
         curve_loss = wp.zeros(p.curve_count, dtype=wp.float32, device=self.device)
         if s.xing > 0:
@@ -203,6 +203,7 @@ class Trainer:
                 group.value.shape,
                 [group.grad, p.ages, self.clock, s.iterations, rate, s.rates.final, low, high],
                 [group.value, group.moment1, group.moment2],
+                split=True,
             )
         return program
 
@@ -259,7 +260,8 @@ class Trainer:
         the file, its gradient that of the render (a straight-through estimator, Bengio et al. 2013).
         """
         assert self.renderer
-        self.renderer.forward_complete()
+        if self.renderer.forward_complete():
+            self._assemble()
         size = {"width": self.renderer.width, "height": self.renderer.height}
         shown = on_white(render_svg(export(self.scene(), self.settings), **size)) / 255
         aim = self.small - (shown - self.renderer.read_image())
