@@ -75,6 +75,23 @@ def test_self_overlap_and_off_canvas(device: str, seed: int) -> None:
     compare(replace(strokes, points=points), device, tolerance=3e-3)
 
 
+@pytest.mark.parametrize("step", [8, 16])
+@pytest.mark.parametrize("seed", range(5))
+def test_edges_on_the_borders_of_tiles(device: str, step: int, seed: int) -> None:
+    """Straight outlines with corners on a grid, on and off the canvas: what decides a slot's state."""
+    rng = np.random.default_rng(seed)
+    scene = random_scene("closed", count=4, width=64, height=64, seed=seed)
+    corners = step * rng.integers(-2, 64 // step + 3, (4, 4, 2)).astype(np.float32)
+    corners[0, 1::2, 0] = corners[0, ::2, 0]
+    following = np.roll(corners, -1, axis=1)
+    sides = [(1 - t) * corners + t * following for t in (0, 1 / 3, 2 / 3)]
+    straight = replace(scene, points=np.stack(sides, axis=2).reshape(4, 12, 2).astype(np.float32))
+    renderer = exact(straight, device)
+    pieces = np.diff(renderer.cubic_first.numpy(), axis=1).tolist()
+    image = reference_exact.render(straight, reference.tensors(straight), pieces, 64, 64, 1.0)
+    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=1e-4)
+
+
 @pytest.mark.parametrize("kind", ["closed", "open"])
 def test_finite_differences(device: str, kind: Kind) -> None:
     """No reference at all: the loss itself, a random direction in all points, central differences."""
