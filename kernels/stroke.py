@@ -216,8 +216,8 @@ def stroke_forward(
                 x0 = wp.max(left, int(wp.ceil(wp.max(span[0], -1.0) - 0.5)))
                 x1 = wp.min(right, int(wp.floor(wp.min(span[1], 1.0e8) + 0.5)))
                 if x0 < x1:
-                    slot_near[slot + (x0 - left) / TILE, lane] = 1
-                    slot_near[slot + (x1 - 1 - left) / TILE, lane] = 1
+                    for s in range(slot + (x0 - left) / TILE, slot + (x1 - 1 - left) / TILE + 1):
+                        slot_near[s, lane] = 1
                 for x in range(x0, x1):
                     s = slot + (x - left) / TILE
                     p = TILE * ((x - left) % TILE) + y - row_zero

@@ -75,6 +75,15 @@ def test_self_overlap_and_off_canvas(device: str, seed: int) -> None:
     compare(replace(strokes, points=points), device, tolerance=3e-3)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_strokes_wider_than_tiles(device: str, seed: int) -> None:
+    """A row of pixels near one segment may span many tiles; some are covered throughout."""
+    scene = random_scene("open", count=3, width=120, height=90, seed=seed)
+    wide = replace(scene, widths=np.array([30, 55, 80], np.float32))
+    compare(wide, device, tolerance=3e-3)
+    assert constants.FULL in exact(wide, device).slot_state.numpy()
+
+
 @pytest.mark.parametrize("step", [8, 16])
 @pytest.mark.parametrize("seed", range(5))
 def test_edges_on_the_borders_of_tiles(device: str, step: int, seed: int) -> None:
