@@ -25,7 +25,7 @@ FAILED = 5
 def command(
     jobs: Path, device: str | None, threads: int | None, verbose: int, quiet: bool, as_json: bool
 ) -> None:
-    r"""Vectorize the images that the YAML file JOBS lists.
+    """Vectorize the images that the YAML file JOBS lists.
 
     \b
     defaults:
@@ -39,7 +39,7 @@ def command(
     Paths are relative to the file. An image that fails is reported and the
     rest are done (exit 5). A result that is there already, made by the same
     settings from the same image, is not made again.
-    """
+    """  # noqa: D301
     from warpsplat.batch import load_jobs
     from warpsplat.cli.run import MISSED, Interrupt, run_file
     from warpsplat.cli.vectorize import summary

@@ -48,12 +48,12 @@ class LazyGroup(click.Group):
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="warpsplat")
 def cli() -> None:
-    r"""Turn raster images into SVGs of Bézier shapes by gradient descent.
+    """Turn raster images into SVGs of Bézier shapes by gradient descent.
 
     \b
     Exit codes: 0 done, 2 wrong usage, 3 unreadable image, 4 result could not
     be written, 5 some images of a batch failed, 6 a goal was missed, 130 interrupted.
-    """
+    """  # noqa: D301
 
 
 def main(arguments: list[str] | None = None) -> Any:

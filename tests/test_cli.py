@@ -56,8 +56,9 @@ def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for name in ("vectorize", "batch", "render", "info"):
+    for name in ("vectorize", "batch", "render", "bench", "info"):
         assert name in done.stdout
+    assert "\\b" not in done.stdout
 
 
 def test_a_run_never_imports_torch(image: Path, tmp_path: Path) -> None:

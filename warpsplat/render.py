@@ -25,7 +25,7 @@ TILE = constants.TILE
 GROWTH = 1.5
 """Capacity over need when an array has to grow, so that a growing scene seldom does."""
 SLOT_LIMIT = 1_500_000
-"""Most slots (2 to 3 KiB each) before a scene is refused: about 4 GiB."""
+"""Most slots (1.3 KiB each, 2.4 for strokes) before a scene is refused: up to 3.5 GiB."""
 ITEM_LIMIT = 16_000_000
 """Most Gaussians or vertices (about 120 bytes each) before a scene is refused."""
 
