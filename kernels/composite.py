@@ -89,6 +89,7 @@ def composite_backward(
     stop = tile_stop[tile]
     one = column(1.0)
     zero = column(0.0)
+    least = column(TINY)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
         red = image_grad[tile, 0, x]
         green = image_grad[tile, 1, x]
@@ -114,7 +115,7 @@ def composite_backward(
             behind = behind - wp.cw_mul(alpha, share)
             # Where no light is left, only rounding is; Adam would make steps of it.
             lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
-            alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, one - alpha))
+            alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
             t = t - seen
             if not full:
                 # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.

@@ -68,6 +68,9 @@ PIECES_MIN = 3
 PIECES_MAX = 64
 """Bounds of the straight pieces of one cubic; 64 are enough for one as large as 8,000 px."""
 
+REACH_MAX = 1.0e7
+"""Largest distance [px] from the origin, and largest width of a stroke; what is beyond is moved there."""
+
 COVERED = 1
 UNCOVERED = 2
 """States of a slot are sums: some of its pixels are covered, some are not (wholly)."""

@@ -20,6 +20,7 @@ TILE = wp.constant(constants.TILE)
 FULL = wp.constant(constants.FULL)
 PARTIAL = wp.constant(constants.PARTIAL)
 UNCOVERED = wp.constant(constants.UNCOVERED)
+FLAT = wp.constant(1.0e-30)  # [px] an edge that rises less is horizontal: its slope would not be finite
 MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
 MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as touching it
 
@@ -92,7 +93,7 @@ def fill_states(
         if wp.min(a[1], b[1]) <= high and wp.max(a[1], b[1]) >= low:
             x0 = a[0]
             x1 = b[0]
-            if a[1] != b[1]:
+            if wp.abs(a[1] - b[1]) > FLAT:
                 slope = (b[0] - a[0]) / (b[1] - a[1])
                 x0 = a[0] + slope * (wp.clamp(a[1], low, high) - a[1])
                 x1 = a[0] + slope * (wp.clamp(b[1], low, high) - a[1])
@@ -183,7 +184,7 @@ def fill_forward(
             b = a
             a = second
             sign = -1.0
-        if b[1] > low and a[1] < high and b[1] > a[1]:
+        if b[1] > low and a[1] < high and b[1] - a[1] > FLAT:
             slope = (b[0] - a[0]) / (b[1] - a[1])
             y_top = wp.max(a[1], low)
             y_bottom = wp.min(b[1], high)
@@ -196,7 +197,7 @@ def fill_forward(
                 dy = y_next - y_top
                 x_next = x_top + dy * slope
                 row = y - TILE * tile_y
-                x_low = wp.max(wp.min(x_top, x_next), 0.0)
+                x_low = wp.clamp(wp.min(x_top, x_next), 0.0, float(pixels))
                 x_high = wp.min(wp.max(x_top, x_next), float(pixels))
                 index = int(x_low)
                 height = sign * dy
@@ -272,6 +273,8 @@ def fill_backward(
     if i >= part_ends[part_ends.shape[0] - 1]:
         return
     part = vertex_part[i]
+    if i < part_first[part] or i >= part_last[part]:
+        return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     base_slot = slot_first[part]
@@ -331,7 +334,10 @@ def fill_backward(
             s_next = wp.max(s_next, s)
             slot = base_slot + (row / TILE - tile_y0) * wide + x / TILE - tile_x0
             p = TILE * (x % TILE) + row % TILE
-            if slot_state[slot] == PARTIAL:
+            # Rounding may take the walk a pixel beyond the part's tiles.
+            out = x < TILE * tile_x0 or x >= TILE * part_tiles[part, 2]
+            out = out or row < TILE * tile_y0 or row >= TILE * part_tiles[part, 3]
+            if not out and slot_state[slot] == PARTIAL:
                 g = sum_grad[slot, p] * (s_next - s)
                 move = wp.vec2(-d[1] * g, d[0] * g)
                 middle = 0.5 * (s + s_next)

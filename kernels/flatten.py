@@ -12,6 +12,7 @@ from warpsplat.kernels.bezier import cubic_weights
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+REACH_MAX = wp.constant(constants.REACH_MAX)
 FLATNESS = wp.constant(constants.FLATNESS)
 FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
 PIECES_MIN = wp.constant(constants.PIECES_MIN)
@@ -53,6 +54,14 @@ def plan_flatten(
     part_vertices[part] = vertices + 1 - closed
 
 
+@wp.func
+def within_reach(x: wp.float32) -> wp.float32:
+    """A coordinate that kernels may turn into an int: a file may hold any number."""
+    if not wp.isfinite(x):
+        return 0.0
+    return wp.clamp(x, -REACH_MAX, REACH_MAX)
+
+
 @wp.kernel
 def flatten_forward(
     # In:
@@ -84,7 +93,7 @@ def flatten_forward(
     p3 = scale * points[curve, (start + 3) % points.shape[1]]
     reach = float(0.0)
     if closed == 0:
-        reach = 0.5 * scale * widths[curve] + 1.0
+        reach = wp.min(0.5 * scale * widths[curve], REACH_MAX) + 1.0
     base = part_first[part] + cubic_first[part, cubic]
     pieces = cubic_first[part, cubic + 1] - cubic_first[part, cubic]
     count = pieces
@@ -93,7 +102,8 @@ def flatten_forward(
     for k in range(count):
         weights = cubic_weights(float(k) / float(pieces))
         vertex_part[base + k] = part
-        vertex[base + k] = weights[0] * p0 + weights[1] * p1 + weights[2] * p2 + weights[3] * p3
+        position = weights[0] * p0 + weights[1] * p1 + weights[2] * p2 + weights[3] * p3
+        vertex[base + k] = wp.vec2(within_reach(position[0]), within_reach(position[1]))
         extent[base + k] = wp.vec2(reach, reach)
 
 

@@ -21,7 +21,8 @@ TILE = wp.constant(constants.TILE)
 COVERED = wp.constant(constants.COVERED)
 UNCOVERED = wp.constant(constants.UNCOVERED)
 PARTIAL = wp.constant(constants.PARTIAL)
-FAR = wp.constant(1.0e9)
+REACH_MAX = wp.constant(constants.REACH_MAX)
+FAR = wp.constant(1.0e15)
 TINY = wp.constant(1.0e-12)
 FLAT = wp.constant(1.0e-4)
 HALF_DIAGONAL = wp.constant(0.70711)  # of a pixel: an edge further away does not cross it
@@ -174,7 +175,7 @@ def stroke_forward(
     local = slot - slot_first[part]
     if local % wide != 0:
         return
-    half = 0.5 * scale * widths[part / opacity_count]
+    half = wp.min(0.5 * scale * widths[part / opacity_count], REACH_MAX)
     reach = half + HALF_DIAGONAL
     # What is stored first is reach^2 - distance^2, 0 where nothing is near. From here on a pixel is covered.
     inside = float(FAR)
@@ -213,7 +214,7 @@ def stroke_forward(
             for y in range(y0, y1):
                 py = float(y) + 0.5 - a[1]
                 span = segment_span(a[0], py, ends, sides)
-                x0 = wp.max(left, int(wp.ceil(wp.max(span[0], -1.0) - 0.5)))
+                x0 = wp.max(left, int(wp.ceil(wp.clamp(span[0], -1.0, 1.0e8) - 0.5)))
                 x1 = wp.min(right, int(wp.floor(wp.min(span[1], 1.0e8) + 0.5)))
                 if x0 < x1:
                     for s in range(slot + (x0 - left) / TILE, slot + (x1 - 1 - left) / TILE + 1):
@@ -294,12 +295,14 @@ def stroke_backward(
     if i >= part_ends[part_ends.shape[0] - 1]:
         return
     part = vertex_part[i]
+    if i < part_first[part] or i >= part_last[part]:
+        return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     of_half = float(0.0)
     base_slot = slot_first[part]
     if slot_last[part] > base_slot and i + 1 < part_last[part]:
-        half = 0.5 * scale * widths[part / opacity_count]
+        half = wp.min(0.5 * scale * widths[part / opacity_count], REACH_MAX)
         reach = half + HALF_DIAGONAL
         tile_x0 = part_tiles[part, 0]
         tile_y0 = part_tiles[part, 1]
@@ -312,13 +315,18 @@ def stroke_backward(
         ends = segment_ends(e, length, over)
         sides = segment_sides(e, reach)
         rows = segment_rows(a, e, length, reach, over)
-        y0 = int(wp.ceil(wp.max(rows[0], 0.0) - 0.5))
-        y1 = wp.min(height, int(wp.floor(wp.min(rows[1], 1.0e8) + 0.5)))
+        # The rectangle's corners may lie outside the part's tiles, where it has no pixel.
+        left = TILE * tile_x0
+        right = wp.min(width, TILE * part_tiles[part, 2])
+        top = TILE * tile_y0
+        bottom = wp.min(height, TILE * part_tiles[part, 3])
+        y0 = wp.max(top, int(wp.ceil(wp.max(rows[0], 0.0) - 0.5)))
+        y1 = wp.min(bottom, int(wp.floor(wp.min(rows[1], 1.0e8) + 0.5)))
         for y in range(y0, y1):
             slot_row = base_slot + (y / TILE - tile_y0) * wide - tile_x0
             span = segment_span(a[0], float(y) + 0.5 - a[1], ends, sides)
-            x0 = int(wp.ceil(wp.max(span[0], 0.0) - 0.5))
-            x1 = wp.min(width, int(wp.floor(wp.min(span[1], 1.0e8) + 0.5)))
+            x0 = wp.max(left, int(wp.ceil(wp.clamp(span[0], 0.0, 1.0e8) - 0.5)))
+            x1 = wp.min(right, int(wp.floor(wp.min(span[1], 1.0e8) + 0.5)))
             for x in range(x0, x1):
                 slot = slot_row + x / TILE
                 p = TILE * (x % TILE) + y % TILE

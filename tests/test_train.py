@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpsplat.config import Density, Renderer, make_settings
+from warpsplat.config import QUALITIES, Density, Renderer, make_settings
 from warpsplat.image import load_image
 from warpsplat.metrics import on_white, psnr, render_svg
 from warpsplat.pipeline import vectorize
 from warpsplat.render import Capacity
 from warpsplat.scene import FloatArray, Kind
 from warpsplat.svg import export
+from warpsplat.tiles import from_tiles
 from warpsplat.train import Progress, Trainer, phases
 
 CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
@@ -168,3 +169,29 @@ def test_a_look_at_the_file_that_outgrows_the_arrays(device: str) -> None:
     shown = on_white(render_svg(export(trainer.scene(), settings)))
     trainer.advance()
     assert trainer.psnr() == pytest.approx(psnr(shown, picture().astype(np.float64) * 255), abs=0.01)
+
+
+@pytest.mark.parametrize(("width", "height"), [(61, 83), (83, 47), (20, 300)])
+def test_reduced_sizes_of_any_ratio(device: str, width: int, height: int) -> None:
+    """The file is looked at in exactly the geometry of the render, whatever the sides are rounded to."""
+    settings = make_settings(curves=6, iterations=100, coarse_pixels=900, fine_pixels=2000)
+    trainer = Trainer(picture(width, height), settings, wp.get_device(device))
+    trainer.enter(phases(settings, width, height)[-1])
+    trainer._look()
+    assert trainer.renderer
+    shift = from_tiles(trainer.device_target.numpy(), trainer.renderer.width, trainer.renderer.height)
+    inner = (shift - trainer.small)[1:-1, 1:-1]
+    assert np.abs(inner).mean() < 0.01
+    assert len(trainer.run()) == 6
+
+
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [(1080, 2400), (3000, 4000), (2480, 3508), (1920, 1080), (1200, 1600), (600, 8000), (8, 40000)],
+)
+def test_one_scale_serves_both_sides(width: int, height: int) -> None:
+    for quality in QUALITIES:
+        for phase in phases(make_settings(quality), width, height):
+            scale = phase.width / width
+            assert abs(height * scale - phase.height) < 0.5
+            assert phase.width * phase.height <= width * height

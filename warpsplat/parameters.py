@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +23,7 @@ class Group:
     @staticmethod
     def upload(value: FloatArray, moment1: FloatArray, moment2: FloatArray, device: wp.Device) -> Group:
         """Copy to ``device``; the gradient starts at 0."""
-        flat = [
-            np.ascontiguousarray(x.reshape(len(value), -1), np.float32) for x in (value, moment1, moment2)
-        ]
+        flat = [np.ascontiguousarray(x, np.float32) for x in (value, moment1, moment2)]
         arrays: list[wp.array] = [wp.array(x, dtype=wp.float32, device=device) for x in flat]
         return Group(arrays[0], wp.zeros_like(arrays[0]), arrays[1], arrays[2])
 
@@ -51,7 +50,8 @@ class Parameters:
         self._template = scene
         self.groups: dict[str, Group] = {}
         for name in NAMES:
-            value = np.asarray(getattr(scene, name), np.float32).reshape(len(scene), -1)
+            value = np.asarray(getattr(scene, name), np.float32)
+            value = value.reshape(len(scene), math.prod(value.shape[1:]))
             m1, m2 = moments[name] if moments else (np.zeros_like(value), np.zeros_like(value))
             self.groups[name] = Group.upload(value, m1, m2, self.device)
         self.ages: wp.array = wp.array(ages, dtype=wp.int32, device=self.device)

@@ -119,6 +119,12 @@ def export(scene: Scene, settings: Settings, metadata: str = "") -> str:
     return write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
 
 
+def resized(text: str, width: int, height: int, scale: float) -> str:
+    """A file written here, to be shown on ``width`` x ``height`` px at ``scale`` px a unit, not stretched."""
+    view = f'width="{width}" height="{height}" viewBox="0 0 {width / scale:.9g} {height / scale:.9g}"'
+    return re.sub(r'width="\d+" height="\d+" viewBox="[^"]*"', view, text, count=1)
+
+
 def read_metadata(text: str) -> str:
     """The metadata text of a file written here; empty if there is none."""
     found = re.search(r"<metadata>warpsplat (.*?)</metadata>", text[:1000])

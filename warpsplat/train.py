@@ -21,8 +21,11 @@ from warpsplat.metrics import on_white, render_svg
 from warpsplat.parameters import Parameters
 from warpsplat.render import TileRenderer, make_renderer
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.svg import export
+from warpsplat.svg import export, resized
 from warpsplat.tiles import to_tiles
+
+SIZE_CHOICES = 12
+"""How many lengths of the shorter side are tried for a reduced image."""
 
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
@@ -72,8 +75,16 @@ def phases(settings: Settings, width: int, height: int) -> list[Phase]:
     """Coarse, then fine, from ``settings.coarse`` of the iterations on; one where both are the same size."""
 
     def fit(pixels: int) -> tuple[int, int]:
-        scale = min(1.0, math.sqrt(pixels / (width * height)))
-        return max(1, round(width * scale)), max(1, round(height * scale))
+        if pixels >= width * height:
+            return width, height
+        # One scale serves both sides, so that of the sizes a little smaller the one is taken where the longer
+        # side is the nearest to a whole number: the largest of those that are equally near.
+        short, long = min(width, height), max(width, height)
+        most = max(1, round(short * math.sqrt(pixels / (width * height))))
+        choices = range(most, max(0, most - SIZE_CHOICES), -1)
+        best = min(choices, key=lambda n: round(abs(long * n / short - round(long * n / short)), 2))
+        other = round(long * best / short)
+        return (best, other) if width <= height else (other, best)
 
     coarse, fine = Phase(*fit(settings.coarse_pixels)), Phase(*fit(settings.fine_pixels))
     return [fine] if coarse == fine else [coarse, fine]
@@ -262,8 +273,9 @@ class Trainer:
         assert self.renderer
         if self.renderer.forward_complete():
             self._assemble()
-        size = {"width": self.renderer.width, "height": self.renderer.height}
-        shown = on_white(render_svg(export(self.scene(), self.settings), **size)) / 255
+        size = (self.renderer.width, self.renderer.height)
+        text = resized(export(self.scene(), self.settings), *size, self.scale)
+        shown = on_white(render_svg(text)) / 255
         aim = self.small - (shown - self.renderer.read_image())
         self.device_target.assign(to_tiles(np.asarray(aim, np.float32)))
 
@@ -334,15 +346,18 @@ class Trainer:
             if stop and stop():
                 self.interrupted = True
                 break
+            if self.step >= s.iterations or (s.time_budget and time.monotonic() > self._deadline):
+                break
             last = phase is plan[-1] and self.step >= s.density.stop * s.iterations
             if s.viewer and last and self.step % LOOK_INTERVAL == 0:
                 self._look()
             due = s.density.interval > 0 and self.step % s.density.interval == 0
             if due and s.time_budget and phase is plan[0]:
                 self._resize((time.monotonic() - started) / (self.step * self._costs[0]))
+                s = self.settings
+                self.update = self._record_update()
+                self._assemble()
             growing = not self.given and self.parameters.curve_count < s.curves
-            if due and (growing or self.step < s.density.stop * s.iterations):
-                self._surgery(self.step / self.settings.iterations)
-            if s.time_budget and time.monotonic() > self._deadline:
-                break
+            if due and self.step < s.iterations and (growing or self.step < s.density.stop * s.iterations):
+                self._surgery(self.step / s.iterations)
         return self.scene()

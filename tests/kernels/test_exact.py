@@ -188,6 +188,34 @@ def test_degenerate_shapes_do_no_harm(device: str, kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("kind", ["closed", "open"])
+@pytest.mark.parametrize("far", [3e9, 1e30, np.inf, np.nan])
+def test_numbers_of_any_size_do_no_harm(device: str, kind: Kind, far: float) -> None:
+    """A file may hold any number, in a point or a width."""
+    scene = random_scene(kind, count=4)
+    points, widths = scene.points.copy(), scene.widths.copy()
+    points[0, 3:6, 0] = far
+    points[1, 4, 1] = -far
+    points[2, 1:3] = far
+    widths[3] = min(far, 1e30) if kind == "open" else 0
+    renderer = exact(replace(scene, points=points, widths=widths), device)
+    renderer.write_image_grad(np.ones((renderer.height, renderer.width, 3), np.float32))
+    renderer.backward()
+    assert np.isfinite(renderer.read_image()).all()
+    assert np.isfinite(renderer.parameters.gradients()["colors"]).all()
+
+
+def test_opaque_shapes_and_none_at_all(device: str) -> None:
+    scene = random_scene("closed", count=6)
+    renderer = exact(replace(scene, opacities=np.ones_like(scene.opacities)), device)
+    renderer.write_image_grad(np.ones((renderer.height, renderer.width, 3), np.float32))
+    renderer.backward()
+    for gradient in renderer.parameters.gradients().values():
+        assert np.isfinite(gradient).all()
+    nothing = render(scene.take(np.arange(0)), device=device)
+    np.testing.assert_allclose(nothing, np.broadcast_to(scene.background, nothing.shape))
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
 def test_same_bits_for_any_number_of_threads(device: str, kind: Kind) -> None:
     scene = random_scene(kind, count=20, width=90, height=70, seed=2)
     outcomes = []
