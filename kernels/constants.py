@@ -13,6 +13,11 @@ GAUSSIAN_MIN = 1.0 / 255.0
 Q_MAX = -2.0 * math.log(GAUSSIAN_MIN)
 """The same cut as a squared Mahalanobis distance: exp(-Q_MAX / 2) = GAUSSIAN_MIN."""
 
+Q_INNER = 6.0
+"""The cut of all rows but the two outermost. There a pixel lies under a dozen Gaussians, so that what is cut
+off (g < 0.05) raises 1 - coverage by a seventh of its 0.015; and it is where inner rows would reach out of
+the shape."""
+
 GAUSSIAN_MAX = 0.99
 """Peak of one Gaussian. Below 1 so that 1 - g can divide in the adjoint; the clamp is the same forward and
 backward, and a clamped Gaussian has no gradient."""

@@ -24,6 +24,7 @@ SPREAD = wp.constant(constants.SPREAD)
 PIXEL_SIGMA = wp.constant(constants.PIXEL_SIGMA)
 EPSILON = wp.constant(constants.EPSILON)
 Q_MAX = wp.constant(constants.Q_MAX)
+Q_INNER = wp.constant(constants.Q_INNER)
 
 
 @wp.func
@@ -77,7 +78,8 @@ def gaussians_forward(
     mean: wp.array[wp.vec2],  # [capacity] px
     # Out:
     conic: wp.array[wp.vec3],  # [capacity] (a, b, c) of q = a dx^2 + 2 b dx dy + c dy^2, px^-2
-    extent: wp.array[wp.vec2],  # [capacity] px, half size of the box where q <= Q_MAX
+    extent: wp.array[wp.vec2],  # [capacity] px, half size of the box where q <= cut
+    cut: wp.array[wp.float32],  # [capacity] the q beyond which a Gaussian is 0
 ):
     """Scale, angle and inverse covariance (paper eq. 10 and 11) of each grid position."""
     i = first + wp.tid()
@@ -104,9 +106,13 @@ def gaussians_forward(
     ss = e[1] * e[1]
     cs = e[0] * e[1]
     conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
+    q_cut = float(Q_INNER)
+    if index < columns or index / columns == part_rows[part] - 1:
+        q_cut = Q_MAX
+    cut[i] = q_cut
     extent[i] = wp.vec2(
-        wp.sqrt(Q_MAX * (cc * variance_x + ss * variance_y)),
-        wp.sqrt(Q_MAX * (ss * variance_x + cc * variance_y)),
+        wp.sqrt(q_cut * (cc * variance_x + ss * variance_y)),
+        wp.sqrt(q_cut * (ss * variance_x + cc * variance_y)),
     )
 
 

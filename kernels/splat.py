@@ -1,7 +1,7 @@
 """Gaussians -> coverage of each slot, and the adjoint.
 
 Inside a part all Gaussians share colour and opacity, so their order does not matter:
-coverage = 1 - prod_i (1 - g_i), g_i = min(exp(-q_i / 2), GAUSSIAN_MAX), cut at q > Q_MAX (paper eq. 9 with
+coverage = 1 - prod_i (1 - g_i), g_i = min(exp(-q_i / 2), GAUSSIAN_MAX), cut at q > cut_i (paper eq. 9 with
 the opacity taken out of the product: it multiplies the coverage once, as fill-opacity does in the file).
 """
 
@@ -14,7 +14,6 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 
 TILE = wp.constant(constants.TILE)
 PARTIAL = wp.constant(constants.PARTIAL)
-Q_MAX = wp.constant(constants.Q_MAX)
 GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 EXPONENT = wp.constant(-0.5 / 256.0)
@@ -31,11 +30,11 @@ def rows_of_tile() -> column:
 
 @wp.func
 def gaussian_column(con: wp.vec3, dx: wp.float32, dy: column, c_dy: column, least: column) -> column:
-    """exp(-q / 2) at offsets (dx, dy) [px] from the mean, 0 beyond Q_MAX.
+    """exp(-q / 2) at offsets (dx, dy) [px] from the mean, 0 beyond the cut.
 
     exp(256 v) = exp(v)^256 with three terms of the series, which is right to 0.04 % where it is least, and
     nothing but vector instructions. ``con`` comes multiplied by EXPONENT, so that q becomes v; ``c_dy`` is
-    its third entry times dy, ``least`` the v of Q_MAX.
+    its third entry times dy, ``least`` the v of the cut.
     """
     one = column(1.0)
     v = wp.cw_mul(dy, c_dy + column(2.0 * con[1] * dx)) + column(con[0] * dx * dx)
@@ -66,6 +65,7 @@ def splat_forward(
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
     extent: wp.array[wp.vec2],  # [gaussian_capacity] px
+    cut: wp.array[wp.float32],  # [gaussian_capacity] of q
     # Out:
     coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
     slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
@@ -85,7 +85,6 @@ def splat_forward(
     top = float(TILE * (part_tiles[part, 1] + local / wide))
     one = column(1.0)
     most = column(GAUSSIAN_MAX)
-    least = column(EXPONENT * Q_MAX)
     rows = rows_of_tile()
     x = left + lane
     while x < right:
@@ -102,6 +101,7 @@ def splat_forward(
                 con = EXPONENT * conic[j]
                 dy = rows + column(top - m[1])
                 c_dy = con[2] * dy
+                least = column(EXPONENT * cut[j])
                 while x < stop:
                     s = slot + (x - left) / TILE
                     slot_state[s] = PARTIAL
@@ -128,6 +128,7 @@ def splat_backward(
     mean: wp.array[wp.vec2],  # [gaussian_capacity]
     conic: wp.array[wp.vec3],  # [gaussian_capacity]
     extent: wp.array[wp.vec2],  # [gaussian_capacity]
+    cut: wp.array[wp.float32],  # [gaussian_capacity] of q
     sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
     # Out:
     mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
@@ -158,7 +159,7 @@ def splat_backward(
         one = column(1.0)
         zero = column(0.0)
         most = column(GAUSSIAN_MAX)
-        least = column(EXPONENT * Q_MAX)
+        least = column(EXPONENT * cut[i])
         rows = rows_of_tile()
         sum_x = zero
         sum_y = zero

@@ -139,7 +139,7 @@ def pixel_centres(width: int, height: int) -> torch.Tensor:
 
 
 def gaussian_values(
-    mean: torch.Tensor, scale: torch.Tensor, angle: torch.Tensor, width: int, height: int
+    mean: torch.Tensor, scale: torch.Tensor, angle: torch.Tensor, cut: torch.Tensor, width: int, height: int
 ) -> torch.Tensor:
     """g of each Gaussian at each pixel, [n, height, width] (paper eq. 9 to 11), cut and clamped."""
     rotation = torch.stack(
@@ -150,14 +150,22 @@ def gaussian_values(
     d = pixel_centres(width, height)[None] - mean[:, None, None, :]
     q = torch.einsum("nhwi,nij,nhwj->nhw", d, inverse, d)
     g = torch.exp(-0.5 * q).clamp(max=k.GAUSSIAN_MAX)
-    return torch.where(q <= k.Q_MAX, g, torch.zeros_like(g))
+    return torch.where(q <= cut[:, None, None], g, torch.zeros_like(g))
+
+
+def cuts(grid: torch.Tensor) -> torch.Tensor:
+    """The q beyond which each Gaussian of a grid is 0, [n]: the outermost rows reach further."""
+    cut = torch.full(grid.shape[:2], k.Q_INNER)
+    cut[0], cut[-1] = k.Q_MAX, k.Q_MAX
+    return cut.reshape(-1)
 
 
 def coverage(
     grid: torch.Tensor, width: int, height: int, detach: bool = False, runs: int = 1
 ) -> torch.Tensor:
     """1 - prod (1 - g) over a part's Gaussians, [height, width]."""
-    return 1 - torch.prod(1 - gaussian_values(*gaussians(grid, detach, runs), width, height), dim=0)
+    g = gaussian_values(*gaussians(grid, detach, runs), cuts(grid), width, height)
+    return 1 - torch.prod(1 - g, dim=0)
 
 
 def composite(

@@ -43,6 +43,7 @@ class SplatRenderer(TileRenderer):
         self.gaussian_part, self.gaussian_across = self.ints(gaussians), self.floats(gaussians)
         self.mean = vectors(wp.vec2, gaussians)
         self.conic, self.extent = vectors(wp.vec3, gaussians), vectors(wp.vec2, gaussians)
+        self.cut = self.floats(gaussians)
         self.mean_grad, self.conic_grad = vectors(wp.vec2, gaussians), vectors(wp.vec3, gaussians)
         self.along_grad, self.across_grad = vectors(wp.vec2, gaussians), vectors(wp.vec2, gaussians)
         self.position_grad, self.column_grad = vectors(wp.vec2, gaussians), vectors(wp.vec2, gaussians)
@@ -74,7 +75,7 @@ class SplatRenderer(TileRenderer):
             gaussian.gaussians_forward,
             gaussians,
             [*self._grid_inputs(), self.mean],
-            [self.conic, self.extent],
+            [self.conic, self.extent, self.cut],
             split=True,
         )
         return self.mean, self.extent
@@ -84,7 +85,7 @@ class SplatRenderer(TileRenderer):
             splat.splat_forward,
             (self.capacity.slots, self.lanes),
             [self.lanes, self.slot_part, self.slot_first, self.part_tiles]
-            + [self.part_first, self.part_last, self.mean, self.conic, self.extent],
+            + [self.part_first, self.part_last, self.mean, self.conic, self.extent, self.cut],
             [self.coverage_columns, self.slot_state],
             split=True,
         )
@@ -97,7 +98,7 @@ class SplatRenderer(TileRenderer):
             splat.splat_backward,
             gaussians,
             [self.gaussian_part, self.slot_first, self.slot_last, self.slot_state, self.part_tiles]
-            + [self.mean, self.conic, self.extent, self.coverage_columns],
+            + [self.mean, self.conic, self.extent, self.cut, self.coverage_columns],
             [self.mean_grad, self.conic_grad],
             split=True,
         )

@@ -50,7 +50,7 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
         splat.splat_backward,
         dim=renderer.capacity.items,
         inputs=[0, renderer.gaussian_part, renderer.slot_first, renderer.slot_last, renderer.slot_state]
-        + [renderer.part_tiles, renderer.mean, renderer.conic, renderer.extent]
+        + [renderer.part_tiles, renderer.mean, renderer.conic, renderer.extent, renderer.cut]
         + [renderer.coverage_columns],
         outputs=[renderer.mean_grad, renderer.conic_grad],
         device=device,
@@ -60,7 +60,11 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
     for part, grid in enumerate(grids):
         mean, scale, angle = (x.detach().requires_grad_() for x in reference.gaussians(grid, runs=runs))
         cover = 1 - torch.prod(
-            1 - reference.gaussian_values(mean, scale, angle, renderer.width, renderer.height), 0
+            1
+            - reference.gaussian_values(
+                mean, scale, angle, reference.cuts(grid), renderer.width, renderer.height
+            ),
+            0,
         )
         np.testing.assert_allclose(got[part], cover.detach().numpy(), atol=2e-3)
         assert np.abs(got[part] - cover.detach().numpy()).mean() < 1e-5
