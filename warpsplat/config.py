@@ -185,7 +185,7 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 }
 """What each preset changes in the defaults."""
 
-SPLAT_SHARE = 0.4
+SPLAT_SHARE = 0.5
 """Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
 
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
