@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.options import threads_option
 from warpsplat.errors import OutputError, WarpsplatError
 
 FAILED = 5
@@ -18,7 +19,7 @@ FAILED = 5
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("jobs", type=click.Path(path_type=Path))
 @click.option("--device", help="Overrides the file's device.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]")
+@threads_option
 @click.option("-v", "--verbose", count=True, help="Say more, on stderr.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object at the end.")

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.options import threads_option
 from warpsplat.errors import UsageError
 
 
@@ -54,7 +55,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @click.option("--renderer", type=click.Choice(["exact", "splat"]), default="exact", show_default=True)
 @click.option("--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True)
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, or cuda:N.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]")
+@threads_option
 @click.option("--repeats", type=click.IntRange(1, 10_000), default=20, show_default=True, metavar="N")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, metavar="N")
 @click.option("-v", "--verbose", count=True, help="List the kernels as well.")

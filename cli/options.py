@@ -13,6 +13,14 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _defaults = Settings()
 
 
+threads_option = click.option(
+    "--threads",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="CPU threads; the result is the same for any number.  [default: all cores]",
+)
+
+
 def quality_options(function: Function) -> Function:
     """What decides the result."""
     options = [
@@ -55,12 +63,7 @@ def run_options(function: Function) -> Function:
             show_default=True,
             help="auto (a GPU if there is one), cpu, or cuda:N.",
         ),
-        click.option(
-            "--threads",
-            type=click.IntRange(min=1),
-            metavar="N",
-            help="CPU threads; the result is the same for any number.  [default: all cores]",
-        ),
+        threads_option,
         click.option("-v", "--verbose", count=True, help="Say more, on stderr."),
         click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
     ]

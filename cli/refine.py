@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import run_options
-from warpsplat.config import make_settings
+from warpsplat.config import Settings, make_settings
 
 
 @click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
@@ -18,7 +18,9 @@ from warpsplat.config import make_settings
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="SVG to write.")
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @click.option("--time-budget", metavar="TIME", help="Size the run to end within 60s, 2m ...")
-@click.option("--precision", type=int, default=1, show_default=True, metavar="N", help="Decimals.")
+@click.option(
+    "--precision", type=int, metavar="N", help=f"Decimals of coordinates.  [default: {Settings.precision}]"
+)
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(

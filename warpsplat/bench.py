@@ -100,10 +100,10 @@ def bench(
     kind: Kind,
     renderer: Any,
     device: wp.Device,
-    opacity: float = 0.9,
-    threads: int | None = None,
-    repeats: int = 20,
-    seed: int = 0,
+    opacity: float,
+    threads: int | None,
+    repeats: int,
+    seed: int,
 ) -> dict[str, Any]:
     """Time ``repeats`` steps after a warm-up. The scene stays as it is: all rates are 0.
 
