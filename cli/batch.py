@@ -10,10 +10,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import threads_option
-from warpsplat.errors import OutputError, WarpsplatError
-
-FAILED = 5
-"""Exit code when some images failed and the rest are done."""
+from warpsplat.errors import ExitCode, OutputError, WarpsplatError
 
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
@@ -42,7 +39,7 @@ def command(
     settings from the same image, is not made again.
     """  # noqa: D301
     from warpsplat.batch import load_jobs
-    from warpsplat.cli.run import MISSED, Interrupt, run_file
+    from warpsplat.cli.run import Interrupt, run_file
     from warpsplat.cli.vectorize import summary
     from warpsplat.device import choose_device, start_warp
 
@@ -95,8 +92,8 @@ def command(
         for r in failed:
             click.echo(f"  {r['error']}", err=True)
     if interrupt.requested:
-        sys.exit(130)
+        sys.exit(ExitCode.INTERRUPTED)
     if failed:
-        sys.exit(FAILED)
+        sys.exit(ExitCode.SOME_FAILED)
     if any(r.get("missed") for r in results):
-        sys.exit(MISSED)
+        sys.exit(ExitCode.GOAL_MISSED)

@@ -20,7 +20,8 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     The SVG is rendered at the image's size; transparency is on white.
     """
     from warpsplat.image import load_image
-    from warpsplat.metrics import read_svg_text, score_svg
+    from warpsplat.inspect_svg import read_svg_text
+    from warpsplat.metrics import score_svg
 
     target = load_image(image)
     try:

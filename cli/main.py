@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from warpsplat._version import __version__
-from warpsplat.errors import WarpsplatError
+from warpsplat.errors import ExitCode, WarpsplatError
 
 COMMANDS = {
     "vectorize": "Turn an image into an SVG.",
@@ -62,7 +62,7 @@ def main(arguments: list[str] | None = None) -> Any:
         sys.exit(cli.main(args=arguments, prog_name="warpsplat", standalone_mode=False) or 0)
     except click.exceptions.Abort:
         click.echo("warpsplat: interrupted", err=True)
-        sys.exit(130)
+        sys.exit(ExitCode.INTERRUPTED)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
@@ -79,7 +79,7 @@ def main(arguments: list[str] | None = None) -> Any:
         sys.exit(1)
     except OSError as error:
         click.echo(f"warpsplat: {error.filename or 'output'}: {error.strerror or error}", err=True)
-        sys.exit(4)
+        sys.exit(ExitCode.OUTPUT)
 
 
 if __name__ == "__main__":

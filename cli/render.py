@@ -19,7 +19,8 @@ def command(svg: Path, output: Path, scale: float) -> None:
     import math
 
     from warpsplat.files import check_output, write_atomically
-    from warpsplat.metrics import read_svg_text, render_svg, svg_size
+    from warpsplat.inspect_svg import read_svg_text
+    from warpsplat.viewer import render_svg, svg_size
 
     text = read_svg_text(svg)
     check_output(output, svg)

@@ -13,11 +13,9 @@ import click
 import warp as wp
 
 from warpsplat.config import Settings
+from warpsplat.errors import ExitCode
 from warpsplat.pipeline import Result, vectorize_file
 from warpsplat.train import Progress
-
-MISSED = 6
-"""Exit code when the file is written but a goal was missed."""
 
 
 class Interrupt:
@@ -106,6 +104,6 @@ def leave(result: Result) -> None:
     for goal in result.missed:
         click.echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.stopped:
-        sys.exit(130)
+        sys.exit(ExitCode.INTERRUPTED)
     if result.missed:
-        sys.exit(MISSED)
+        sys.exit(ExitCode.GOAL_MISSED)

@@ -20,7 +20,8 @@ from PIL import Image
 from tests.test_image import bad_files
 from warpsplat import __version__
 from warpsplat.cli.main import main
-from warpsplat.metrics import on_white, psnr, render_svg
+from warpsplat.metrics import psnr
+from warpsplat.viewer import on_white, render_svg
 
 QUICK = ["--curves", "8", "--iterations", "12", "--device", "cpu"]
 

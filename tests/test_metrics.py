@@ -7,8 +7,10 @@ from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import ImageError
-from warpsplat.metrics import count_nodes, ms_ssim, on_white, psnr, render_svg, score_svg, ssim
+from warpsplat.inspect_svg import count_nodes
+from warpsplat.metrics import ms_ssim, psnr, score_svg, ssim
 from warpsplat.svg import write_svg
+from warpsplat.viewer import on_white, render_svg
 
 
 def test_psnr() -> None:

@@ -15,10 +15,11 @@ from tests.scenes import random_scene
 from tests.test_cli import one_line, run
 from warpsplat.config import make_settings
 from warpsplat.errors import ImageError
-from warpsplat.metrics import on_white, psnr, render_svg
+from warpsplat.metrics import psnr
 from warpsplat.refine import load_scene, refine
 from warpsplat.render import render
 from warpsplat.svg import write_svg
+from warpsplat.viewer import on_white, render_svg
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" '
 FOREIGN = {

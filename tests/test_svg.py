@@ -14,10 +14,11 @@ from PIL import Image
 from tests.scenes import disc, random_scene
 from warpsplat.errors import ImageError
 from warpsplat.kernels.constants import PLATEAU
-from warpsplat.metrics import on_white, psnr, render_svg
+from warpsplat.metrics import psnr
 from warpsplat.render import render
 from warpsplat.scene import Kind
 from warpsplat.svg import hex_color, join_numbers, number, path_data, read_metadata, read_svg, write_svg
+from warpsplat.viewer import on_white, render_svg
 
 NUMBERS = [
     (0.0, 1, "0"),

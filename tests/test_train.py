@@ -11,13 +11,14 @@ import warp as wp
 
 from warpsplat.config import QUALITIES, Density, Renderer, make_settings
 from warpsplat.image import load_image
-from warpsplat.metrics import on_white, psnr, render_svg
+from warpsplat.metrics import psnr
 from warpsplat.pipeline import vectorize
 from warpsplat.render import Capacity
 from warpsplat.scene import FloatArray, Kind
 from warpsplat.svg import export
 from warpsplat.tiles import from_tiles
 from warpsplat.train import Progress, Trainer, phases
+from warpsplat.viewer import on_white, render_svg
 
 CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
 

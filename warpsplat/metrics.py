@@ -6,48 +6,18 @@ All figures are taken in 8-bit sRGB from a render by resvg, an independent rende
 from __future__ import annotations
 
 import gzip
-import io
-import re
-import zlib
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-import resvg_py
-from PIL import Image
 
 from warpsplat.errors import ImageError
+from warpsplat.inspect_svg import DRAWN, count_nodes
+from warpsplat.viewer import Pixels, on_white, render_svg
 
-Pixels = npt.NDArray[np.float64]
 SSIM_WINDOW = 11
-DRAWN = re.compile(rb"<(?:path|circle|ellipse|polygon|polyline|line)\b")
-
-
-def render_svg(
-    text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
-) -> Image.Image:
-    """Render SVG text with resvg, at its own size, at a size in px, or magnified by ``zoom``.
-
-    Raises:
-        ImageError: resvg does not accept the text.
-    """
-    try:
-        png = resvg_py.svg_to_bytes(
-            svg_string=text, width=width, height=height, zoom=zoom, dpi=96.0, skip_system_fonts=True
-        )
-    except ValueError as error:
-        raise ImageError(f"cannot be rendered: {str(error).splitlines()[0]}") from error
-    return Image.open(io.BytesIO(bytes(png)))
-
-
-def on_white(image: Image.Image) -> Pixels:
-    """RGB in 0..255, shape (height, width, 3), transparency composited on white."""
-    rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
-    alpha = rgba[..., 3:] / 255.0
-    return np.asarray(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha))
 
 
 def psnr(a: Pixels, b: Pixels) -> float:
@@ -104,24 +74,6 @@ def ms_ssim(a: Pixels, b: Pixels) -> float | None:
     return value
 
 
-PATH_DATA = re.compile(r"<path\b[^>]*?\sd=[\"']([^\"']*)")
-COMMAND = re.compile(r"([a-zA-Z])([^a-zA-Z]*)")
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
-ARGUMENTS = {"m": 2, "l": 2, "t": 2, "h": 1, "v": 1, "s": 4, "q": 4, "c": 6, "a": 7}
-"""Numbers that each node of a path command takes (SVG 1.1 section 8.3)."""
-
-
-def count_nodes(text: str) -> int:
-    """Nodes of all paths of an SVG text; other drawn shapes count as one."""
-    nodes = len(DRAWN.findall(text.encode())) - text.count("<path")
-    for data in PATH_DATA.findall(text):
-        for command, rest in COMMAND.findall(data):
-            size = ARGUMENTS.get(command.lower())
-            if size:
-                nodes += len(NUMBER.findall(rest)) // size
-    return max(nodes, 0)
-
-
 @dataclass(frozen=True)
 class Score:
     """Figures of one file against its image."""
@@ -167,45 +119,3 @@ def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
         bytes=len(data),
         gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
     )
-
-
-def read_svg_text(path: Path) -> str:
-    """Text of an SVG file, gzipped (``.svgz``) or not.
-
-    Raises:
-        ImageError: missing, unreadable or not text.
-    """
-    try:
-        data = path.read_bytes()
-        if data[:2] == b"\x1f\x8b":
-            data = gzip.decompress(data)
-        return data.decode("utf-8")
-    except FileNotFoundError:
-        raise ImageError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise ImageError(f"{path}: is a folder, not an SVG") from None
-    except PermissionError:
-        raise ImageError(f"{path}: no permission to read it") from None
-    except (UnicodeDecodeError, OSError, EOFError, zlib.error):
-        raise ImageError(f"{path}: not an SVG") from None
-
-
-PIXELS_PER_UNIT = {"px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "pt": 96 / 72, "pc": 16.0}
-"""CSS absolute lengths."""
-
-
-def svg_size(text: str, path: Path) -> tuple[int, int]:
-    """Size [px] at which a viewer shows an SVG.
-
-    Raises:
-        ImageError: not an SVG; the message names ``path``.
-    """
-    try:
-        # resvg knows every way of giving a size; a probe that keeps the proportions is cheap.
-        wide = render_svg(text, width=64)
-        own = re.search(r"<svg\b[^>]*?\swidth=[\"'](\d+\.?\d*)(px|in|mm|cm|pt|pc)?[\"']", text)
-        box = re.search(r"<svg\b[^>]*?\sviewBox=[\"'][-\d.e]+[ ,]+[-\d.e]+[ ,]+(\d+\.?\d*)", text)
-    except ImageError as error:
-        raise ImageError(f"{path}: {error}") from error
-    width = float(own[1]) * PIXELS_PER_UNIT[own[2] or "px"] if own else float(box[1]) if box else 100.0
-    return max(1, round(width)), max(1, round(width * wide.height / wide.width))

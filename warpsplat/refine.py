@@ -19,10 +19,11 @@ import warp as wp
 
 from warpsplat.config import Density, Settings
 from warpsplat.errors import ImageError
-from warpsplat.metrics import render_svg, score_svg
+from warpsplat.metrics import score_svg
 from warpsplat.pipeline import Result, vectorize
 from warpsplat.scene import FloatArray, Kind, Scene
 from warpsplat.svg import write_svg
+from warpsplat.viewer import render_svg
 
 MAX_POINTS = 60_000
 """Most control points of one path; beyond, the padding of the others would fill the memory."""
@@ -230,6 +231,6 @@ REFINE_RATE = 0.5
 def read_pair(svg: Path, image: Path) -> tuple[str, FloatArray]:
     """Text of the SVG and pixels of the image."""
     from warpsplat.image import load_image
-    from warpsplat.metrics import read_svg_text
+    from warpsplat.inspect_svg import read_svg_text
 
     return read_svg_text(svg), load_image(image)

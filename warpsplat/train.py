@@ -17,12 +17,12 @@ from warpsplat.initialize import grid_scene
 from warpsplat.kernels import adam, loss
 from warpsplat.kernels.tile import column
 from warpsplat.launch import Program, capture
-from warpsplat.metrics import on_white, render_svg
 from warpsplat.parameters import Parameters
 from warpsplat.render import TileRenderer, make_renderer
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg import export, resized
 from warpsplat.tiles import to_tiles
+from warpsplat.viewer import on_white, render_svg
 
 SIZE_CHOICES = 12
 """How many lengths of the shorter side are tried for a reduced image."""

@@ -15,12 +15,13 @@ from tests.kernels.helpers import relative_error
 from tests.scenes import disc, random_scene
 from warpsplat.kernels import constants
 from warpsplat.kernels.stroke import half_plane, half_plane_slope
-from warpsplat.metrics import on_white, psnr, render_svg
+from warpsplat.metrics import psnr
 from warpsplat.parameters import Parameters
 from warpsplat.render import Capacity, render
 from warpsplat.render_exact import ExactRenderer
 from warpsplat.scene import Kind, Scene
 from warpsplat.svg import write_svg
+from warpsplat.viewer import on_white, render_svg
 
 CASES = [
     ("closed", 1, 1, 1.0),

@@ -1,0 +1,58 @@
+"""Reading what a user names: a file, or ``-`` for the standard input."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+from pathlib import Path
+
+from warpsplat.errors import ImageError
+
+STANDARD = Path("-")
+"""Stands for the standard input, and for the standard output."""
+
+MAX_INPUT = 1 << 30
+"""Largest input [bytes]: an endless pipe or device must not fill the memory."""
+
+
+def input_name(path: Path) -> str:
+    """How messages call an input."""
+    return "standard input" if path == STANDARD else str(path)
+
+
+def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) -> bytes:
+    """All bytes of a file, or of the standard input for ``-``.
+
+    Args:
+        path: the file.
+        what: what it should be, for messages: "an image", "an SVG".
+        limit: most bytes to read.
+
+    Raises:
+        ImageError: missing, a folder, not permitted, a device, empty, or more than ``limit`` bytes.
+    """
+    name = input_name(path)
+    try:
+        if path == STANDARD:
+            data = sys.stdin.buffer.read(limit + 1)
+        else:
+            with path.open("rb") as file:
+                mode = os.fstat(file.fileno()).st_mode
+                if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
+                    raise ImageError(f"{name}: is a device, not {what}")
+                data = file.read(limit + 1)
+    except FileNotFoundError:
+        raise ImageError(f"{name}: no such file") from None
+    except IsADirectoryError:
+        raise ImageError(f"{name}: is a folder, not {what}") from None
+    except PermissionError:
+        raise ImageError(f"{name}: no permission to read it") from None
+    except (OSError, ValueError) as error:  # a loop of links, a name with a NUL, a name too long
+        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise ImageError(f"{name}: cannot be read: {cause}") from error
+    if len(data) > limit:
+        raise ImageError(f"{name}: is larger than {limit // (1 << 20)} MiB")
+    if not data:
+        raise ImageError(f"{name}: {'nothing came' if path == STANDARD else 'the file is empty'}")
+    return data
