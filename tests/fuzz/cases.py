@@ -1,0 +1,234 @@
+"""Cases: a changed input with the commands that take it, and what must hold after each of them."""
+
+from __future__ import annotations
+
+import io
+import random
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from PIL import Image
+
+from tests.fuzz import corpus, mutate
+from tests.fuzz.corpus import Seed
+from tests.fuzz.vocabulary import SVG_SNIPPETS, SVG_WORDS, TEXT_OPTIONS, TOKENS, YAML_SNIPPETS, YAML_WORDS
+from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, Outcome
+from warpsplat.errors import ExitCode
+
+QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "2")
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command line; what it writes and what it may end with."""
+
+    arguments: tuple[str, ...]
+    codes: tuple[int, ...]
+    """Exit codes that are right, besides 0; ``RESOURCES`` always is."""
+    output: str = ""
+    """File that is there, whole, if the exit code is 0, and else is not."""
+    stdin: str = ""
+    """File that the standard input is."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """An input file and commands on it, run one after the other in a folder of their own."""
+
+    target: str
+    index: int
+    seed: str
+    """Name of the seed that was changed."""
+    name: str
+    """File name of the input."""
+    data: bytes
+    commands: tuple[Command, ...] = field(repr=False)
+
+    def with_data(self, data: bytes) -> Case:
+        """The same commands on another input."""
+        return replace(self, data=data)
+
+
+def _reference() -> bytes:
+    buffer = io.BytesIO()
+    corpus.picture().save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+GOOD_IMAGE, GOOD_SVG = "good.png", "good.svg"
+FILES: dict[str, bytes] = {
+    GOOD_IMAGE: _reference(),
+    GOOD_SVG: corpus.own_svg("fill"),
+    # What batch files find: their images fail, so that no case trains for long.
+    "in/a.png": b"no image",
+    "in/b.jpg": b"",
+    "in/deep/c.gif": b"GIF89a",
+    "in/é.png": b"\x89PNG\r\n\x1a\n",
+}
+"""Laid into every case's folder; must be as they were afterwards."""
+
+INPUT, USAGE = int(ExitCode.INPUT), int(ExitCode.USAGE)
+
+
+def _image_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
+    given, stdin = ("-", name) if rng.random() < 0.05 else (name, "")
+    commands = [Command(("eval", given, GOOD_SVG, "--json"), (INPUT,), stdin=stdin)]
+    if rng.random() < 0.15:
+        kind = rng.choice(("--open", "--closed"))
+        commands.append(Command(("vectorize", name, "-o", "out.svg", kind, *QUICK), (INPUT,), "out.svg"))
+    if rng.random() < 0.05:
+        refine = ("refine", GOOD_SVG, name, "-o", "out2.svg", "--iterations", "1", "--device", "cpu")
+        commands.append(Command(refine, (INPUT,), "out2.svg"))
+    return tuple(commands)
+
+
+def _svg_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
+    refine = ("refine", name, GOOD_IMAGE, "-o", "out.svg", "--iterations", "1", "--device", "cpu")
+    given, stdin = ("-", name) if rng.random() < 0.05 else (name, "")
+    all_of_them = (
+        Command(("render", given, "-o", "out.png"), (INPUT,), "out.png", stdin),
+        Command(("eval", GOOD_IMAGE, name), (INPUT,)),
+        Command(refine, (INPUT,), "out.svg"),
+    )
+    return all_of_them
+
+
+def _yaml_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
+    flags = rng.choice(((), ("--json",), ("-q",), ("-v",)))
+    return (Command(("batch", name, *flags), (USAGE, int(ExitCode.SOME_FAILED)), output=""),)
+
+
+def _option_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
+    """Values of options. The image is none, so that whatever is accepted ends there."""
+    given: list[str] = []
+    for _ in range(rng.choice((1, 1, 2))):
+        value = "".join(rng.choice(TOKENS) for _ in range(rng.choice((1, 1, 2))))
+        given += [rng.choice(TEXT_OPTIONS), value]
+    # "--help" and its like come about by no combination, so that 0 is not right here.
+    return (Command(("vectorize", "in/a.png", *given), (USAGE, INPUT)),)
+
+
+def _changed_image(rng: random.Random, data: bytes, other: bytes) -> bytes:
+    if data.startswith(b"\x89PNG") and rng.random() < 0.6:
+        return mutate.png(rng, data, other)
+    return mutate.mutate_bytes(rng, data, other)
+
+
+def _changed_svg(rng: random.Random, data: bytes, other: bytes) -> bytes:
+    return mutate.mutate_text(rng, data, other, SVG_WORDS, SVG_SNIPPETS)
+
+
+def _changed_yaml(rng: random.Random, data: bytes, other: bytes) -> bytes:
+    return mutate.mutate_text(rng, data, other, YAML_WORDS, YAML_SNIPPETS)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A kind of input."""
+
+    seeds: Callable[[], list[Seed]]
+    endings: tuple[str, ...] | None
+    """Of a folder's files that belong here; None: all that are no text."""
+    change: mutate.Mutation
+    commands: Callable[[random.Random, str], tuple[Command, ...]]
+    share: int
+    """Of a run over all targets."""
+
+
+TARGETS = {
+    "image": Target(corpus.images, None, _changed_image, _image_commands, 9),
+    "svg": Target(corpus.svgs, (".svg", ".svgz"), _changed_svg, _svg_commands, 8),
+    "yaml": Target(corpus.yamls, (".yaml", ".yml"), _changed_yaml, _yaml_commands, 2),
+    "options": Target(lambda: [Seed("in.txt", b"-")], (), lambda rng, data, other: data, _option_commands, 1),
+}
+
+
+class Cases:
+    """All cases of a seed: the same number, the same case, in any order."""
+
+    def __init__(self, seed: int, target: str = "all", folder: Path | None = None) -> None:
+        self.seed = seed
+        self.names = [name for name, t in TARGETS.items() if target in ("all", name) for _ in range(t.share)]
+        self.seeds = {name: TARGETS[name].seeds() for name in set(self.names)}
+        if folder:
+            for name in self.seeds:
+                self.seeds[name] += corpus.from_folder(folder, TARGETS[name].endings)
+
+    def __getitem__(self, index: int) -> Case:
+        rng = random.Random(f"{self.seed} {index}")
+        name = rng.choice(self.names)
+        target = TARGETS[name]
+        seed, other = rng.choice(self.seeds[name]), rng.choice(self.seeds[name])
+        data = target.change(rng, seed.data, other.data)
+        file = "case" + Path(seed.name).suffix
+        return Case(name, index, seed.name, file, data, target.commands(rng, file))
+
+
+LINE = re.compile(r"warpsplat: [^\x00-\x1f\x7f-\x9f]+\n?")
+BATCH_LINE = re.compile(r"(warpsplat: |\[\d+/\d+\] |failed:|  |in/|case)[^\x00-\x1f\x7f-\x9f]*")
+
+
+def judge(command: Command, outcome: Outcome, folder: Path) -> str:
+    """What is wrong with the outcome, in a few words; empty if nothing is."""
+    code = outcome.code
+    if outcome.ended:
+        return f"no end within {MAX_SECONDS:g} s" if outcome.ended == "time" else "over 2 GiB"
+    if code < 0:
+        return f"ended by signal {-code}"
+    if "Traceback" in outcome.stderr:
+        return f"traceback: {outcome.stderr.strip().splitlines()[-1][:150]}"
+    if code not in (0, ExitCode.RESOURCES, *command.codes):
+        return f"exit code {code}"
+    message = _judge_messages(command, outcome)
+    if message:
+        return message
+    if outcome.seconds > MAX_SECONDS:
+        return f"took more than {MAX_SECONDS:g} s"
+    if outcome.peak > MAX_MEMORY:
+        return "over 2 GiB"
+    return _judge_output(command, code, folder)
+
+
+def _judge_messages(command: Command, outcome: Outcome) -> str:
+    lines = outcome.stderr.splitlines(keepends=True)
+    if command.arguments[0] == "batch" and outcome.code in (0, ExitCode.SOME_FAILED):
+        wrong = [
+            line
+            for line in outcome.stderr.rstrip("\n").split("\n")
+            if line and not BATCH_LINE.fullmatch(line)
+        ]
+        return f"odd line on stderr: {wrong[0][:100]!r}" if wrong else ""
+    if len(lines) > 1 or any(not LINE.fullmatch(line) for line in lines):
+        return f"not one line on stderr: {outcome.stderr[:200]!r}"
+    if outcome.code and not lines:
+        return "failed without a word"
+    if outcome.code and outcome.stdout:
+        return "failed, and wrote to stdout"
+    return ""
+
+
+def _judge_output(command: Command, code: int, folder: Path) -> str:
+    if command.output:
+        path = folder / command.output
+        if path.exists() != (code == 0):
+            return f"exit code {code}, and {command.output} is {'there' if path.exists() else 'missing'}"
+        if code == 0:
+            whole = _is_png(path) if path.suffix == ".png" else path.read_bytes().rstrip().endswith(b"</svg>")
+            # Of a foreign SVG that cannot be improved, the copy ends as that does.
+            if not whole and command.arguments[0] != "refine":
+                return f"{command.output} is not whole"
+            path.unlink()
+    for stray in folder.rglob(".*"):
+        return f"left {stray.name}"
+    for name, data in FILES.items():
+        if (folder / name).read_bytes() != data:
+            return f"{name} was changed"
+    return ""
+
+
+def _is_png(path: Path) -> bool:
+    with Image.open(path) as image:
+        image.load()
+    return True

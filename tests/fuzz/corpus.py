@@ -1,0 +1,136 @@
+"""Inputs that are in order, from which mutation starts."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from tests.fuzz.vocabulary import HEAD, HEADS, HEIGHT, SHAPES, WIDTH, YAMLS
+
+
+@dataclass(frozen=True)
+class Seed:
+    """An input: the name's ending says what it is."""
+
+    name: str
+    data: bytes
+
+
+def picture(mode: str = "RGB") -> Image.Image:
+    """A ramp with noise, of any Pillow mode."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    noise = np.random.default_rng(0).integers(0, 32, (HEIGHT, WIDTH))
+    rgba = np.stack([7 * x, 9 * y, 3 * x + noise, 255 - 4 * y], axis=2).astype(np.uint8)
+    image = Image.fromarray(rgba)
+    if mode == "I;16":
+        return Image.fromarray((x * 2000 + noise).astype(np.uint16))
+    if mode == "I":
+        return Image.fromarray((x * 2000 + noise).astype(np.int32))
+    if mode == "F":
+        return Image.fromarray((x / WIDTH).astype(np.float32))
+    return image.convert(mode) if mode in ("LA", "RGBA") else image.convert("RGB").convert(mode)
+
+
+FORMATS: dict[str, tuple[tuple[str, ...], tuple[dict[str, object], ...]]] = {
+    "png": (("1", "L", "LA", "P", "RGB", "RGBA", "I;16", "I"), ({}, {"transparency": 0}, {"dpi": (72, 72)})),
+    "jpg": (("L", "RGB", "CMYK", "YCbCr"), ({}, {"progressive": True}, {"quality": 30})),
+    "tif": (("1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "LAB", "YCbCr", "I", "I;16", "F"),
+            ({}, {"compression": "tiff_lzw"}, {"compression": "tiff_deflate"}, {"compression": "packbits"})),
+    "gif": (("L", "P", "RGB", "RGBA"), ({}, {"interlace": 1}, {"save_all": True, "append_images": []})),
+    "bmp": (("1", "L", "P", "RGB", "RGBA"), ({},)),
+    "webp": (("RGB", "RGBA"), ({}, {"lossless": True})),
+    "ppm": (("1", "L", "RGB", "I;16", "F"), ({},)),
+    "tga": (("1", "L", "LA", "P", "RGB", "RGBA"), ({}, {"compression": "tga_rle"})),
+    "ico": (("RGBA",), ({}, {"bitmap_format": "bmp"})),
+    "jp2": (("L", "RGB", "RGBA"), ({},)),
+    "pcx": (("1", "L", "P", "RGB"), ({},)),
+    "sgi": (("L", "RGB", "RGBA"), ({},)),
+    "dds": (("L", "RGB", "RGBA"), ({},)),
+    "qoi": (("RGB", "RGBA"), ({},)),
+}  # fmt: skip
+"""Ending -> modes and ways of saving."""
+
+
+def images() -> list[Seed]:
+    """Every mode of every format, saved in several ways; an EXIF rotation, animations, a colour profile."""
+    seeds = []
+    for ending, (modes, ways) in FORMATS.items():
+        for mode in modes:
+            for number, options in enumerate(ways):
+                buffer = io.BytesIO()
+                given = dict(options)
+                if "append_images" in given:
+                    given["append_images"] = [picture(mode).rotate(180)]
+                if ending == "png" and "transparency" in given and mode in ("LA", "RGBA", "I", "P"):
+                    continue
+                if given.get("transparency") == 0 and mode == "RGB":
+                    given["transparency"] = (0, 0, 16)
+                try:
+                    picture(mode).save(buffer, Image.registered_extensions()["." + ending], **given)
+                except (OSError, KeyError, ValueError, RuntimeError):  # not built in, or not of this mode
+                    continue
+                seeds.append(Seed(f"{mode.replace(';', '')}-{number}.{ending}", buffer.getvalue()))
+    for turn in (3, 6, 8):
+        exif = Image.Exif()
+        exif[0x0112] = turn
+        buffer = io.BytesIO()
+        picture().save(buffer, "JPEG", exif=exif)
+        seeds.append(Seed(f"turned-{turn}.jpg", buffer.getvalue()))
+    buffer = io.BytesIO()
+    picture().save(buffer, "PNG", save_all=True, append_images=[picture().rotate(180)])
+    seeds.append(Seed("animated.png", buffer.getvalue()))
+    return seeds
+
+
+def svgs() -> list[Seed]:
+    """Each of ``SHAPES`` alone, mixtures of them, files as this tool writes them, other heads."""
+    seeds = [Seed(f"shape-{i}.svg", f"{HEAD}{shape}</svg>".encode()) for i, shape in enumerate(SHAPES)]
+    for step in (2, 3, 5):
+        seeds.append(Seed(f"every-{step}.svg", f"{HEAD}{''.join(SHAPES[::step])}</svg>".encode()))
+    fills, strokes = own_svg("fill"), own_svg("stroke")
+    seeds += [Seed("fills.svg", fills)] * 4 + [Seed("strokes.svg", strokes)] * 4
+    seeds += [
+        Seed(f"head-{i}.svg", f"{head}{''.join(SHAPES[: 3 * i + 2])}</svg>".encode())
+        for i, head in enumerate(HEADS)
+    ]
+    return seeds
+
+
+def own_svg(kind: str) -> bytes:
+    """An SVG as this tool writes it: ``kind`` is "fill" or "stroke"."""
+    rng = np.random.default_rng(1)
+    rows = []
+    for _ in range(6):
+        x, y = rng.integers(2, 28), rng.integers(2, 20)
+        color = f"#{int(rng.integers(0, 1 << 24)):06x}"
+        outline = f"M{x} {y}c3.1-2.4 8.2 1.5 6 5.2"
+        if kind == "fill":
+            rows.append(f'<path d="{outline}-2.6 4.1-9.1 1.2-6-5.2z" fill="{color}" fill-opacity=".8"/>')
+        else:
+            rows.append(f'<path d="{outline}" stroke="{color}" stroke-width="2.3"/>')
+    around = '<g fill="none" stroke-linecap="round" stroke-linejoin="round">' if kind == "stroke" else "<g>"
+    return "\n".join(
+        (HEAD, "<metadata>warpsplat 0.1.0 key=0123456789abcdef01234567</metadata>",
+         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#946f57"/>', around, *rows, "</g>", "</svg>\n")
+    ).encode()  # fmt: skip
+
+
+def yamls() -> list[Seed]:
+    """Batch files."""
+    return [Seed(f"batch-{i}.yaml", text.encode()) for i, text in enumerate(YAMLS)]
+
+
+def from_folder(folder: Path, endings: tuple[str, ...] | None, most: int = 200_000) -> list[Seed]:
+    """Files of a folder (and those below) with one of ``endings``, or all that are no text."""
+    texts = (".svg", ".svgz", ".yaml", ".yml")
+    return [
+        Seed(path.name, path.read_bytes())
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+        and 0 < path.stat().st_size <= most
+        and (path.suffix.lower() in endings if endings else path.suffix.lower() not in texts)
+    ]

@@ -1,0 +1,116 @@
+"""What the corpus and the mutations are made of: heads and shapes of SVG, batch files, words, odd numbers."""
+
+WIDTH, HEIGHT = 32, 24
+"""Size of the corpus' pictures [px]."""
+
+HEAD = f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}">'
+
+HEADS = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 24">',
+    '<svg xmlns="http://www.w3.org/2000/svg" width="1in" height=".75in">',
+    '<?xml version="1.0"?><!DOCTYPE svg [<!ENTITY a "red">]><svg xmlns="http://www.w3.org/2000/svg" width="100%" viewBox="-5 -5 64 48">',
+    '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="8em" height="6em" viewBox="0 0 32 24" preserveAspectRatio="none">',
+)
+"""Other ways of saying how large an SVG is."""
+
+SHAPES = (
+    '<path d="M2 2C8 2 20 4 28 10S14 22 9 20z" fill="#8a3c1e" fill-opacity=".8"/>',
+    '<path d="M3 12q8-9 12 0t12 2" fill="none" stroke="#123" stroke-width="2.5" stroke-linecap="round"/>',
+    '<path d="M4 4h20v14H4zM8 8v6h10V8z" fill="teal" fill-rule="evenodd"/>',
+    '<path d="M5 20A9 7 30 1 0 20 5" style="fill:none;stroke:rgb(10%,20%,30%);stroke-opacity:.5"/>',
+    '<rect x="1" y="2" width="12" height="9" rx="3" fill="hsl(120,50%,50%)"/>',
+    '<circle cx="20" cy="10" r="6" fill="#0f08" opacity="50%"/>',
+    '<ellipse cx="16" cy="12" rx="9" ry="4" transform="rotate(20 16 12) skewX(5)"/>',
+    '<polygon points="1,1 30,3 16,22" fill="orange"/>',
+    '<polyline points="2 20 9 4 17 19 30 2" fill="none" stroke="navy" stroke-dasharray="3 1 2" stroke-linejoin="bevel"/>',
+    '<line x1="0" y1="0" x2="32" y2="24" stroke="black" stroke-linecap="square" stroke-miterlimit="2"/>',
+    '<g transform="matrix(.9 .1 -.1 .9 1 2)" opacity=".7"><path d="M0 0L9 9 0 9z"/><rect width="5" height="5" fill="red"/></g>',
+    '<g style="mix-blend-mode:multiply;isolation:isolate"><rect width="20" height="20" fill="cyan"/></g>',
+    '<defs><linearGradient id="g"><stop offset="0" stop-color="red"/><stop offset="1" stop-color="blue" stop-opacity=".5"/>'
+    '</linearGradient></defs><rect width="32" height="24" fill="url(#g)"/>',
+    '<defs><radialGradient id="r" cx=".3" fx=".1" gradientTransform="scale(2)"><stop stop-color="lime"/></radialGradient></defs>'
+    '<circle cx="9" cy="9" r="8" fill="url(#r)"/>',
+    '<defs><pattern id="p" width="4" height="4" patternUnits="userSpaceOnUse"><rect width="2" height="2"/></pattern></defs>'
+    '<rect width="32" height="24" fill="url(#p)"/>',
+    '<defs><clipPath id="c"><circle cx="9" cy="9" r="8"/></clipPath></defs><rect width="32" height="24" clip-path="url(#c)"/>',
+    '<defs><mask id="m"><rect width="9" height="9" fill="white"/></mask></defs><rect width="32" height="24" mask="url(#m)"/>',
+    '<defs><filter id="f"><feGaussianBlur stdDeviation="2"/><feTurbulence baseFrequency=".1" numOctaves="2"/></filter></defs>'
+    '<rect width="32" height="24" filter="url(#f)"/>',
+    '<symbol id="s" viewBox="0 0 9 9"><rect width="9" height="9"/></symbol><use href="#s" x="3" y="3" width="9" height="9"/>',
+    '<switch><g systemLanguage="xx"><rect width="9" height="9" fill="red"/></g><g><rect width="9" height="9"/></g></switch>',
+    '<style>.a{fill:#345;stroke:none} path{opacity:.9}</style><path class="a" d="M1 1l20 3-5 16z"/>',
+    '<text x="3" y="12" font-size="9">Aé</text>',
+    '<marker id="k" markerWidth="3" markerHeight="3"><path d="M0 0L3 3"/></marker><path d="M2 2L20 20" stroke="red" marker-end="url(#k)"/>',
+    '<image width="9" height="9" href="data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="/>',
+    '<svg x="3" y="3" width="9" height="9" viewBox="0 0 3 3" preserveAspectRatio="xMaxYMin slice"><rect width="3" height="3"/></svg>',
+)  # fmt: skip
+"""One thing of SVG each."""
+
+SVG_WORDS = (
+    "path", "g", "svg", "rect", "circle", "ellipse", "line", "polygon", "polyline", "use", "symbol", "switch", "defs", "style",
+    "text", "tspan", "image", "mask", "clipPath", "filter", "pattern", "marker", "linearGradient", "stop", "a", "script",
+    "d", "fill", "stroke", "opacity", "fill-opacity", "stroke-opacity", "stroke-width", "transform", "viewBox", "width", "height",
+    "x", "y", "r", "rx", "cx", "points", "href", "id", "class", "display", "visibility", "fill-rule", "stroke-dasharray",
+    "stroke-linecap", "stroke-linejoin", "preserveAspectRatio", "none", "inherit", "currentColor", "evenodd", "hidden", "auto",
+    "scale", "rotate", "translate", "matrix", "skewX", "url", "rgb", "rgba", "hsl", "white", "transparent", "em", "ex", "px",
+    "M", "m", "L", "l", "H", "v", "C", "c", "S", "Q", "T", "A", "a", "Z", "z", "xMidYMid", "meet", "slice",
+)  # fmt: skip
+
+SVG_SNIPPETS = (
+    *SHAPES,
+    "<!-- " + "<path " * 3000 + "-->",
+    "<!--" + "fill:" + " " * 5000 + "-->",
+    '<path style="fill:' + " " * 5000 + '"/>',
+    "<![CDATA[<path d='M0 0'/>]]>",
+    '<path d="z"/>',
+    '<path d="M0 0' + "l1 1" * 3000 + '"/>',
+    '<path d="M0 0' + "a9 9 0 1 1 1 1" * 300 + '"/>',
+    '<path d="' + "M0 0z" * 2000 + '"/>',
+    '<use href="#s"/>',
+    '<g id="s"><use href="#s"/></g>',
+    "&a;",
+    '<g transform="scale(1e30)">',
+    '<g transform="scale(1e-30) rotate(45)">',
+    '<circle r="1e9" fill="url(#g)"/>',
+    ' width="0"', ' height="-1"', ' width="1e30"', ' height="2000000"', ' width="100%"', ' viewBox="0 0 0 0"',
+    ' viewBox="0 0 1 60000"', ' viewBox="1e30 0 1e-30 5"', ' viewBox="nan 0 1 1"', ' style="mix-blend-mode:screen"',
+    ' stroke-dasharray="1e-9"', ' stroke-dasharray="0 0"', ' stroke-miterlimit="0"', ' stroke-width="1e30"', ' opacity=".5em"',
+    ' fill="url(#nothing) red"', ' fill="#ggg"', ' fill="rgb(999,-1,1e400)"', ' transform="matrix(0 0 0 0 0 0)"', ' d=""',
+    "\0", "\x1b[31m", "\ufffe", "\u202e", "</g>", "</svg>", "<svg>", "<", ">", '"', "&", "&#0;", "&#x110000;",
+)  # fmt: skip
+
+YAMLS = (
+    "jobs:\n  - images: in/a.png\n",
+    "defaults:\n  curves: 3\n  quality: draft\n  output: out\njobs:\n  - images: in/*.png\n  - images: [in/b.jpg, 'in/**/c.*']\n"
+    "    curves: 4\n    closed: true\n",
+    "defaults: {curves: 3, iterations: 1, seed: 7, device: cpu, precision: 2, renderer: exact}\n"
+    "jobs: [{images: in/a.png, output: out, time-budget: 2s, max-bytes: 10KB, target-psnr: 30.5}]\n",
+    "# comment\ndefaults: &d\n  open: true\n  output: 'out/deep'\njobs:\n- images:\n  - in/a.png\n  - \"in/\\u00e9.png\"\n  iterations: 2\n",
+    "%YAML 1.2\n---\njobs:\n  - images: !!str in/a.png\n    output: >-\n      folded\n      name\n    quality: high\n...\n",
+)
+
+YAML_WORDS = (
+    "defaults", "jobs", "images", "curves", "quality", "iterations", "seed", "precision", "renderer", "target-psnr",
+    "time-budget", "max-bytes", "closed", "open", "output", "device", "draft", "balanced", "high", "exact", "splat", "true", "false", "null", "yes", "~",
+    "cpu", "cuda", "in", "a.png", "b.jpg", "out", "60s", "10GB", "1e3",
+)  # fmt: skip
+
+YAML_SNIPPETS = (
+    "[" * 2000, "{" * 2000, "[" * 50 + "]" * 50, "- " * 500, "? " * 300, "&x ", "*x", "*d", "<<: *d\n", "!!python/object:os.system ", "!!binary a", "!!int x ",
+    "!!float .nan ", "!!timestamp 2001-99-99 ", '"\\U00110000"', '"\\ud800"', '"a\\0b"', "'in/a\x00.png'", "in/" + "x" * 300, "../" * 40, "~nobody/", "~/",
+    "in/[", "**", "***", "?", "\t", "\r", "\u2028", "\ufeff", "\x07", "  ", "\n", "\n---\n", "\n...\n", "%TAG ! x\n", "|\n", ">2\n", "# ", ": ", "- ", ", ",
+    "jobs:\n", "  - images: in/a.png\n", "    output: loop/x\n", "    output: in/a.png\n", "    output: fifo\n", "    images: fifo\n", "    images: .\n",
+    ".inf", "-.inf", ".nan", "0o777", "0x7f", "1_000", "190:20:30", "9" * 5000, "1e999",
+)  # fmt: skip
+
+NUMBERS = ("0", "-0", "1", "-1", "0.5", "1e-9", "1e9", "1e30", "-1e30", "3.5e38", "1e308", "-1e309", "1e-320", "nan", "inf",
+           "NaN", "Infinity", "9" * 400, "0." + "0" * 300 + "1", "2147483648", "-2147483649", "65536", "1e", "--1", "+.5e+2",
+           "0x10", "1_000", "١٢", "1,5", "", "50%", "-50%", "1e400%", "2em", "3ex", "1in", "5rem", "10vw", "1q", "90deg")  # fmt: skip
+"""What may stand where a number is expected."""
+
+TEXT_OPTIONS = ("--time-budget", "--max-bytes", "--target-psnr", "--curves", "--iterations", "--seed", "--precision", "--threads",
+                "--device", "--quality", "--renderer", "-o")  # fmt: skip
+
+TOKENS = (*NUMBERS, "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
+          "draft", "exact", "x.svg", "/", ".", "..", "a/b.svg", "é.svg", "\udcff.svg", "\n.svg", "\x1b[2J.svg", "x" * 300, "-", "--", "٣s", "x.SVG",
+          "good.png", "in", "in/a.png/x.svg", "/dev/null", "/dev/full", "/proc/x.svg")  # fmt: skip
