@@ -1,0 +1,212 @@
+"""Runs commands of warpsplat under limits, and with signals at chosen moments.
+
+``Forks`` gives tasks to a process of ``python -m tests.forks``, which has everything loaded and runs each in a
+fork of itself: a run starts at once, and what it does to its process is gone with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.abc
+import json
+import os
+import resource
+import runpy
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "12")
+NOBODY = 65534
+"""A user without rights, by custom."""
+
+MOMENTS = {
+    "loading": ("warp", "Module", "load"),
+    "training": ("warp", "Launch", "launch"),
+    "scoring": ("resvg_py", "svg_to_bytes"),
+    "writing": ("os", "fsync"),
+    "renaming": ("os", "replace"),
+}
+"""Stages of a run by library calls that it makes there, whatever the structure of the program."""
+
+
+@dataclass
+class Task:
+    """A command line and what happens to it."""
+
+    arguments: list[str]
+    folder: str
+    stdout: str
+    stderr: str
+    moment: str = ""
+    """At which ``signal`` comes: one of ``MOMENTS``, or "import NAME"."""
+    count: int = 1
+    """The how many-th time."""
+    signal: int = 0
+    ignored: bool = False
+    """Ctrl-C is, as under ``nohup``."""
+    file_size: int = 0
+    """Largest file [bytes], as ``ulimit -f`` sets it; 0: any."""
+    rights: bool = True
+    """If not, a superuser, whom permissions do not bind, becomes another user."""
+
+
+class _ImportTrip(importlib.abc.MetaPathFinder):
+    """Calls ``pull`` as soon as ``module`` is imported."""
+
+    def __init__(self, module: str, pull: Callable[[], None]) -> None:
+        self.module, self.pull = module, pull
+
+    def find_spec(self, name: str, path: Sequence[str] | None, target: Any = None) -> None:
+        """Find nothing: the next finder will."""
+        if name == self.module:
+            self.pull()
+
+
+def _lay_trip(task: Task) -> None:
+    """Have the task's signal sent to this process at the task's moment."""
+    seen = 0
+
+    def pull() -> None:
+        nonlocal seen
+        seen += 1
+        if seen == task.count:
+            os.kill(os.getpid(), task.signal)
+
+    if task.moment.startswith("import "):
+        sys.meta_path.insert(0, _ImportTrip(task.moment.removeprefix("import "), pull))
+        return
+    module, *path, name = MOMENTS[task.moment]
+    owner: Any = __import__(module)
+    for part in path:
+        owner = getattr(owner, part)
+    original = getattr(owner, name)
+
+    def tripping(*arguments: Any, **named: Any) -> Any:
+        pull()
+        return original(*arguments, **named)
+
+    setattr(owner, name, tripping)
+
+
+def run(task: Task) -> None:
+    """Run a task in this process, which is fit for nothing else afterwards."""
+    os.chdir(task.folder)
+    for number, name in ((1, task.stdout), (2, task.stderr)):
+        os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+    if task.ignored:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if task.moment:
+        _lay_trip(task)
+    if task.file_size:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (task.file_size, task.file_size))
+    if not task.rights and os.geteuid() == 0:
+        os.setgroups([])
+        os.setgid(NOBODY)
+        os.setuid(NOBODY)
+    sys.argv[1:] = task.arguments
+    runpy.run_module("warpsplat", run_name="__main__", alter_sys=True)
+
+
+def _end(task: Task) -> None:
+    """Run a task, then end the process as Python would, less the clean-up of what it was forked from."""
+    code: Any = 0
+    try:
+        run(task)
+    except SystemExit as end:
+        code = end.code
+    except BaseException:
+        sys.excepthook(*sys.exc_info())
+        code = 1
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(int(code or 0))
+
+
+def serve() -> None:
+    """Answer tasks until the input ends; the first ones are run here, so that all that they need is loaded."""
+    from warpsplat.cli.main import main
+
+    tasks, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    for line in tasks:
+        task = Task(**json.loads(line))
+        if task.stderr == os.devnull:
+            os.chdir(task.folder)
+            with contextlib.suppress(SystemExit):
+                main(task.arguments)
+            code = 0
+        else:
+            child = os.fork()
+            if not child:
+                _end(task)
+            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        print(code, file=answers, flush=True)
+
+
+def make_image(path: Path, seed: int = 0) -> None:
+    """A small picture without any sense."""
+    import numpy as np  # not above: a cold start is to be one
+    from PIL import Image
+
+    rng = np.random.default_rng(seed)
+    Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
+
+
+WARM = (
+    ("vectorize", "a.png", "-o", "b.svg", *QUICK),
+    ("vectorize", "a.png", "-o", "a.svg", "--open", *QUICK),
+    ("refine", "b.svg", "a.png", "-o", "c.svg", "--device", "cpu", "--iterations", "2"),
+    ("render", "a.svg", "-o", "b.png"),
+    ("eval", "a.png", "a.svg"),
+    ("batch", "jobs.yaml"),
+)
+
+
+class Forks:
+    """Gives tasks to a process that forks."""
+
+    def __init__(self, scratch: Path) -> None:
+        self.out, self.err = str(scratch / "stdout"), str(scratch / "stderr")
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.forks"],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        make_image(scratch / "a.png")
+        (scratch / "jobs.yaml").write_text(
+            "jobs: [{images: a.png, device: cpu, curves: 4, iterations: 2, output: o}]"
+        )
+        for arguments in WARM:
+            self._ask(Task(list(arguments), str(scratch), os.devnull, os.devnull))
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.kill()
+        self.process.communicate()
+
+    def run(self, arguments: Sequence[str], folder: Path, **how: Any) -> tuple[int, str, str]:
+        """Exit code (or minus the signal that ended it), stdout and stderr; ``how``: see ``Task``."""
+        task = Task(list(arguments), str(folder), **{"stdout": self.out, "stderr": self.err, **how})
+        code = self._ask(task)
+        out, err = ("" if n.startswith("/dev/") else Path(n).read_text() for n in (task.stdout, task.stderr))
+        return code, out, err
+
+    def _ask(self, task: Task) -> int:
+        assert self.process.stdin and self.process.stdout
+        print(json.dumps(asdict(task)), file=self.process.stdin, flush=True)
+        return int(self.process.stdout.readline())
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:  # one task, from a cold start
+        run(Task(**json.loads(sys.argv[1])))
+    serve()

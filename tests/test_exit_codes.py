@@ -1,0 +1,205 @@
+"""The README's table of exit codes, held against the program: each kind of failure in each command."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from PIL import Image
+
+from tests.fuzz.corpus import own_svg
+from tests.test_cli import run
+from warpsplat.errors import ExitCode
+
+CPU = "--device cpu"
+QUICK = f"{CPU} --curves 4 --iterations 4"
+REFINE = f"{CPU} --iterations 2"
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+def _raising(owner: Any, name: str, error: BaseException) -> Patch:
+    """Have a library's function fail."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    return lambda patch: patch.setattr(owner, name, fail)
+
+
+NO_SPACE = _raising(os, "fsync", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+NO_MEMORY = _raising(wp, "launch", MemoryError())
+NO_MEMORY_FOR_PIXELS = _raising(Image, "open", MemoryError())
+CTRL_C = _raising(np, "asarray", KeyboardInterrupt())
+FAULT = _raising(wp, "launch", RuntimeError("a fault\nof two lines"))
+FAULT_OF_NUMPY = _raising(np, "asarray", RuntimeError("a fault\nof two lines"))
+
+TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
+    # exit code, what is wrong, command line, what fails underneath
+    (ExitCode.DONE, "nothing", f"vectorize photo.png {QUICK}", None),
+    (ExitCode.DONE, "nothing", "batch good.yaml", None),
+    (ExitCode.DONE, "nothing", f"refine drawing.svg photo.png -o a.svg {REFINE}", None),
+    (ExitCode.DONE, "nothing", "eval photo.png drawing.svg", None),
+    (ExitCode.DONE, "nothing", "render drawing.svg -o a.png", None),
+    (ExitCode.DONE, "nothing", "bench --curves 4 --size 32x32 --repeats 1", None),
+    (ExitCode.DONE, "nothing", "info", None),
+    (ExitCode.INTERNAL, "a fault of the program", f"vectorize photo.png {QUICK}", FAULT),
+    (ExitCode.INTERNAL, "a fault of the program", f"refine drawing.svg photo.png -o a.svg {REFINE}", FAULT),
+    (ExitCode.INTERNAL, "a fault of the program", "eval photo.png drawing.svg", FAULT_OF_NUMPY),
+    (ExitCode.INTERNAL, "a fault of the program", "bench --curves 4 --size 32x32", FAULT),
+    (ExitCode.USAGE, "unknown command", "nonsense", None),
+    (ExitCode.USAGE, "unknown option", "vectorize photo.png --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "batch good.yaml --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "refine drawing.svg photo.png -o a.svg --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "eval photo.png drawing.svg --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "render drawing.svg -o a.png --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "bench --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "info --nonsense", None),
+    (ExitCode.USAGE, "missing argument", "vectorize", None),
+    (ExitCode.USAGE, "missing argument", "refine drawing.svg photo.png", None),
+    (ExitCode.USAGE, "a value out of range", "vectorize photo.png --curves 0", None),
+    (ExitCode.USAGE, "a value out of range", "refine drawing.svg photo.png -o a.svg --iterations 0", None),
+    (ExitCode.USAGE, "a value out of range", "render drawing.svg -o a.png --scale -1", None),
+    (ExitCode.USAGE, "a value out of range", "bench --size 0x0", None),
+    (ExitCode.USAGE, "unknown device", "vectorize photo.png --device cuda:99", None),
+    (ExitCode.USAGE, "unknown device", "batch good.yaml --device cuda:99", None),
+    (ExitCode.USAGE, "unknown device", "refine drawing.svg photo.png -o a.svg --device cuda:99", None),
+    (ExitCode.USAGE, "unknown device", "bench --device cuda:99", None),
+    (ExitCode.USAGE, "no folder for the output", "vectorize photo.png -o none/a.svg", None),
+    (ExitCode.USAGE, "no folder for the output", "refine drawing.svg photo.png -o none/a.svg", None),
+    (ExitCode.USAGE, "no folder for the output", "render drawing.svg -o none/a.png", None),
+    (ExitCode.USAGE, "the output is a folder", "vectorize photo.png -o folder.svg", None),
+    (ExitCode.USAGE, "the output's folder is a file", "vectorize photo.png -o photo.png/a.svg", None),
+    (ExitCode.USAGE, "the output's folder cannot be", "vectorize photo.png -o /proc/a.svg", None),
+    (ExitCode.USAGE, "the output is the input", "vectorize photo.png -o photo.png", None),
+    (ExitCode.USAGE, "the output is the input", "refine drawing.svg photo.png -o drawing.svg", None),
+    (ExitCode.USAGE, "the output is the input", "render drawing.svg -o drawing.svg", None),
+    (ExitCode.USAGE, "the output is no SVG by its name", "vectorize photo.png -o a.txt", None),
+    (ExitCode.USAGE, "the output is no SVG by its name", "refine drawing.svg photo.png -o a.txt", None),
+    (ExitCode.USAGE, "the output is a foreign file", "vectorize photo.png -o foreign.svg", None),
+    (ExitCode.USAGE, "the output is a foreign file", "refine drawing.svg photo.png -o foreign.svg", None),
+    (ExitCode.USAGE, "an output is a foreign file", "batch foreign.yaml", None),
+    (ExitCode.USAGE, "batch file missing", "batch none.yaml", None),
+    (ExitCode.USAGE, "batch file wrong", "batch wrong.yaml", None),
+    (ExitCode.INPUT, "no such image", "vectorize none.png", None),
+    (ExitCode.INPUT, "no such image", "refine drawing.svg none.png -o a.svg", None),
+    (ExitCode.INPUT, "no such image", "eval none.png drawing.svg", None),
+    (ExitCode.INPUT, "no image", "vectorize broken.png", None),
+    (ExitCode.INPUT, "no image", "refine drawing.svg broken.png -o a.svg", None),
+    (ExitCode.INPUT, "no image", "eval broken.png drawing.svg", None),
+    (ExitCode.INPUT, "the image is a folder", "vectorize folder.svg", None),
+    (ExitCode.INPUT, "no permission for the image", "vectorize photo.png",
+     _raising(Path, "open", PermissionError(errno.EACCES, os.strerror(errno.EACCES)))),
+    (ExitCode.INPUT, "no such SVG", "refine none.svg photo.png -o a.svg", None),
+    (ExitCode.INPUT, "no such SVG", "eval photo.png none.svg", None),
+    (ExitCode.INPUT, "no such SVG", "render none.svg -o a.png", None),
+    (ExitCode.INPUT, "no SVG", "refine broken.png photo.png -o a.svg", None),
+    (ExitCode.INPUT, "no SVG", "eval photo.png broken.png", None),
+    (ExitCode.INPUT, "no SVG", "render broken.png -o a.png", None),
+    (ExitCode.INPUT, "an SVG that it cannot hold", "refine filter.svg photo.png -o a.svg", None),
+    (ExitCode.OUTPUT, "disk full", f"vectorize photo.png {QUICK}", NO_SPACE),
+    (ExitCode.OUTPUT, "disk full", f"refine drawing.svg photo.png -o a.svg {REFINE}", NO_SPACE),
+    (ExitCode.OUTPUT, "disk full", "render drawing.svg -o a.png", NO_SPACE),
+    (ExitCode.SOME_FAILED, "an image of a batch is none", "batch broken.yaml", None),
+    (ExitCode.SOME_FAILED, "disk full", "batch good.yaml", NO_SPACE),
+    (ExitCode.SOME_FAILED, "no memory for an image of a batch", "batch good.yaml", NO_MEMORY),
+    (ExitCode.SOME_FAILED, "a fault of the program in a batch", "batch good.yaml", FAULT),
+    (ExitCode.GOAL_MISSED, "target PSNR missed", f"vectorize photo.png {QUICK} --target-psnr 90", None),
+    (ExitCode.GOAL_MISSED, "size missed", f"vectorize photo.png {QUICK} --max-bytes 10", None),
+    (ExitCode.GOAL_MISSED, "time missed", f"vectorize photo.png {QUICK} --time-budget 1ms", None),
+    (ExitCode.GOAL_MISSED, "time missed",
+     f"refine drawing.svg photo.png -o a.svg {CPU} --time-budget 1ms", None),
+    (ExitCode.GOAL_MISSED, "target PSNR missed", "batch missed.yaml", None),
+    (ExitCode.RESOURCES, "no memory", f"vectorize photo.png {QUICK}", NO_MEMORY),
+    (ExitCode.RESOURCES, "no memory", f"refine drawing.svg photo.png -o a.svg {REFINE}", NO_MEMORY),
+    (ExitCode.RESOURCES, "no memory", "bench --curves 4 --size 32x32", NO_MEMORY),
+    (ExitCode.RESOURCES, "no memory for the pixels", f"vectorize photo.png {QUICK}", NO_MEMORY_FOR_PIXELS),
+    (ExitCode.RESOURCES, "no memory for the pixels", "eval photo.png drawing.svg", NO_MEMORY_FOR_PIXELS),
+    (ExitCode.RESOURCES, "no memory for the picture", "render drawing.svg -o a.png",
+     _raising(Image.Image, "save", MemoryError())),
+    (ExitCode.INTERRUPTED, "Ctrl-C", f"vectorize photo.png {QUICK}", CTRL_C),
+    (ExitCode.INTERRUPTED, "Ctrl-C", "batch good.yaml", CTRL_C),
+    (ExitCode.INTERRUPTED, "Ctrl-C", f"refine drawing.svg photo.png -o a.svg {REFINE}", CTRL_C),
+    (ExitCode.INTERRUPTED, "Ctrl-C", "eval photo.png drawing.svg", CTRL_C),
+]  # fmt: skip
+"""SIGTERM, and both signals at each stage: ``test_signals.py``. Full streams: ``test_limits.py``."""
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    scratch = tmp_path_factory.mktemp("inputs") / "photo.png"
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(scratch)
+    head = b'<svg xmlns="http://www.w3.org/2000/svg" width="32" height="24">'
+    options = "iterations: 4, curves: 4, device: cpu"
+    return {
+        "photo.png": scratch.read_bytes(),
+        "broken.png": b"no image",
+        "foreign.png": scratch.read_bytes(),
+        "foreign.svg": head + b"<!-- by hand --></svg>",
+        "drawing.svg": own_svg("fill"),
+        "filter.svg": head + b'<filter id="f"/><path d="M0 0H9V9z" filter="url(#f)"/></svg>',
+        "good.yaml": f"jobs: [{{images: photo.png, {options}}}]".encode(),
+        "broken.yaml": f"jobs: [{{images: [photo.png, broken.png], {options}}}]".encode(),
+        "foreign.yaml": f"jobs: [{{images: foreign.png, {options}}}]".encode(),
+        "missed.yaml": f"jobs: [{{images: photo.png, target-psnr: 90, {options}}}]".encode(),
+        "wrong.yaml": b"jobs: [{images: photo.png, curvs: 4}]",
+    }
+
+
+@pytest.mark.parametrize(
+    ("code", "line", "patch"),
+    [pytest.param(c, line, p, id=f"{int(c)}-{line.split()[0]}-{what}") for c, what, line, p in TABLE],
+)
+def test_exit_code(
+    tmp_path: Path,
+    inputs: dict[str, bytes],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    code: ExitCode,
+    line: str,
+    patch: Patch | None,
+) -> None:
+    for name, data in inputs.items():
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "folder.svg").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with monkeypatch.context() as patched:
+        if patch:
+            patch(patched)
+        assert run(*line.split()) == code
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    if code not in (ExitCode.DONE, ExitCode.SOME_FAILED) and not line.startswith("batch"):
+        assert re.fullmatch(r"\n?warpsplat: .*\n", said), "one line on stderr"
+    assert {n: (tmp_path / n).read_bytes() for n in inputs} == inputs, "inputs are as they were"
+    written = set(os.listdir(tmp_path)) - set(inputs) - {"folder.svg"}
+    whole = code in (ExitCode.DONE, ExitCode.GOAL_MISSED, ExitCode.SOME_FAILED)
+    assert all(whole and Path(name).suffix in (".svg", ".png") for name in written), "nothing is half written"
+
+
+def test_every_code_and_command_is_in_the_table() -> None:
+    from warpsplat.cli.main import COMMANDS
+
+    assert {code for code, *_ in TABLE} == set(ExitCode) - {ExitCode.TERMINATED}
+    assert {line.split()[0] for _, _, line, _ in TABLE} == {*COMMANDS, "nonsense"}
+
+
+def test_the_readme_lists_the_codes() -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+    section = readme.split("### Exit codes")[1].split("\n#")[0]
+    listed = [int(number) for number in re.findall(r"^\| (\d+) \|", section, re.MULTILINE)]
+    assert listed == sorted(set(ExitCode)), "each code once, in order"
+
+
+def test_help_lists_the_codes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--help") == 0
+    text = " ".join(capsys.readouterr().out.split("Exit codes:")[1].split())
+    listed = [int(number) for number in re.findall(r"(?:^|, )(\d+) ", text.split(".")[0] + " ")]
+    assert listed == sorted(set(ExitCode))

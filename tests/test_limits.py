@@ -1,0 +1,147 @@
+"""Where the system says no (no room, no right, no reader): one line, the right code, nothing half written."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.forks import QUICK, ROOT, Forks, make_image
+from tests.fuzz.corpus import own_svg
+
+
+@pytest.fixture(scope="module")
+def forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forks]:
+    made = Forks(tmp_path_factory.mktemp("forks"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A folder with inputs that every user can reach."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name)
+        path.chmod(0o755)
+        make_image(path / "a.png")
+        (path / "drawing.svg").write_bytes(own_svg("fill"))
+        (path / "jobs.yaml").write_text(
+            f"jobs: [{{images: a.png, output: out, curves: 4, iterations: {QUICK[-1]}, device: cpu}}]"
+        )
+        yield path
+
+
+def assert_one_line(text: str) -> None:
+    assert text.startswith("warpsplat: "), text
+    assert text.count("\n") == 1, text
+
+
+ROOM = 500
+"""Largest file [bytes]: less than any result."""
+
+VECTORIZE = f"vectorize a.png -o a.svg {' '.join(QUICK)}"
+WRITING = {
+    "vectorize": VECTORIZE,
+    "refine": "refine drawing.svg a.png -o a.svg --device cpu --iterations 1",
+    "render": "render drawing.svg -o a-large.png --scale 9",
+}
+
+
+@pytest.mark.parametrize("command", WRITING)
+def test_a_limit_on_the_size_of_files(forks: Forks, folder: Path, command: str) -> None:
+    before = sorted(os.listdir(folder))
+    code, out, err = forks.run(WRITING[command].split(), folder, file_size=ROOM)
+    assert code == 4, err
+    assert out == ""
+    assert_one_line(err)
+    assert sorted(os.listdir(folder)) == before
+
+
+def test_a_limit_on_the_size_of_files_in_a_batch(forks: Forks, folder: Path) -> None:
+    code, out, err = forks.run(["batch", "jobs.yaml"], folder, file_size=ROOM)
+    assert code == 5, err
+    assert "1 failed" in out
+    assert "Traceback" not in err
+    assert os.listdir(folder / "out") == []
+
+
+@pytest.mark.parametrize("command", WRITING)
+def test_a_folder_without_permission(forks: Forks, folder: Path, command: str) -> None:
+    folder.chmod(0o555)
+    before = sorted(os.listdir(folder))
+    code, out, err = forks.run(WRITING[command].split(), folder, rights=False)
+    assert code == 2, err
+    assert out == ""
+    assert_one_line(err)
+    assert "ermission" in err
+    assert sorted(os.listdir(folder)) == before
+
+
+def test_a_batch_without_permission_fails_before_any_work(forks: Forks, folder: Path) -> None:
+    folder.chmod(0o555)
+    code, out, err = forks.run(["batch", "jobs.yaml"], folder, rights=False)
+    assert code == 2, err
+    assert out == ""
+    assert_one_line(err)
+    assert "jobs.yaml:1: " in err
+    assert "output" in err
+
+
+@pytest.mark.parametrize("name", ["a.png", "drawing.svg"])
+def test_an_input_without_permission(forks: Forks, folder: Path, name: str) -> None:
+    (folder / name).chmod(0)
+    code, _, err = forks.run(["eval", "a.png", "drawing.svg"], folder, rights=False)
+    assert code == 3, err
+    assert_one_line(err)
+    assert f"{name}: no permission" in err
+
+
+@pytest.mark.parametrize("output", ["a.png/b.svg", "/proc/b.svg", "/dev/full", "loop.svg"])
+def test_places_where_no_file_can_be(forks: Forks, folder: Path, output: str) -> None:
+    (folder / "loop.svg").symlink_to("loop.svg")
+    code, out, err = forks.run(["vectorize", "a.png", "-o", output, *QUICK], folder)
+    assert code == 2, err
+    assert out == ""
+    assert_one_line(err)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("command", ["info --json", "eval a.png drawing.svg"])
+def test_results_that_nobody_can_take(forks: Forks, folder: Path, command: str) -> None:
+    code, _, err = forks.run(command.split(), folder, stdout="/dev/full")
+    assert code == 4, err
+    assert_one_line(err)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+def test_messages_that_nobody_can_take(forks: Forks, folder: Path) -> None:
+    """The code is that of the failure, and what was asked for is done."""
+    assert forks.run(["eval", "none.png", "drawing.svg"], folder, stderr="/dev/full")[0] == 3
+    code, out, _ = forks.run([*VECTORIZE.split(), "-v"], folder, stderr="/dev/full")
+    assert code == 0
+    assert out.startswith("a.svg: ")
+
+
+@pytest.mark.parametrize(("stream", "command"), [(0, "info"), (1, "info"), (2, VECTORIZE)])
+def test_a_closed_stream(folder: Path, stream: int, command: str) -> None:
+    """As ``>&-`` in a shell."""
+    done = subprocess.run(
+        [sys.executable, "-m", "warpsplat", *command.split()],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        preexec_fn=lambda: os.close(stream),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode in ((0, 4) if stream == 1 else (0,)), done.stderr
+    assert "Traceback" not in done.stderr
+    if command == VECTORIZE:
+        assert done.stdout.startswith("a.svg: ")
+        assert (folder / "a.svg").read_bytes().rstrip().endswith(b"</svg>")
