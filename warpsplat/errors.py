@@ -64,3 +64,7 @@ class ResourceError(WarpsplatError):
 
 class CapacityError(ResourceError):
     """A device array would have to grow past what the machine can hold."""
+
+
+class Stopped(Exception):  # noqa: N818 - a wish that came true, no error
+    """Work was given up because its caller's ``stop`` said so. The caller catches it; no user sees it."""
