@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
 
@@ -9,14 +10,19 @@ import numpy as np
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError
+from warpsplat.inputs import input_name, read_input
 from warpsplat.scene import FloatArray
 
 MIN_SIDE = 2
 """Smallest side of an image [px]: with one pixel there is nothing to fit a curve to."""
 
 
-def load_image(path: Path) -> FloatArray:
-    """Read an image file: first frame, EXIF rotation applied, transparency composited on white.
+def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
+    """Read an image: first frame, EXIF rotation applied, transparency composited on white.
+
+    Args:
+        source: a file, or its bytes.
+        name: how messages call it; default: the file's.
 
     Returns:
         sRGB in [0, 1], shape (height, width, 3), float32. 16-bit images keep their precision.
@@ -25,24 +31,18 @@ def load_image(path: Path) -> FloatArray:
         ImageError: missing, unreadable, truncated, not an image, too large or too small. The message is one
             line that names the file and the cause.
     """
+    path = name or (input_name(source) if isinstance(source, Path) else "image")
+    data = read_input(source) if isinstance(source, Path) else source
     try:
-        if path.stat().st_size == 0 and path.is_file():
-            raise ImageError(f"{path}: the file is empty")
         with warnings.catch_warnings():
             # Pillow warns of what it can read all the same (odd metadata), and of bombs, which are refused.
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path) as opened:
+            with Image.open(io.BytesIO(data)) as opened:
                 opened.load()
                 pixels = to_srgb(ImageOps.exif_transpose(opened))
     except ImageError:
         raise
-    except FileNotFoundError:
-        raise ImageError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise ImageError(f"{path}: is a folder, not an image") from None
-    except PermissionError:
-        raise ImageError(f"{path}: no permission to read it") from None
     except UnidentifiedImageError:
         raise ImageError(f"{path}: not an image, or a format that Pillow cannot read") from None
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
