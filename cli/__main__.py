@@ -1,5 +1,5 @@
 """``python -m warpsplat.cli``."""
 
-from warpsplat.cli.main import main
+from warpsplat.__main__ import main
 
 main()

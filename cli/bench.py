@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import threads_option
+from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 
 
@@ -74,4 +75,4 @@ def command(size: str, device: str, verbose: int, as_json: bool, **options: Any)
 
     start_warp()
     values = bench(width=width, height=height, device=choose_device(device), **options)
-    click.echo(json.dumps(values) if as_json else table(values, verbose))
+    say(json.dumps(values) if as_json else table(values, verbose))

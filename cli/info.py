@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.say import say
+
 
 @click.command("info", context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -31,10 +33,10 @@ def command(as_json: bool) -> None:
         "kernel_cache": str(wp.config.kernel_cache_dir),
     }
     if as_json:
-        click.echo(json.dumps(values))
+        say(json.dumps(values))
         return
-    click.echo(f"warpsplat {values['warpsplat']}, Warp {values['warp']}, Python {values['python']}")
+    say(f"warpsplat {values['warpsplat']}, Warp {values['warp']}, Python {values['python']}")
     for found in values["devices"]:
         mark = "  (default)" if found["name"] == values["default_device"] else ""
-        click.echo(f"  {found['name']:8} {found['description']}{mark}")
-    click.echo(f"  {values['cpu_threads']} CPU threads; compiled kernels in {values['kernel_cache']}")
+        say(f"  {found['name']:8} {found['description']}{mark}")
+    say(f"  {values['cpu_threads']} CPU threads; compiled kernels in {values['kernel_cache']}")

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import importlib
+import os
+import signal
 import sys
-from typing import Any
+import traceback
+from typing import Any, NoReturn
 
 import click
 
 from warpsplat._version import __version__
-from warpsplat.errors import ExitCode, WarpsplatError
+from warpsplat.cli import signals
+from warpsplat.cli.say import open_standard_streams, say, show_notices, silence
+from warpsplat.errors import ExitCode, OutputError, explain, printable
 
 COMMANDS = {
     "vectorize": "Turn an image into an SVG.",
@@ -39,6 +44,14 @@ class LazyGroup(click.Group):
             return None
         return getattr(importlib.import_module(f"warpsplat.cli.{MODULES.get(cmd_name, cmd_name)}"), "command")  # noqa: B009
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command. Of a reader of stdout that has gone, click would say nothing and exit with 1."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:
+            silence(sys.stdout)
+            raise OutputError("standard output: nobody reads it any more") from error
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list, without importing the commands."""
         with formatter.section("Commands"):
@@ -51,35 +64,55 @@ def cli() -> None:
     """Turn raster images into SVGs of Bézier shapes by gradient descent.
 
     \b
-    Exit codes: 0 done, 2 wrong usage, 3 unreadable image, 4 result could not
-    be written, 5 some images of a batch failed, 6 a goal was missed, 130 interrupted.
+    Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image or
+    SVG, 4 result could not be written, 5 some images of a batch failed, 6 a goal
+    was missed, 7 not enough memory, threads or kernel cache, 130 interrupted,
+    143 terminated.
     """  # noqa: D301
 
 
-def main(arguments: list[str] | None = None) -> Any:
-    """Run the command line; errors end in one line on stderr and the exit code of their kind."""
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line; whatever is raised ends in one line on stderr and the exit code of its kind.
+
+    Where a signal came, the code says so, whatever else there is to say: a shell's loop must not go on.
+    """
+    code: Any = ExitCode.INTERNAL
     try:
-        sys.exit(cli.main(args=arguments, prog_name="warpsplat", standalone_mode=False) or 0)
-    except click.exceptions.Abort:
-        click.echo("warpsplat: interrupted", err=True)
-        sys.exit(ExitCode.INTERRUPTED)
-    except click.exceptions.NoArgsIsHelpError as error:
+        with signals.handled():
+            open_standard_streams()
+            show_notices()
+            code = cli.main(args=arguments, prog_name="warpsplat", standalone_mode=False) or 0
+            sys.stdout.flush()
+    except SystemExit as error:
+        code = error.code
+    except BaseException as error:
+        code = report(error)
+    number = signals.received()
+    sys.exit(128 + number if number else int(code or 0))
+
+
+def report(error: BaseException) -> int:
+    """Say what was raised, and return the exit code for it."""
+    number = signals.received() or (signal.SIGINT if isinstance(error, KeyboardInterrupt) else None)
+    if os.environ.get("WARPSPLAT_TRACEBACK"):
+        traceback.print_exception(error)
+    if number or isinstance(error, click.exceptions.Abort):
+        # What a library makes of an interruption inside of it (an ImportError, say) is an interruption.
+        say("warpsplat: interrupted", err=True)
+        return 128 + (number or signal.SIGINT)
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.format_message())
-        sys.exit(2)
-    except click.ClickException as error:
+        return ExitCode.USAGE
+    if isinstance(error, click.ClickException):
         context = getattr(error, "ctx", None)
         help_of = f" (see {context.command_path} --help)" if context else ""
-        click.echo(f"warpsplat: {error.format_message()}{help_of}", err=True)
-        sys.exit(error.exit_code)
-    except WarpsplatError as error:
-        click.echo(f"warpsplat: {error}", err=True)
-        sys.exit(error.exit_code)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
-    except OSError as error:
-        click.echo(f"warpsplat: {error.filename or 'output'}: {error.strerror or error}", err=True)
-        sys.exit(ExitCode.OUTPUT)
+        message, code = printable(error.format_message()) + help_of, error.exit_code
+    else:
+        message, code = explain(error)
+    if isinstance(error, OSError) and error.filename is None:
+        silence(sys.stdout)  # what is left in its buffer cannot be written either
+    say(f"warpsplat: {message}", err=True)
+    return code
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
+from warpsplat.cli.say import set_voice
 from warpsplat.config import QUALITIES, Settings, make_settings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -17,8 +18,29 @@ threads_option = click.option(
     "--threads",
     type=click.IntRange(min=1),
     metavar="N",
-    help="CPU threads; the result is the same for any number.  [default: all cores]",
+    help="CPU threads, 8 a core at most; the result is the same for any number.  [default: all cores]",
 )
+
+overwrite_option = click.option(
+    "--overwrite", is_flag=True, help="Replace files that warpsplat did not write as well."
+)
+
+
+def voice_options(function: Function) -> Function:
+    """``-v`` and ``-q``."""
+
+    def follow(context: click.Context, parameter: click.Parameter, value: int | bool) -> int | bool:
+        if value:
+            set_voice(quiet=parameter.name == "quiet")
+        return value
+
+    options = [
+        click.option("-v", "--verbose", count=True, callback=follow, help="Say more, on stderr."),
+        click.option("-q", "--quiet", is_flag=True, callback=follow, help="Say nothing but errors."),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
 
 
 def quality_options(function: Function) -> Function:
@@ -64,8 +86,7 @@ def run_options(function: Function) -> Function:
             help="auto (a GPU if there is one), cpu, or cuda:N.",
         ),
         threads_option,
-        click.option("-v", "--verbose", count=True, help="Say more, on stderr."),
-        click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+        voice_options,
     ]
     for option in reversed(options):
         function = option(function)

@@ -40,7 +40,8 @@ def command(
     widths move. A result that is no better is not taken.
     """
     settings = make_settings(**given)
-    from warpsplat.cli.run import Interrupt, leave, progress_bar
+    from warpsplat.cli.run import leave, progress_bar
+    from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.vectorize import summary
     from warpsplat.device import choose_device, start_warp
     from warpsplat.files import check_output, write_atomically

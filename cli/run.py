@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,35 +11,21 @@ from typing import Any
 import click
 import warp as wp
 
+from warpsplat.cli.say import say
+from warpsplat.cli.signals import Interrupt
 from warpsplat.config import Settings
-from warpsplat.errors import ExitCode
+from warpsplat.errors import ExitCode, printable
+from warpsplat.inputs import input_name
 from warpsplat.pipeline import Result, vectorize_file
 from warpsplat.train import Progress
 
+BAR_LENGTH = 1000
+"""Of a progress bar: thousandths of the work."""
 
-class Interrupt:
-    """Turns the first Ctrl-C into a wish to stop; a second one ends the program at once."""
 
-    def __init__(self) -> None:
-        self.requested = False
-
-    def __call__(self) -> bool:
-        """Whether to stop."""
-        return self.requested
-
-    def _handle(self, number: int, frame: Any) -> None:
-        if self.requested:
-            raise KeyboardInterrupt
-        self.requested = True
-
-    @contextlib.contextmanager
-    def watching(self) -> Iterator[None]:
-        """Catch Ctrl-C in the block."""
-        before = signal.signal(signal.SIGINT, self._handle)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, before)
+def _quality(progress: Progress) -> str:
+    """The decibels, but only of the finest size: a reduced image has more, and they would seem to fall."""
+    return f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
 
 
 @contextlib.contextmanager
@@ -52,28 +37,21 @@ def progress_bar(
 
         def tell(progress: Progress) -> None:
             if verbose > 1:
-                click.echo(
-                    f"{source}: step {progress.step}/{progress.steps}, {progress.psnr:.2f} dB, "
-                    f"{progress.seconds:.1f} s",
-                    err=True,
-                )
+                step = f"step {progress.step}/{progress.steps}"
+                say(f"{source}: {step}, {_quality(progress)}, {progress.seconds:.1f} s", err=True)
 
         yield tell
         return
     bar: Any
     with click.progressbar(
-        length=settings.iterations,
-        label=source.name,
+        length=BAR_LENGTH,
+        label=printable(source.name),
         file=sys.stderr,
-        item_show_func=lambda p: f"{p.psnr:.2f} dB" if p else None,
+        item_show_func=lambda p: _quality(p) if p else None,
     ) as bar:
-        last = 0
 
         def show(progress: Progress) -> None:
-            nonlocal last
-            bar.length = progress.steps  # a time budget may change it
-            bar.update(progress.step - last, progress)
-            last = progress.step
+            bar.update(round(BAR_LENGTH * progress.work) - bar.pos, progress)
 
         yield show
 
@@ -84,26 +62,31 @@ def run_file(
     settings: Settings,
     device: wp.Device,
     *,
+    data: bytes,
     threads: int | None = None,
     verbose: int = 0,
     quiet: bool = False,
-    interrupt: Interrupt | None = None,
 ) -> Result:
-    """``vectorize_file`` with a progress bar."""
-    interrupt = interrupt or Interrupt()
+    """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
     if verbose:
-        click.echo(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
+        say(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
+    interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         return vectorize_file(
-            source, output, settings, device, threads=threads, report=report, stop=interrupt
+            data,
+            output,
+            settings,
+            device,
+            name=input_name(source),
+            threads=threads,
+            report=report,
+            stop=interrupt,
         )
 
 
 def leave(result: Result) -> None:
     """Name missed goals and end the program with the code for it, if there is one to give."""
     for goal in result.missed:
-        click.echo(f"warpsplat: goal missed: {goal}", err=True)
-    if result.stopped:
-        sys.exit(ExitCode.INTERRUPTED)
+        say(f"warpsplat: goal missed: {goal}", err=True)
     if result.missed:
         sys.exit(ExitCode.GOAL_MISSED)

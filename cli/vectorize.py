@@ -8,18 +8,23 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import quality_options, run_options, settings_from
-from warpsplat.errors import ImageError
+from warpsplat.cli.options import overwrite_option, quality_options, run_options, settings_from
+from warpsplat.cli.say import say
+from warpsplat.errors import UsageError
 
 
 def summary(output: Path, values: dict[str, Any]) -> str:
     """One line on the result, for people."""
+    name = "standard output" if str(output) == "-" else output
+    note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
+    if values["paths"] is None:
+        size = f"{values['bytes'] / 1000:.1f} kB"
+        return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
     ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
-    note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
     return (
-        f"{output}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
+        f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
         f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
         f"{values['seconds']:.1f} s{note}"
     )
@@ -28,14 +33,19 @@ def summary(output: Path, values: dict[str, Any]) -> str:
 @click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("image", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="SVG to write.  [default: IMAGE with .svg, here]"
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="SVG to write; - is the standard output.  [default: IMAGE with .svg, here]",
 )
+@overwrite_option
 @quality_options
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
     image: Path,
     output: Path | None,
+    overwrite: bool,
     device: str,
     threads: int | None,
     verbose: int,
@@ -43,30 +53,38 @@ def command(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """Turn IMAGE into an SVG and say how good the file is.
+    """Turn IMAGE (- is the standard input) into an SVG and say how good the file is.
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
-    against the image, number of paths, size.
+    against the image, number of paths, size. They go to stderr where the SVG
+    goes to stdout.
     """
     settings = settings_from(given)
-    if not image.name or image.is_dir():
-        raise ImageError(f"{image}: is a folder, not an image")
-    output = output or Path(image.name).with_suffix(".svg")
-    if not image.exists():
-        raise ImageError(f"{image}: no such file")
     from warpsplat.files import check_output
+    from warpsplat.inputs import STANDARD, read_input
 
-    check_output(output, image)
+    if output is None and image == STANDARD:
+        raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
+    data = read_input(image)
+    output = output or Path(image.name).with_suffix(".svg")
+    check_output(output, image, ending=".svg", overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
     from warpsplat.device import choose_device, start_warp
 
     start_warp()
     result = run_file(
-        image, output, settings, choose_device(device), threads=threads, verbose=verbose, quiet=quiet
+        image,
+        output,
+        settings,
+        choose_device(device),
+        data=data,
+        threads=threads,
+        verbose=verbose,
+        quiet=quiet,
     )
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
     if as_json:
-        click.echo(json.dumps(values))
+        say(json.dumps(values), err=output == STANDARD)
     elif not quiet:
-        click.echo(summary(output, values))
+        say(summary(output, values), err=output == STANDARD)
     leave(result)

@@ -1,7 +1,7 @@
 """Runs commands of warpsplat under limits, and with signals at chosen moments.
 
-``Forks`` gives tasks to ``python -m tests.forks``, which has everything loaded and runs each in a fork of itself:
-a run starts at once, and what it does to its process is gone with it.
+``Forks`` gives tasks to ``python -m tests.forks``, which has everything loaded and forks for each of them: a run
+starts at once, and what it does to its process is gone with it.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def run(task: Task) -> None:
 
 
 def _end(task: Task) -> None:
-    """Run a task, then end the process as Python would, less the clean-up of its origin."""
+    """Run a task, then end the process as Python would, but with nothing of the origin's clean-up."""
     code: Any = 0
     try:
         run(task)

@@ -66,7 +66,7 @@ def test_without_output_beside_the_image(folder: Path) -> None:
 
 
 BAD = [
-    ("", 1, "mapping"),
+    ("# nothing", 1, "mapping"),
     ("- 1", 1, "mapping"),
     ("defaults: {}\n", 1, "'jobs' is missing"),
     ("jobs:\n  - curves: 3\n", 2, "'images' is missing"),
@@ -93,7 +93,7 @@ BAD = [
     ("jobs:\n  - images: 'in/**a/[.png'\n", 2, "[.png"),
     ("jobs:\n  - images: ~nosuchuser/a.png\n", 2, "nosuchuser"),
     ("jobs:\n  - images: in/a.png\n    output: ~nosuchuser\n", 2, "nosuchuser"),
-    ("jobs:\n  - images: in/a.png\n    output: in/b.png\n", 2, "not a folder"),
+    ("jobs:\n  - images: in/a.png\n    output: in/b.png\n", 3, "not a folder"),
     ("jobs:\n  - images: in/a.png\n    target-psnr: true\n", 3, "target-psnr"),
     ("jobs:\n  - images: in/a.png\n    time-budget: soon\n", 3, "time-budget"),
     ("jobs:\n  - images: in/deep/../pic.svg\n", 1, "overwritten"),
@@ -156,10 +156,10 @@ def test_a_stopped_result_is_made_again(folder: Path) -> None:
     path = write(folder, "jobs: [{images: in/a.png, curves: 4, iterations: 5, device: cpu}]")
     assert run("batch", path, "-q") == 0
     job = load_jobs(path)[0]
-    assert job.done()
+    assert job.done(job.image.read_bytes())
     svg = job.output.read_text()
     job.output.write_text(svg[: svg.index("key=")] + "stopped" + svg[svg.index("</metadata>") :])
-    assert not job.done()
+    assert not job.done(job.image.read_bytes())
 
 
 def test_examples_are_valid(tmp_path: Path) -> None:

@@ -73,6 +73,7 @@ def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
     moved = replace(scene, points=scene.points + rng.normal(0, 1, scene.points.shape).astype(np.float32))
     text = write_svg(moved)
     result, before = refine(text, target, make_settings(iterations=120), wp.get_device(device), name="a.svg")
+    assert result.score
     assert result.score.psnr > before + 4
     assert result.score.paths == 6
     assert result.score.nodes <= 6 * 6
@@ -86,6 +87,7 @@ def test_padding_is_not_exported(device: str) -> None:
     )
     target = np.full((30, 40, 3), 0.4, np.float32)
     result, _ = refine(text, target, make_settings(iterations=10), wp.get_device(device), name="a.svg")
+    assert result.score
     assert result.score.nodes <= 20
 
 

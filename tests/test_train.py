@@ -49,6 +49,7 @@ def test_the_loss_falls_and_the_count_stays(device: str, kind: Kind) -> None:
     seen: list[Progress] = []
     result = vectorize(picture(), settings, wp.get_device(device), report=seen.append)
     assert len(result.scene) == 20
+    assert result.score
     assert result.score.paths == 20
     assert seen[-1].step == seen[-1].steps == 80
     assert seen[-1].psnr > seen[0].psnr + 2
@@ -69,6 +70,7 @@ def test_paper_options_run(device: str) -> None:
     result = vectorize(picture(), settings, wp.get_device(device))
     assert len(result.scene) == 8
     assert result.scene.opacities.shape == (8, 3)
+    assert result.score
     assert result.score.paths == 24
 
 
@@ -122,6 +124,7 @@ def test_a_photograph_reaches_its_figure(renderer: Renderer, kind: Kind, figure:
     """451x300, 192 curves, 100 steps: PSNR of the file, and how much more the training render has."""
     settings = make_settings(renderer=renderer, kind=kind, curves=192, iterations=100, coarse_pixels=30_000)
     result = vectorize(load_image(CAT), settings, wp.get_device("cpu"))
+    assert result.score
     assert result.score.psnr > figure
     assert abs(result.internal_psnr - result.score.psnr) < gap
 
@@ -138,6 +141,7 @@ def test_time_budget_sizes_the_run(device: str) -> None:
 def test_target_psnr_ends_the_run(device: str) -> None:
     settings = make_settings(curves=20, iterations=3000, target_psnr=22.0)
     result = vectorize(picture(), settings, wp.get_device(device))
+    assert result.score
     assert result.score.psnr >= 22
     assert result.iterations < 3000
     assert not result.missed
@@ -149,6 +153,7 @@ def test_max_bytes_is_kept(device: str) -> None:
     for limit in (900, 3000):
         settings = make_settings(curves=200, iterations=15, max_bytes=limit)
         result = vectorize(picture(), settings, wp.get_device(device))
+        assert result.score
         assert result.score.bytes <= limit
         assert len(result.scene) >= limit // 300 - 1
     tiny = vectorize(picture(), replace(settings, max_bytes=50), wp.get_device(device))

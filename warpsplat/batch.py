@@ -17,7 +17,10 @@ Paths are relative to the YAML file.
 
 from __future__ import annotations
 
+import errno
 import os
+import reprlib
+import stat
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,7 +30,9 @@ from typing import Any
 import yaml
 
 from warpsplat.config import Settings, make_settings
-from warpsplat.errors import UsageError
+from warpsplat.errors import ImageError, UsageError
+from warpsplat.files import HEAD, check_output, check_target, may_replace
+from warpsplat.inputs import read_input
 from warpsplat.pipeline import job_key
 from warpsplat.svg import read_metadata
 
@@ -46,15 +51,34 @@ class Job:
     output: Path
     settings: Settings
     device: str
+    where: str = ""
+    """File and line that ask for it, for messages."""
 
-    def done(self) -> bool:
-        """Whether ``output`` is there and was made from this image with these settings."""
+    def done(self, data: bytes) -> bool:
+        """Whether ``output`` is there, whole, and was made from an image of the bytes ``data`` so."""
         try:
+            if not stat.S_ISREG(os.stat(self.output).st_mode):
+                return False  # opening a pipe would wait for whoever fills it
             with self.output.open("rb") as file:
-                head = file.read(2000).decode("utf-8", "replace")
-            return read_metadata(head).endswith(f"key={job_key(self.settings, self.image.read_bytes())}")
+                head = file.read(HEAD).decode("utf-8", "replace")
+                file.seek(max(0, file.seek(0, os.SEEK_END) - len(TAIL)))
+                whole = file.read() == TAIL
+            return whole and read_metadata(head).endswith(f"key={job_key(self.settings, data)}")
         except OSError:
             return False
+
+
+TAIL = b"</svg>\n"
+"""How every SVG that was written here ends; one that was cut short does not."""
+
+MAX_FILE = 1 << 20
+"""Largest batch file [bytes]: reading a mebibyte of YAML takes some seconds."""
+
+MAX_DEPTH = 16
+"""Deepest nesting of a batch file; four is what one needs."""
+
+MAX_SCALAR = 4096
+"""Longest single value [characters]: that of the longest path."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +95,38 @@ class _File:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            text = path.read_text("utf-8")
-        except FileNotFoundError:
-            raise UsageError(f"{path}: no such file") from None
-        except IsADirectoryError:
-            raise UsageError(f"{path}: is a folder, not a YAML file") from None
-        except (OSError, UnicodeDecodeError) as error:
-            raise UsageError(f"{path}: cannot be read: {error}") from error
+            text = read_input(path, "a YAML file", limit=MAX_FILE).decode("utf-8-sig")
+        except ImageError as error:
+            raise UsageError(str(error)) from error
+        except UnicodeDecodeError as error:
+            raise UsageError(f"{path}: cannot be read: not UTF-8, at byte {error.start}") from error
+        reader: Any = None
         try:
-            self.root = yaml.compose(text, yaml.SafeLoader)
+            reader = yaml.SafeLoader(text)
+            self._check(text)
+            self.root = reader.get_single_node()
             self.loader = yaml.SafeLoader("")
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             raise self.error(mark.line + 1 if mark else 1, f"not valid YAML: {error.problem}") from None
-        except yaml.YAMLError as error:
-            raise UsageError(f"{path}: not valid YAML: {str(error).splitlines()[0]}") from None
+        except yaml.reader.ReaderError as error:
+            line = text.count("\n", 0, error.position) + 1
+            raise self.error(line, f"not valid YAML: character {error.character!r} is not allowed") from None
+        except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
+            # An escape beyond Unicode, say: the scanner lets chr() raise.
+            cause = str(error).splitlines()[0]
+            raise self.error(reader.line + 1 if reader else 1, f"not valid YAML: {cause}") from None
+
+    def _check(self, text: str) -> None:
+        """Refuse what is too deep or too long for a batch file before it is built."""
+        depth = 0
+        for event in yaml.parse(text, yaml.SafeLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            line = event.start_mark.line + 1 if event.start_mark else 1
+            if depth > MAX_DEPTH:
+                raise self.error(line, f"nested deeper than {MAX_DEPTH} levels")
+            if isinstance(event, yaml.ScalarEvent) and len(event.value) > MAX_SCALAR:
+                raise self.error(line, f"a value of more than {MAX_SCALAR} characters")
 
     def error(self, line: int, message: str) -> UsageError:
         return UsageError(f"{self.path}:{line}: {message}")
@@ -100,7 +141,7 @@ class _File:
         result: dict[str, tuple[int, yaml.Node]] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
-            key = str(key_node.value)
+            key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
             if key not in allowed:
                 raise self.error(line, f"unknown key {key!r} in {where}; known are: {', '.join(allowed)}")
             if key in result:
@@ -113,7 +154,20 @@ class _File:
             return self.loader.construct_object(node, deep=True)
         except Exception as error:  # tags and scalars of YAML's own types raise what their constructors raise
             line = node.start_mark.line + 1
-            raise self.error(line, f"not a plain value: {str(error).splitlines()[0]}") from error
+            cause = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise self.error(line, f"not a plain value: {cause}") from error
+
+    def text(self, line: int, key: str, value: Any) -> str:
+        """``value`` as a path or name.
+
+        Raises:
+            UsageError: it is no text, or holds what no name can.
+        """
+        if not isinstance(value, str):
+            raise self.error(line, f"{key}: must be text, not {reprlib.repr(value)}")
+        if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
+            raise self.error(line, f"{key}: {value!r} holds a character that no name can have")
+        return value
 
 
 def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, _Value]:
@@ -123,8 +177,10 @@ def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str
         if key not in KEYS:
             continue
         value = file.value(node)
-        if key in (*TEXT_KEYS, "quality") and (not isinstance(value, str) or "\0" in value):
-            raise file.error(line, f"{key}: must be text, not {value!r}")
+        if not isinstance(node, yaml.ScalarNode):
+            raise file.error(line, f"{key}: must be one value, not {reprlib.repr(value)}")
+        if key in (*TEXT_KEYS, "quality"):
+            file.text(line, key, value)
         if key in KIND_KEYS and value is not True:
             raise file.error(line, f"{key}: must be true, not {value!r}; leave it out or give the other kind")
         if key in (*SETTING_KEYS, *GOAL_KEYS):
@@ -160,6 +216,7 @@ def _images(file: _File, line: int, node: yaml.Node) -> list[Path]:
         patterns = [patterns]
     if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) and p for p in patterns):
         raise file.error(line, "images: must be a path or pattern, or a list of them")
+    patterns = [file.text(line, "images", pattern) for pattern in patterns]
     found: dict[Path, None] = {}
     for pattern in patterns:
         try:
@@ -203,13 +260,14 @@ def load_jobs(path: Path) -> list[Job]:
     line, node = top["jobs"]
     if not isinstance(node, yaml.SequenceNode) or not node.value:
         raise file.error(line, "jobs: must be a list with at least one job")
-    planned: list[tuple[Path, Path, Settings, str]] = []
+    planned: list[_Planned] = []
     for item in node.value:
         entries = file.mapping(item, "a job", ("images", *KEYS))
         start = item.start_mark.line + 1
         if "images" not in entries:
             raise file.error(start, "key 'images' is missing in a job")
-        options = _merge(defaults, _options(file, entries))
+        own = _options(file, entries)
+        options = _merge(defaults, own)
         kind = "open" if options.pop("open", False) else "closed" if options.pop("closed", False) else None
         output, device = options.pop("output", None), options.pop("device", "auto")
         settings = make_settings(options.pop("quality", "balanced"), kind=kind, **options)
@@ -217,23 +275,107 @@ def load_jobs(path: Path) -> list[Job]:
             folder_given = None if output is None else path.parent / Path(output).expanduser()
         except RuntimeError as error:
             raise file.error(start, f"output: {output!r}: {error}") from error
-        if folder_given and folder_given.exists() and not folder_given.is_dir():
-            raise file.error(start, f"output: {output!r} is a file, not a folder")
+        given = own.get("output") or defaults.get("output")
+        at = given.line if given else entries["images"][0]
         for image in _images(file, *entries["images"]):
-            folder = folder_given or image.parent
-            planned.append((image, folder, settings, device))
-    # a.png and a.jpg in one folder keep their endings; an image in two jobs cannot have one result.
-    distinct = {(folder, image) for image, folder, _, _ in planned}
+            planned.append(_Planned(image, folder_given or image.parent, settings, device, at))
+    jobs = _named(file, line, planned)
+    _check_outputs(file, [plan.line for plan in planned], jobs)
+    return jobs
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """An image and where its result goes, before that has a name."""
+
+    image: Path
+    folder: Path
+    settings: Settings
+    device: str
+    line: int
+
+
+def _named(file: _File, line: int, planned: list[_Planned]) -> list[Job]:
+    """Give each result a name; no two may have one, and none that of its image.
+
+    Of a.png and a.jpg in one folder the results keep the endings; an image in two jobs cannot have one
+    result.
+    """
+    distinct = {(plan.folder, plan.image) for plan in planned}
     stems = Counter((folder, image.stem) for folder, image in distinct)
     jobs = []
-    for image, folder, settings, device in planned:
+    for plan in planned:
+        image, folder = plan.image, plan.folder
         name = image.stem if stems[folder, image.stem] == 1 else image.name
-        jobs.append(Job(image, folder / f"{name}.svg", settings, device))
-        if jobs[-1].output.resolve() == image.resolve():
+        job = Job(image, folder / f"{name}.svg", plan.settings, plan.device, f"{file.path}:{plan.line}")
+        if os.path.realpath(job.output) == os.path.realpath(image):
             raise file.error(line, f"jobs: {image} would be overwritten by its own result; give an output")
-    for output_path, count in Counter(job.output for job in jobs).items():
+        jobs.append(job)
+    for output, count in Counter(job.output for job in jobs).items():
         if count > 1:
-            raise file.error(
-                line, f"jobs: {count} images would be written to {output_path}; give other outputs"
-            )
+            raise file.error(line, f"jobs: {count} images would be written to {output}; give other outputs")
     return jobs
+
+
+def _check_outputs(file: _File, lines: list[int], jobs: list[Job]) -> None:
+    """Find out before the work whether every result can be written.
+
+    Raises:
+        UsageError: a folder that is none, cannot be written or cannot be made, a name that is too long, or a
+            result that is a folder, a pipe, a device or a loop of links.
+    """
+    usable: set[Path] = set()
+    for line, job in zip(lines, jobs, strict=True):
+        folder = job.output.parent
+        try:
+            if folder not in usable:
+                _check_folder(folder)
+                usable.add(folder)
+            if folder.is_dir():
+                check_target(job.output)
+            else:
+                _check_names(folder, job.output.name)
+        except OSError as error:
+            cause = error.strerror or str(error)
+            raise file.error(line, f"output: {job.output} cannot be written: {cause}") from error
+        except UsageError as error:
+            raise file.error(line, f"output: {error}") from error
+
+
+def _check_folder(folder: Path) -> None:
+    """Check that ``folder`` can be written, or made."""
+    if folder.is_dir():
+        check_output(folder / "result.svg")
+        return
+    above = folder
+    while not os.path.lexists(above):
+        above = above.parent
+    if not above.is_dir():
+        raise UsageError(f"{above} is a file, not a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise UsageError(f"{folder} cannot be made: no permission to write to {above}")
+    _check_names(folder)
+
+
+def _check_names(folder: Path, name: str = "") -> None:
+    """Check the lengths of names in a folder that is yet to be made."""
+    above = folder
+    while not above.is_dir():
+        above = above.parent
+    longest = os.pathconf(above, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
+    for part in (*folder.relative_to(above).parts, name):
+        if len(os.fsencode(part)) > longest:
+            raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
+
+
+def not_ours(jobs: list[Job]) -> list[Path]:
+    """The results that are there already and that warpsplat did not write."""
+    found = []
+    for job in jobs:
+        try:
+            free = may_replace(job.output)
+        except OSError:
+            free = False
+        if not free:
+            found.append(job.output)
+    return found

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.config import Density, Settings
-from warpsplat.initialize import contour_angles, pixel_of, place
+from warpsplat.initialize import pixel_of, place, shape_angles
 from warpsplat.scene import FloatArray, IndexArray, Scene
 
 BoolArray = npt.NDArray[np.bool_]
@@ -143,5 +143,5 @@ def densify(
         sizes = np.concatenate([sizes, np.full(missing, 2.0, np.float32)])
     column, row = pixel_of(places, target)
     tones = cv2.GaussianBlur(target, (0, 0), 1.0)[row, column]
-    angles = contour_angles(target, places, 2.0)
+    angles = shape_angles(settings, target, places, 2.0)
     return place(settings, scene, places * unit, np.pi * (sizes * unit) ** 2, angles, tones)

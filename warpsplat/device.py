@@ -1,38 +1,28 @@
-"""Choosing a device."""
+"""Starting Warp and choosing a device."""
 
 from __future__ import annotations
-
-import contextlib
-import os
-from collections.abc import Iterator
 
 import warp as wp
 
 from warpsplat.errors import UsageError
-
-
-@contextlib.contextmanager
-def _native_messages_hidden() -> Iterator[None]:
-    """Send the process's standard error to nowhere: native code writes there behind Python's back."""
-    try:
-        saved = os.dup(2)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-    except OSError:
-        yield
-        return
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(nowhere)
+from warpsplat.kernel_cache import native_messages_hidden, use_temporary_folder
 
 
 def start_warp() -> None:
-    """Start Warp without its greeting and without a warning where there is no GPU."""
+    """Start Warp without its greeting and without a warning where there is no GPU.
+
+    Raises:
+        ResourceError: there is no folder for compiled kernels.
+    """
     wp.config.log_level = wp.LOG_WARNING
-    with _native_messages_hidden():
+    with native_messages_hidden():
+        try:
+            wp.init()
+            return
+        except OSError as error:
+            failure = error
+    use_temporary_folder(failure)  # outside the block, as it has something to say
+    with native_messages_hidden():
         wp.init()
 
 
@@ -45,7 +35,7 @@ def choose_device(name: str = "auto") -> wp.Device:
     if name == "auto":
         return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
     try:
-        with _native_messages_hidden():
+        with native_messages_hidden():
             return wp.get_device(name)
     except Exception as error:
         found = ", ".join(str(d) for d in wp.get_devices())

@@ -5,6 +5,7 @@ Each message is one line that names the thing and the cause.
 
 from __future__ import annotations
 
+import errno
 from enum import IntEnum
 
 
@@ -64,3 +65,56 @@ class ResourceError(WarpsplatError):
 
 class CapacityError(ResourceError):
     """A device array would have to grow past what the machine can hold."""
+
+
+class Stopped(Exception):  # noqa: N818 - a wish that came true, no error
+    """Work was given up because its caller's ``stop`` said so. The caller catches it; no user sees it."""
+
+
+LONGEST_MESSAGE = 1000
+"""Characters of an error's message: a hostile value in it must not fill the terminal."""
+
+NO_MEMORY = (
+    "failed to allocate",
+    "out of memory",
+    "insufficient memory",
+    "bad_alloc",
+    "can't start new thread",
+)
+"""How Warp, CUDA, OpenCV, C++ and Python say that the machine has no more to give, in lower case."""
+
+
+def printable(text: str) -> str:
+    """``text`` as one line: control characters, line breaks and undecodable bytes of names are escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def explain(error: BaseException) -> tuple[str, ExitCode]:
+    """What to tell a user about anything that was raised: a message of one line, and the exit code.
+
+    Errors raised on purpose say so themselves. What libraries raise is sorted by what it means: no memory, a
+    panic of the renderer's Rust code, a file that the system refuses; all else is a fault of warpsplat.
+    """
+    cause = (str(error).strip().splitlines() or [""])[0]
+    kind = type(error).__name__
+    if isinstance(error, WarpsplatError):
+        message, code = str(error), error.exit_code
+    elif isinstance(error, MemoryError) or any(sign in cause.lower() for sign in NO_MEMORY):
+        message, code = f"not enough memory: {cause}" if cause else "not enough memory", ExitCode.RESOURCES
+    elif isinstance(error, OSError) and error.errno in {
+        errno.ENOMEM,
+        errno.EAGAIN,
+        errno.EMFILE,
+        errno.ENFILE,
+    }:
+        message, code = f"{error.filename or 'system'}: {error.strerror}", ExitCode.RESOURCES
+    elif kind == "PanicException":  # of pyo3; derives from BaseException and is not importable
+        message, code = f"the SVG renderer gave up: {cause}", ExitCode.INPUT
+    elif isinstance(error, OSError):
+        message, code = f"{error.filename or 'output'}: {error.strerror or cause or kind}", ExitCode.OUTPUT
+    else:
+        hint = "set WARPSPLAT_TRACEBACK=1 for the traceback"
+        message, code = f"internal error: {kind}: {cause} ({hint})", ExitCode.INTERNAL
+    if len(message) > LONGEST_MESSAGE:
+        message = message[:LONGEST_MESSAGE] + " ..."
+    return printable(message), code

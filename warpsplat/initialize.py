@@ -20,7 +20,27 @@ COVER = 1.3
 STROKE_ASPECT = 3.0
 """Length over width of a new stroke."""
 
+SURVEY_PIXELS = 400_000
+"""Largest image that colours and directions of the first shapes are taken from [pixels]."""
+
+SURVEY_SIGMA = 128.0
+"""Widest blur of that image [px]: its cost grows with the width."""
+
 Floats = npt.NDArray[np.floating]
+
+
+def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
+    """``target`` so small that a blur by ``sigma`` [px of ``target``] takes no time.
+
+    Returns:
+        the image, ``target`` itself if it is small enough, and how many of ``target``'s pixels a pixel spans.
+    """
+    height, width = target.shape[:2]
+    span = max(np.sqrt(width * height / SURVEY_PIXELS), sigma / SURVEY_SIGMA)
+    if span <= 1:
+        return target, 1.0
+    size = (max(1, round(width / span)), max(1, round(height / span)))
+    return np.asarray(cv2.resize(target, size, interpolation=cv2.INTER_AREA), np.float32), float(span)
 
 
 def background_color(target: FloatArray) -> FloatArray:
@@ -28,7 +48,7 @@ def background_color(target: FloatArray) -> FloatArray:
     border = np.concatenate([target[0], target[-1], target[:, 0], target[:, -1]])
     median = np.median(border, axis=0)
     alike = np.abs(border - median).max(axis=1) < 8 / 255
-    color = median if alike.mean() > 0.5 else target.mean(axis=(0, 1))
+    color = median if alike.mean() > 0.5 else survey(target)[0].mean(axis=(0, 1))
     # As the file will have it.
     return np.asarray(np.round(color * 255) / 255, np.float32)
 
@@ -108,6 +128,13 @@ def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatAr
     return np.asarray(gradient + np.pi / 2, np.float32)
 
 
+def shape_angles(settings: Settings, target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
+    """``contour_angles`` for strokes; 0 for filled shapes, which start as circles."""
+    if settings.kind == "closed":
+        return np.zeros(len(centres), np.float32)
+    return contour_angles(target, centres, sigma)
+
+
 def pixel_of(centres: Floats, target: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Column and row of the pixels that hold ``centres``, clamped to the image."""
     column = np.clip(centres[:, 0].astype(np.intp), 0, target.shape[1] - 1)
@@ -127,9 +154,10 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     cell = np.sqrt(width * height / count)
     centres = np.stack([x, y], axis=1) + rng.uniform(-0.25, 0.25, (count, 2)) * cell
     centres = np.clip(centres, 0, [width, height])
-    blurred = cv2.GaussianBlur(target, (0, 0), max(cell / 4, 0.5))
-    column, row = pixel_of(centres, target)
+    small, span = survey(target, cell / 2)
+    blurred = cv2.GaussianBlur(small, (0, 0), max(cell / span / 4, 0.5))
+    column, row = pixel_of(centres / span, small)
     areas = np.full(count, COVER * cell * cell)
-    angles = contour_angles(target, centres, cell / 2)
+    angles = shape_angles(settings, small, centres / span, cell / span / 2)
     scene = place(settings, template, centres, areas, angles, blurred[row, column])
     return scene.take(rng.permutation(count))

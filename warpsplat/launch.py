@@ -15,8 +15,14 @@ from typing import Any
 
 import warp as wp
 
+from warpsplat.kernel_cache import load
+
 PIECES_PER_THREAD = 4
 """A split launch is cut finer than there are threads, so that uneven pieces balance."""
+
+
+THREADS_PER_CORE = 8
+"""Most threads that a split launch is cut for: more only wait, and cost memory for pieces and stacks."""
 
 
 def available_cores() -> int:
@@ -104,14 +110,18 @@ class Program:
     """
 
     def __init__(self, device: wp.Device, threads: int | None = None) -> None:
-        """``threads``: of a CPU; default all. Where no thread can be started, the caller's does the work."""
+        """``threads``: of a CPU; default all, eight a core at most.
+
+        Where no thread can be started, the caller's does the work.
+        """
         self.device = device
         self.launches: list[Launch] = []
         # Recorded launches hold addresses only.
         self._arrays: list[tuple[Sequence[Any], Sequence[Any]]] = []
         self.stage = ""
         """Names what is added from now on, for ``run_timed``."""
-        self.threads = max(1, threads or available_cores()) if device.is_cpu else 1
+        most = THREADS_PER_CORE * available_cores()
+        self.threads = max(1, min(threads or available_cores(), most)) if device.is_cpu else 1
         """CPU threads that share a split launch."""
 
     def add(
@@ -127,6 +137,7 @@ class Program:
         shape = (dim,) if isinstance(dim, int) else tuple(dim)
         if min(shape) == 0:
             return
+        load(kernel, self.device)
         count = self.threads * PIECES_PER_THREAD if split and self.threads > 1 else 1
         count = min(count, shape[0])
         borders = [shape[0] * i // count for i in range(count + 1)]
@@ -161,9 +172,11 @@ class Program:
         if len(launch.pieces) > 1:
             helpers = _helpers(self.threads)
             requests = [helpers.ask(work) for _ in range(min(helpers.count, len(launch.pieces) - 1))]
-        work()
-        for request in requests:
-            request.wait()
+        try:
+            work()
+        finally:  # an interruption must not free arrays that helpers still write
+            for request in requests:
+                request.wait()
 
     def run(self) -> None:
         """Replay all launches."""

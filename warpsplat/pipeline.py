@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,10 @@ import warp as wp
 
 from warpsplat import __version__
 from warpsplat.config import Settings
-from warpsplat.files import write_atomically
+from warpsplat.errors import Stopped
+from warpsplat.files import write_result
 from warpsplat.image import load_image
+from warpsplat.inputs import input_name, read_input
 from warpsplat.metrics import Score, score_svg
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg import export
@@ -28,8 +30,8 @@ class Result:
 
     svg: str
     scene: Scene
-    score: Score
-    """Of the SVG as resvg shows it."""
+    score: Score | None
+    """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
     internal_psnr: float
     """Of the last training render, at its size [dB]."""
     iterations: int
@@ -41,9 +43,10 @@ class Result:
     """Goals that were not reached, each as a sentence."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """For JSON. Figures that were not measured are None."""
+        figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
-            **self.score.as_dict(),
+            **(self.score.as_dict() if self.score else figures),
             "internal_psnr": round(self.internal_psnr, 3),
             "curves": len(self.scene),
             "iterations": self.iterations,
@@ -69,6 +72,7 @@ def vectorize(
     scene: Scene | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    write: Callable[[str], None] | None = None,
 ) -> Result:
     """Fit curves to ``target`` (sRGB in [0, 1], (height, width, 3)) and score the file they make.
 
@@ -77,10 +81,12 @@ def vectorize(
         settings: all that decides the result.
         device: where to compute.
         threads: CPU threads; default all. Does not change the result.
-        metadata: text for the file's metadata.
+        metadata: text for the file's metadata; that of a run that was stopped says so instead.
         scene: curves to start from; without, new ones.
         report: called every few steps.
-        stop: asked after every step; once true, the curves as they are make the file.
+        stop: asked after every step; once true, the curves as they are make the file. True later, the score
+            is given up.
+        write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
     """
     started = time.monotonic()
     if settings.max_bytes:
@@ -90,16 +96,11 @@ def vectorize(
         tail = TAIL_SECONDS + TAIL_PER_PIXEL * target.shape[0] * target.shape[1]
         trainer.size_to(settings.time_budget - tail - (time.monotonic() - started))
     scene = trainer.run(report, stop)
-
-    svg = export(scene, settings, metadata)
-    while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
-        # The estimate was short: leave out what shows least, as many as the excess needs.
-        excess = 1 - settings.max_bytes / len(svg.encode())
-        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
-        seen = scene.areas() * scene.opacities.max(axis=1)
-        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene, settings, metadata)
-    score = score_svg(svg, target)
+    # A file that was cut short must not pass for a finished one.
+    svg, scene = export_within(scene, settings, "stopped" if trainer.interrupted else metadata)
+    if write:
+        write(svg)
+    score = _score(svg, target, stop, interrupted=trainer.interrupted)
     seconds = time.monotonic() - started
     return Result(
         svg=svg,
@@ -111,6 +112,36 @@ def vectorize(
         stopped=trainer.interrupted,
         missed=missed_goals(settings, score, seconds),
     )
+
+
+def export_within(scene: Scene, settings: Settings, metadata: str) -> tuple[str, Scene]:
+    """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
+    svg = export(scene, settings, metadata)
+    while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
+        excess = 1 - settings.max_bytes / len(svg.encode())
+        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
+        seen = scene.areas() * scene.opacities.max(axis=1)
+        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
+        svg = export(scene, settings, metadata)
+    return svg, scene
+
+
+QUICK_PIXELS = 1_000_000
+"""Of an image up to this size, an interrupted run is still scored: it takes about a second."""
+
+
+def _score(
+    svg: str, target: FloatArray, stop: Callable[[], bool] | None, *, interrupted: bool
+) -> Score | None:
+    """The score of a file, or None where there is no time for it."""
+    if interrupted:
+        return score_svg(svg, target) if target.shape[0] * target.shape[1] <= QUICK_PIXELS else None
+    if stop and stop():
+        return None
+    try:
+        return score_svg(svg, target)
+    except Stopped:
+        return None
 
 
 TAIL_SECONDS = 0.3
@@ -126,9 +157,11 @@ def affordable_curves(settings: Settings) -> int:
     return max(1, min(settings.curves, (settings.max_bytes - 400) // each))
 
 
-def missed_goals(settings: Settings, score: Score, seconds: float) -> tuple[str, ...]:
-    """The goals of ``settings`` that a run did not reach."""
-    missed = []
+def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:
+    """The goals of ``settings`` that a run did not reach; without a score nobody knows."""
+    missed: list[str] = []
+    if score is None:
+        return ()
     if settings.target_psnr and score.psnr < settings.target_psnr:
         missed.append(f"target-psnr {settings.target_psnr:g} dB: reached {score.psnr:.2f} dB")
     if settings.max_bytes and score.bytes > settings.max_bytes:
@@ -139,28 +172,41 @@ def missed_goals(settings: Settings, score: Score, seconds: float) -> tuple[str,
 
 
 def vectorize_file(
-    source: Path,
+    source: Path | bytes,
     output: Path,
     settings: Settings,
     device: wp.Device,
     *,
+    name: str | None = None,
     threads: int | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
-    """Read ``source``, vectorize it and write ``output`` atomically.
+    """Read an image, vectorize it, write ``output`` atomically, and score it.
+
+    Args:
+        source: the image's file, or its bytes.
+        output: the SVG; ``-`` is the standard output.
+        settings: all that decides the result.
+        device: where to compute.
+        name: how messages call the image; default: the file's name.
+        threads: CPU threads; default all.
+        report: called every few steps.
+        stop: asked after every step, see ``vectorize``.
 
     Raises:
         ImageError: ``source`` cannot be read.
         OutputError: ``output`` cannot be written.
     """
-    target = load_image(source)
-    key = job_key(settings, source.read_bytes())
-    metadata = f"key={key}"
-    result = vectorize(target, settings, device, threads=threads, metadata=metadata, report=report, stop=stop)
-    svg = result.svg
-    if result.stopped:
-        # A file that was cut short must not pass for a finished one.
-        svg = svg.replace(metadata, "stopped", 1)
-    write_atomically(output, svg.encode())
-    return result
+    if isinstance(source, Path):
+        name, source = name or input_name(source), read_input(source)
+    return vectorize(
+        load_image(source, name),
+        settings,
+        device,
+        threads=threads,
+        metadata=f"key={job_key(settings, source)}",
+        report=report,
+        stop=stop,
+        write=lambda svg: write_result(output, svg.encode()),
+    )

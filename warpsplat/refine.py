@@ -218,8 +218,9 @@ def refine(
     result = vectorize(target, settings, device, scene=scene, **options)
     trimmed = _without_padding(result.scene, scene)
     svg = write_svg(trimmed, precision=settings.precision)
-    result = replace(result, svg=svg, scene=trimmed, score=score_svg(svg, target))
-    if result.score.psnr <= before.psnr:
+    score = score_svg(svg, target)
+    result = replace(result, svg=svg, scene=trimmed, score=score)
+    if score.psnr <= before.psnr:
         result = replace(result, svg=text, scene=scene, score=before)
     return result, before.psnr
 

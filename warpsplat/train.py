@@ -61,6 +61,10 @@ class Progress:
     """Of the internal render at the current training size [dB]."""
     seconds: float
     """Since the start of the training."""
+    work: float
+    """Share of the run's work that is done, 0 to 1: a step counts by what its size makes it cost."""
+    fine: bool
+    """Whether the size is the finest: on a reduced image the same curves have more decibels."""
 
 
 @dataclass(frozen=True)
@@ -317,6 +321,14 @@ class Trainer:
         iterations = min(max(iterations, self.step, CHECK_INTERVAL), MAX_ITERATIONS)
         self.settings = replace(s, iterations=iterations)
 
+    def _work(self, plan: list[Phase]) -> float:
+        """Share of the work that is done: a step costs what its pixels cost."""
+        s = self.settings
+        coarse = s.coarse * s.iterations if len(plan) > 1 else 0.0
+        first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
+        done = min(self.step, coarse) * first + max(self.step - coarse, 0.0) * last
+        return done / (coarse * first + (s.iterations - coarse) * last)
+
     def run(
         self, report: Callable[[Progress], None] | None = None, stop: Callable[[], bool] | None = None
     ) -> Scene:
@@ -340,7 +352,9 @@ class Trainer:
                     self.overflows += 1
                     self._assemble()
                 if report:
-                    report(Progress(self.step, s.iterations, self.psnr(), time.monotonic() - started))
+                    spent = time.monotonic() - started
+                    done, fine = self._work(plan), phase is plan[-1]
+                    report(Progress(self.step, s.iterations, self.psnr(), spent, done, fine))
                 if s.target_psnr and phase is plan[-1] and self.psnr() >= s.target_psnr + TARGET_MARGIN:
                     break
             if stop and stop():

@@ -1,0 +1,78 @@
+"""What the program says: figures on stdout, everything else on stderr, each in whole, printable lines."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+
+import click
+
+from warpsplat.errors import printable
+
+
+def open_standard_streams() -> None:
+    """Make sure that 0, 1 and 2 are open: of a closed one, the next file opened would take the number."""
+    for number, name in ((0, "stdin"), (1, "stdout"), (2, "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_RDONLY if number == 0 else os.O_WRONLY)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+        if getattr(sys, name) is None:
+            setattr(
+                sys, name, os.fdopen(number, "r" if number == 0 else "w", encoding="utf-8", closefd=False)
+            )
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure:  # names that the terminal's encoding lacks are shown escaped
+            reconfigure(errors="backslashreplace")
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print lines, control characters escaped. A stderr that takes no more is no reason to fail.
+
+    Raises:
+        OSError: stdout cannot be written.
+    """
+    text = "\n".join(printable(line) for line in text.split("\n"))
+    try:
+        click.echo(text, err=err)
+    except OSError:
+        if not err:
+            raise
+        silence(sys.stderr)
+
+
+def silence(stream: object) -> None:
+    """Send what is left in a stream's buffer, and all to come, to nowhere."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())  # type: ignore[attr-defined]
+        os.close(nowhere)
+
+
+class _Notices(logging.Handler):
+    """Shows the library's notices on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        # A progress bar may stand in the line.
+        start = "\r\x1b[2K" if sys.stderr.isatty() else ""
+        with contextlib.suppress(OSError):
+            click.echo(f"{start}warpsplat: {printable(record.getMessage())}", err=True)
+
+
+def show_notices() -> None:
+    """Show the library's warnings, and on a terminal what it is busy with; ``set_voice`` changes that."""
+    log = logging.getLogger("warpsplat")
+    log.handlers = [_Notices()]
+    log.propagate = False
+    log.setLevel(logging.INFO if sys.stderr.isatty() else logging.WARNING)
+
+
+def set_voice(*, quiet: bool) -> None:
+    """Show errors only, or everything."""
+    logging.getLogger("warpsplat").setLevel(logging.ERROR if quiet else logging.INFO)

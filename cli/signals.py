@@ -1,0 +1,102 @@
+"""Ctrl-C and SIGTERM: what the first one does, and the second.
+
+While there is nothing to save, the first signal raises KeyboardInterrupt. Once a run has asked whether to
+stop, it is a wish: the run ends by itself, with the best so far. A second signal ends the process at once.
+
+Handlers are the process's, so what they saw is kept here once. A signal that was ignored when the program
+started (``nohup``, a background job of a shell) stays ignored; SIGHUP is never touched.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+
+
+class _State:
+    """What the process's handlers saw."""
+
+    received: int | None = None
+    patient = False
+    """Whether somebody asks now and then if to stop, so that the first signal need not raise."""
+
+
+_state = _State()
+
+
+def received() -> int | None:
+    """Number of the first signal since ``handled`` began."""
+    return _state.received
+
+
+def _handle(number: int, frame: Any) -> None:
+    if _state.received is not None:
+        _end(number)
+    _state.received = number
+    if not _state.patient:
+        raise KeyboardInterrupt
+
+
+def _end(number: int) -> None:
+    """End now; no clean-up but that of files that are being written, no wait for threads."""
+    files = sys.modules.get("warpsplat.files")
+    if files:
+        files.remove_unfinished()
+    with contextlib.suppress(OSError):
+        os.write(2, b"\nwarpsplat: interrupted\n")
+    os._exit(128 + number)
+
+
+@contextlib.contextmanager
+def handled() -> Iterator[None]:
+    """Handle SIGINT and SIGTERM in the block, but where they are ignored or this is not the main thread."""
+    _state.received, _state.patient = None, False
+    before: dict[int, Any] = {}
+    hook = sys.unraisablehook
+
+    def unraisable(found: Any) -> None:
+        if not isinstance(
+            found.exc_value, KeyboardInterrupt
+        ):  # raised in a destructor, which nobody can catch
+            hook(found)
+
+    sys.unraisablehook = unraisable
+    try:
+        with contextlib.suppress(ValueError):
+            for number in STOPPING:
+                if signal.getsignal(number) is not signal.SIG_IGN:
+                    before[number] = signal.signal(number, _handle)
+        yield
+    finally:
+        for caught, handler in before.items():
+            signal.signal(caught, handler)
+        sys.unraisablehook = hook
+
+
+class Interrupt:
+    """Whether a run should stop: ask it between steps. Handed to the library as ``stop``."""
+
+    def __call__(self) -> bool:
+        """Whether a signal came. From the first question on, the first signal is a wish."""
+        _state.patient = True
+        return _state.received is not None
+
+    @property
+    def requested(self) -> bool:
+        """Whether a signal came."""
+        return _state.received is not None
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """One run; it is patient from its first question to the end of the block."""
+        _state.patient = False
+        try:
+            yield
+        finally:
+            _state.patient = False
