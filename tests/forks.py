@@ -1,6 +1,6 @@
 """Runs commands of warpsplat under limits, and with signals at chosen moments.
 
-``Forks`` gives tasks to ``python -m tests.forks``, which has everything loaded and forks for each of them: a run
+``Forks`` gives tasks to a process of this module that has everything loaded and forks for each of them: a run
 starts at once, and what it does to its process is gone with it.
 """
 
@@ -114,7 +114,7 @@ def run(task: Task) -> None:
 
 
 def _end(task: Task) -> None:
-    """Run a task, then end the process as Python would, but with nothing of the origin's clean-up."""
+    """Run a task, then end the process as Python would, but leave its origin's clean-up alone."""
     code: Any = 0
     try:
         run(task)
@@ -130,7 +130,7 @@ def _end(task: Task) -> None:
 
 
 def serve() -> None:
-    """Answer tasks until the input ends; the first ones are run here, so that all that they need is loaded."""
+    """Run a task, then end the process as Python would, without the clean-up of its origin."""
     from warpsplat.cli.main import main
 
     tasks, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -37,9 +39,21 @@ def _raising(owner: Any, name: str, error: BaseException) -> Patch:
 NO_SPACE = _raising(os, "fsync", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
 NO_MEMORY = _raising(wp, "launch", MemoryError())
 NO_MEMORY_FOR_PIXELS = _raising(Image, "open", MemoryError())
-CTRL_C = _raising(np, "asarray", KeyboardInterrupt())
 FAULT = _raising(wp, "launch", RuntimeError("a fault\nof two lines"))
-FAULT_OF_NUMPY = _raising(np, "asarray", RuntimeError("a fault\nof two lines"))
+FAULT_OF_JSON = _raising(json, "dumps", RuntimeError("a fault\nof two lines"))
+
+
+def CTRL_C(patch: pytest.MonkeyPatch) -> None:  # noqa: N802 - stands among the others in the table
+    """As soon as pixels are looked at."""
+    original = np.asarray
+
+    def interrupting(*arguments: Any, **named: Any) -> Any:
+        patch.setattr(np, "asarray", original)
+        os.kill(os.getpid(), signal.SIGINT)
+        return original(*arguments, **named)
+
+    patch.setattr(np, "asarray", interrupting)
+
 
 TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
     # exit code, what is wrong, command line, what fails underneath
@@ -52,7 +66,7 @@ TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
     (ExitCode.DONE, "nothing", "info", None),
     (ExitCode.INTERNAL, "a fault of the program", f"vectorize photo.png {QUICK}", FAULT),
     (ExitCode.INTERNAL, "a fault of the program", f"refine drawing.svg photo.png -o a.svg {REFINE}", FAULT),
-    (ExitCode.INTERNAL, "a fault of the program", "eval photo.png drawing.svg", FAULT_OF_NUMPY),
+    (ExitCode.INTERNAL, "a fault of the program", "eval photo.png drawing.svg --json", FAULT_OF_JSON),
     (ExitCode.INTERNAL, "a fault of the program", "bench --curves 4 --size 32x32", FAULT),
     (ExitCode.USAGE, "unknown command", "nonsense", None),
     (ExitCode.USAGE, "unknown option", "vectorize photo.png --nonsense", None),

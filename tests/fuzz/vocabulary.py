@@ -114,3 +114,26 @@ TEXT_OPTIONS = ("--time-budget", "--max-bytes", "--target-psnr", "--curves", "--
 TOKENS = (*NUMBERS, "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
           "draft", "exact", "x.svg", "/", ".", "..", "a/b.svg", "é.svg", "\udcff.svg", "\n.svg", "\x1b[2J.svg", "x" * 300, "-", "--", "٣s", "x.SVG",
           "good.png", "in", "in/a.png/x.svg", "/dev/null", "/dev/full", "/proc/x.svg")  # fmt: skip
+
+PAINTS = ("red", "#123", "#4080c0", "rgb(10%,50%,90%)", "hsl(90,50%,50%)", "teal")
+
+CLAIMS_OF_FILLS = (
+    "", "", "", 'fill-opacity="0"', 'fill-opacity=".5"', 'fill-opacity="80%"', 'fill-rule="evenodd"', 'style="mix-blend-mode:multiply"',
+    'opacity=".6"', 'display="none"', 'visibility="hidden"', 'transform="rotate(20 16 12)"', 'transform="scale(.5 -1) translate(3 -9)"',
+    'style="fill:lime"', 'clip-path="url(#none)"',
+)  # fmt: skip
+"""Attributes of filled shapes."""
+
+CLAIMS_OF_STROKES = (
+    "", 'stroke-linecap="round" stroke-linejoin="round"', 'stroke-linecap="round" stroke-linejoin="round" stroke-width="3"',
+    'stroke-linecap="round" stroke-linejoin="round" stroke-opacity=".5"', 'stroke-linecap="square"', 'stroke-linejoin="bevel"',
+    'stroke-dasharray="3 2"', 'stroke-miterlimit="1"', 'stroke-width="3"', 'stroke-width="10%"',
+    'style="stroke-linecap:round;stroke-linejoin:round" transform="scale(2 1)"', 'vector-effect="non-scaling-stroke" transform="scale(2)"',
+)  # fmt: skip
+"""Attributes of stroked shapes."""
+
+GROUPS = (
+    "<g>", "<g>", "<g>", '<g opacity=".5">', '<g transform="translate(2 1)">', '<g stroke-linecap="round" stroke-linejoin="round">',
+    "<symbol>", "<switch>", "<defs>", "<a>", '<g fill="none">', '<g style="isolation:isolate">',
+)  # fmt: skip
+"""What shapes stand in."""

@@ -77,7 +77,11 @@ class Worker:
         """End the process."""
         if self._process:
             self._process.kill()
-            self._process.communicate()
+            self._process.wait()
+            for pipe in (self._process.stdin, self._process.stdout):
+                with contextlib.suppress(OSError):  # what is left in the pipe goes nowhere
+                    assert pipe
+                    pipe.close()
         self._process = None
 
     def run(self, arguments: list[str], folder: Path, stdin: Path | None = None) -> Outcome:
@@ -85,7 +89,9 @@ class Worker:
         if not self._process:
             # Warm, so that the first command's time is its own; the limit there only guards against hangs.
             self._start()
-            self._ask(["info"], folder, None, limit=120.0)
+            outcome = self._ask(["info"], folder, None, limit=120.0)
+            if not self._process:
+                return outcome
         outcome = self._ask(arguments, folder, stdin, limit=MAX_SECONDS)
         if self._process and _status(self._process.pid, "VmRSS") > DRIFT:
             self.close()
@@ -104,8 +110,9 @@ class Worker:
         process = self._process
         assert process and process.stdin and process.stdout
         task = {"arguments": arguments, "folder": str(folder), "stdin": str(stdin or os.devnull)}
-        process.stdin.write(json.dumps(task).encode() + b"\n")
-        process.stdin.flush()
+        with contextlib.suppress(BrokenPipeError):  # a process that has ended is seen below
+            process.stdin.write(json.dumps(task).encode() + b"\n")
+            process.stdin.flush()
         started, peak, ended = time.monotonic(), 0, ""
         while not ended and not select.select([process.stdout], [], [], 0.05)[0]:
             held = sum(_status(p, "VmRSS") for p in (process.pid, *_children(process.pid)))

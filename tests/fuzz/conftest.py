@@ -1,0 +1,10 @@
+"""Hypothesis keeps nothing in the tree: the same examples on every run need no memory."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from hypothesis.configuration import set_hypothesis_home_dir
+
+set_hypothesis_home_dir(Path(tempfile.gettempdir()) / "warpsplat-test-hypothesis")

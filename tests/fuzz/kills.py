@@ -1,0 +1,196 @@
+"""``python -m tests.fuzz.kills --count 60 --seed N``: signals at random moments of runs, as a table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.forks import ROOT, make_image
+from warpsplat.errors import WarpsplatError
+from warpsplat.viewer import render_svg
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+SETTINGS = {"curves": "24", "iterations": "400", "device": "cpu"}
+INPUTS = {"vectorize": ("a.png",), "batch": ("a.png", "b.png", "c.png")}
+ARGUMENTS = {
+    "vectorize": ("vectorize", "a.png", *(f"--{k}={v}" for k, v in SETTINGS.items())),
+    "batch": ("batch", "jobs.yaml"),
+}
+
+
+def lay_out(folder: Path, command: str) -> None:
+    """Make a command's inputs."""
+    for seed, name in enumerate(INPUTS[command]):
+        make_image(folder / name, seed)
+    if command == "batch":
+        values = {**SETTINGS, "curves": int(SETTINGS["curves"]), "iterations": int(SETTINGS["iterations"])}
+        (folder / "jobs.yaml").write_text(json.dumps({"defaults": values, "jobs": [{"images": "*.png"}]}))
+
+
+def start(folder: Path, command: str, cache: Path | None = None) -> subprocess.Popen[str]:
+    """Start a command; ``cache``: where its compiled kernels are, if not where they always are."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "warpsplat", *ARGUMENTS[command]],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **({"WARP_CACHE_PATH": str(cache)} if cache else {})},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """The SVGs that are there."""
+    return {path.name: path.read_bytes() for path in folder.glob("*.svg")}
+
+
+def broken(folder: Path) -> list[str]:
+    """Results that are no whole SVG."""
+    found = []
+    for name, data in results(folder).items():
+        try:
+            render_svg(data.decode(), width=32)
+        except (WarpsplatError, UnicodeDecodeError):
+            found.append(name)
+        else:
+            if not data.rstrip().endswith(b"</svg>"):
+                found.append(name)
+    return found
+
+
+COMPILING = 8.0
+"""About what the kernels take to compile [s]; that is native code, which a signal does not reach."""
+
+LATE = 2.0
+"""A run must have ended so long after a signal [s]."""
+
+ENDING = 0.3
+"""What Python's own end takes [s]: a signal in it changes the exit code no more."""
+
+
+@dataclass(frozen=True)
+class Kill:
+    """One run that was ended, and the next one."""
+
+    command: str
+    cold: bool
+    """Whether it had to compile its kernels."""
+    number: signal.Signals
+    moment: float
+    """[s] after the start."""
+    code: int
+    wait: float
+    """From the signal to the end [s]."""
+    left: str
+    """What was there afterwards: "none", "old", "new", or "mixed" in a batch."""
+    faults: tuple[str, ...]
+
+    def line(self) -> str:
+        """A row of the table."""
+        return (
+            f"{self.command:10}{'cold' if self.cold else 'warm':5}{self.number.name:8}{self.moment:6.2f} s  {self.code:5}{self.wait:7.2f} s  "
+            f"{self.left:7}{'; '.join(self.faults) or 'ok'}"
+        )
+
+
+def _state(before: dict[str, bytes], after: dict[str, bytes], count: int) -> str:
+    if not after:
+        return "none"
+    if after == before:
+        return "old"
+    return "new" if len(after) == count and all(after[n] != before.get(n) for n in after) else "mixed"
+
+
+def kill_once(
+    rng: random.Random, folder: Path, whole: dict[str, dict[str, bytes]], span: dict[str, float]
+) -> Kill:
+    """End a run at a random moment, then run again; half of the runs find old results."""
+    command, number = rng.choice(list(ARGUMENTS)), rng.choice(SIGNALS)
+    lay_out(folder, command)
+    if rng.random() < 0.5:
+        for name, data in whole[command].items():
+            # An older version's, so that a batch makes it anew.
+            (folder / name).write_bytes(data.replace(b"key=", b"key=0"))
+    before = results(folder)
+    moment = rng.uniform(0, span[command] + (COMPILING if cold else 0))
+    process = start(folder, command, cache)
+    time.sleep(moment)
+    running = process.poll() is None
+    process.send_signal(number)
+    sent = time.monotonic()
+    try:
+        said = process.communicate(timeout=60)[1]
+    except subprocess.TimeoutExpired:
+        process.kill()
+        said = process.communicate()[1]
+    wait, code = time.monotonic() - sent, process.returncode
+    after = results(folder)
+    faults = [f"{name} is not whole" for name in broken(folder)]
+    faults += [f"{name} is gone" for name in before if name not in after]
+    # 0: it was done before; minus the signal: Python had not begun, a shell says the same of both.
+    if code not in (0, 128 + number, -number):
+        faults.append(f"exit code {code}")
+    if "Traceback" in said:
+        faults.append("traceback")
+    if wait > (LATE + COMPILING if cold else LATE):
+        faults.append("late")
+    if running and code == 0 and wait > ENDING:
+        faults.append("went on")
+    again = start(folder, command, cache)
+    said = again.communicate(timeout=120)[1]
+    if again.returncode:
+        faults.append(f"next run: exit code {again.returncode}")
+    if results(folder) != whole[command]:
+        faults.append("next run: other results")
+    known = {*INPUTS[command], *whole[command], "jobs.yaml"}
+    faults += [f"next run: left {name}" for name in os.listdir(folder) if name not in known]
+    return Kill(
+        command, number, moment, code, wait, _state(before, after, len(whole[command])), tuple(faults)
+    )
+
+
+def main() -> None:
+    """Run and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz.kills", description=__doc__)
+    parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    rng = random.Random(given.seed)
+    whole: dict[str, dict[str, bytes]] = {}
+    span: dict[str, float] = {}
+    for command in ARGUMENTS:
+        for _ in range(2):  # the first one may compile
+            with tempfile.TemporaryDirectory() as scratch:
+                lay_out(Path(scratch), command)
+                begin = time.monotonic()
+                said = start(Path(scratch), command).communicate()[1]
+                span[command] = time.monotonic() - begin
+                whole[command] = results(Path(scratch))
+                assert len(whole[command]) == len(INPUTS[command]), said
+    kills = []
+    for _ in range(given.count):
+        with tempfile.TemporaryDirectory() as scratch:
+            kills.append(kill_once(rng, Path(scratch), whole, span))
+        print(kills[-1].line(), flush=True)
+    print()
+    counts = Counter((k.command, k.number.name, k.code, k.left, bool(k.faults)) for k in kills)
+    for (command, name, code, left, is_faulty), count in sorted(counts.items()):
+        print(f"{command:10}{name:9} exit {code:4}  {left:6} {'FAULTY' if is_faulty else 'ok':7}{count:4}")
+    faulty = sum(bool(k.faults) for k in kills)
+    slowest = max((k.wait for k in kills), default=0.0)
+    print(f"{len(kills)} runs ended, {faulty} with faults; the longest wait after a signal: {slowest:.2f} s")
+    sys.exit(bool(faulty))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,288 @@
+"""What must hold of any input, tried on inputs that hypothesis makes up."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from PIL import Image
+
+from tests.fuzz.drawings import drawings
+from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
+from warpsplat.batch import KEYS, load_jobs
+from warpsplat.config import Settings, make_settings, parse_bytes, parse_duration
+from warpsplat.errors import ImageError, OutputError, UsageError, explain
+from warpsplat.files import check_output, write_atomically
+from warpsplat.image import load_image
+from warpsplat.metrics import psnr
+from warpsplat.refine import load_scene
+from warpsplat.svg import write_svg
+from warpsplat.viewer import on_white, render_svg
+
+
+def examples(count: int) -> Callable[[Any], Any]:
+    """The same ``count`` examples on every run; none is stored."""
+    return settings(
+        max_examples=count,
+        derandomize=True,
+        database=None,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+    )
+
+
+def one_line(error: BaseException) -> str:
+    """What a user is told."""
+    message, _ = explain(error)
+    assert message.isprintable()
+    return message
+
+
+numbers = st.sampled_from(NUMBERS) | st.integers().map(str) | st.floats().map(repr)
+blanks = st.sampled_from(["", " ", "\t"])
+
+
+@examples(150)
+@given(st.text(max_size=20) | st.tuples(numbers, st.text("smhinKMGTBekib ", max_size=4)).map("".join))
+def test_durations_and_sizes_are_numbers_or_refused(text: str) -> None:
+    for parse in (parse_duration, parse_bytes):
+        try:
+            value = parse(text)
+        except UsageError as error:
+            one_line(error)
+        else:
+            assert math.isfinite(value)
+            assert value >= 0
+
+
+@examples(100)
+@given(
+    st.integers(0, 10**6), blanks, st.sampled_from([("ms", 0.001), ("s", 1), ("", 1), ("m", 60), ("h", 3600)])
+)
+def test_durations_are_in_seconds(number: int, blank: str, unit: tuple[str, float]) -> None:
+    assert parse_duration(f"{number}{blank}{unit[0]}") == pytest.approx(number * unit[1])
+
+
+@examples(100)
+@given(
+    st.integers(0, 10**6),
+    blanks,
+    st.sampled_from(
+        [("", 1), ("B", 1), ("kB", 1e3), ("KiB", 2**10), ("MB", 1e6), ("MiB", 2**20), ("GB", 1e9)]
+    ),
+)
+def test_sizes_are_in_bytes(number: int, blank: str, unit: tuple[str, float]) -> None:
+    assert parse_bytes(f"{number}{blank}{unit[0]}") == number * unit[1]
+
+
+anything = (
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.lists(st.none(), max_size=1)
+)
+names = st.sampled_from(
+    [
+        "curves",
+        "iterations",
+        "precision",
+        "seed",
+        "target_psnr",
+        "time_budget",
+        "max_bytes",
+        "kind",
+        "renderer",
+    ]
+)
+
+
+@examples(150)
+@given(st.dictionaries(names, anything, max_size=3))
+def test_settings_are_in_range_or_refused(values: dict[str, Any]) -> None:
+    try:
+        made = make_settings("draft", **values)
+    except UsageError as error:
+        one_line(error)
+        return
+    assert 1 <= made.curves <= 100_000
+    assert 1 <= made.iterations <= 1_000_000
+    for goal in (made.target_psnr, made.time_budget, made.max_bytes):
+        assert goal is None or 0 < goal < math.inf
+
+
+def assert_named(error: ImageError) -> None:
+    assert one_line(error).startswith("made up: ")
+
+
+def saved(pixels: np.ndarray, form: str) -> bytes:
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, form)
+    return buffer.getvalue()
+
+
+shapes = st.tuples(st.integers(2, 20), st.integers(2, 20))
+colored = shapes.flatmap(lambda s: arrays.arrays(np.uint8, (*s, 3)))
+transparent = shapes.flatmap(lambda s: arrays.arrays(np.uint8, (*s, 4)))
+
+
+@examples(60)
+@given(colored, st.sampled_from(["PNG", "TIFF", "BMP", "PPM", "TGA"]))
+def test_pixels_come_back(pixels: np.ndarray, form: str) -> None:
+    loaded = load_image(saved(pixels, form), "made up")
+    assert loaded.shape == pixels.shape
+    np.testing.assert_array_equal(np.round(loaded * 255), pixels)
+
+
+@examples(60)
+@given(transparent, st.sampled_from(["PNG", "TIFF"]))
+def test_transparency_goes_on_white(pixels: np.ndarray, form: str) -> None:
+    alpha = pixels[..., 3:] / 255
+    expected = pixels[..., :3] / 255 * alpha + 1 - alpha
+    np.testing.assert_allclose(load_image(saved(pixels, form), "made up"), expected, atol=1e-6)
+
+
+@examples(60)
+@given(shapes.flatmap(lambda s: arrays.arrays(np.uint16, s)), st.sampled_from(["PNG", "TIFF"]))
+def test_grey_of_16_bits_comes_back(pixels: np.ndarray, form: str) -> None:
+    np.testing.assert_array_equal(
+        np.round(load_image(saved(pixels, form), "made up")[..., 1] * 65535.0), pixels
+    )
+
+
+@examples(60)
+@given(shapes.flatmap(lambda s: arrays.arrays(np.float32, s)))
+def test_floats_are_pixels_or_refused(pixels: np.ndarray) -> None:
+    """Among them NaN, infinities and all that is out of range."""
+    try:
+        loaded = load_image(saved(pixels, "TIFF"), "made up")
+    except ImageError as error:
+        assert_named(error)
+        return
+    assert loaded.dtype == np.float32
+    assert np.isfinite(loaded).all()
+    assert loaded.min() >= 0 and loaded.max() <= 1
+
+
+@examples(150)
+@given(
+    st.sampled_from([b"", b"\x89PNG\r\n\x1a\n", b"GIF89a", b"II*\0", b"BM", b"P6 ", b"\xff\xd8"]),
+    st.binary(max_size=60),
+)
+def test_bytes_are_an_image_or_refused(head: bytes, rest: bytes) -> None:
+    try:
+        assert load_image(head + rest, "made up").ndim == 3
+    except ImageError as error:
+        assert_named(error)
+
+
+keys = st.sampled_from([*KEYS, "images", "jobs", "defaults"]) | st.text(max_size=3)
+tree = st.recursive(
+    anything, lambda t: st.lists(t, max_size=3) | st.dictionaries(keys, t, max_size=3), max_leaves=6
+)
+file = st.fixed_dictionaries({"jobs": st.lists(st.dictionaries(keys, tree, max_size=3), max_size=2)}) | tree
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("batch")
+    (path / "a.png").touch()
+    return path
+
+
+def refused_with_its_line(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+    try:
+        assert load_jobs(path)
+    except UsageError as error:
+        message = one_line(error)
+        assert message.startswith(f"{path}:")
+
+
+@examples(100)
+@given(file)
+def test_batch_files_of_any_content_are_jobs_or_refused(folder: Path, content: Any) -> None:
+    refused_with_its_line(folder / "jobs.yaml", yaml.safe_dump(content).encode())
+
+
+@examples(100)
+@given(st.binary(max_size=30) | st.text("jobs: []{}-&*!|>'\"\n\t#%?,images", max_size=40).map(str.encode))
+def test_batch_files_of_any_bytes_are_jobs_or_refused(folder: Path, data: bytes) -> None:
+    refused_with_its_line(folder / "jobs.yaml", data)
+
+
+options = st.fixed_dictionaries(
+    {},
+    optional={
+        "curves": st.integers(1, 100_000),
+        "iterations": st.integers(1, 1_000_000),
+        "seed": st.integers(0, 2**32 - 1),
+        "precision": st.integers(0, 6),
+        "renderer": st.sampled_from(["exact", "splat"]),
+        "quality": st.sampled_from(["draft", "balanced", "high"]),
+        "target-psnr": st.floats(1, 99, allow_nan=False).map(lambda x: round(x, 3)),
+        "time-budget": st.integers(1, 500).map("{}s".format),
+        "max-bytes": st.integers(1, 500).map("{}KB".format),
+    },
+)
+
+
+@examples(100)
+@given(options, options)
+def test_settings_of_a_batch_are_those_of_the_flags(
+    folder: Path, defaults: dict[str, Any], own: dict[str, Any]
+) -> None:
+    path = folder / "jobs.yaml"
+    path.write_text(yaml.safe_dump({"defaults": defaults, "jobs": [{"images": "a.png", **own}]}))
+    flags = {key.replace("-", "_"): value for key, value in {**defaults, **own}.items()}
+    expected: Settings = make_settings(flags.pop("quality", "balanced"), **flags)
+    assert load_jobs(path)[0].settings == expected
+
+
+@examples(60)
+@given(st.text(st.characters(codec="utf-8") | st.sampled_from("/.\0\n\udc80-~ "), min_size=1, max_size=8))
+def test_a_name_can_be_written_or_is_refused(name: str) -> None:
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "folder"
+        folder.mkdir()
+        path = folder / (name.lstrip("/") + ".svg")
+        try:
+            check_output(path)
+            write_atomically(path, b"<svg/>")
+        except (UsageError, OutputError) as error:
+            one_line(error)
+            assert not os.listdir(folder)
+        else:
+            assert path.read_bytes() == b"<svg/>"
+
+
+@examples(120)
+@given(drawings)
+def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
+    """What ``refine`` starts from shows what the SVG shows, whatever features it has."""
+    try:
+        scene = load_scene(text, WIDTH, HEIGHT, "made up")
+    except ImageError as error:
+        assert_named(error)
+        return
+    held, shown = (
+        on_white(render_svg(t, width=8 * WIDTH, height=8 * HEIGHT))
+        for t in (write_svg(scene, precision=3), text)
+    )
+    assert psnr(held, shown) > FAITHFUL, text
+
+
+FAITHFUL = 30.0
+"""Between an SVG and what is held of it [dB]; a dash that is lost costs more than twenty."""
