@@ -112,10 +112,12 @@ def _state(before: dict[str, bytes], after: dict[str, bytes], count: int) -> str
 
 
 def kill_once(
-    rng: random.Random, folder: Path, whole: dict[str, dict[str, bytes]], span: dict[str, float]
+    rng: random.Random, scratch: Path, whole: dict[str, dict[str, bytes]], span: dict[str, float]
 ) -> Kill:
-    """End a run at a random moment, then run again; half of the runs find old results."""
-    command, number = rng.choice(list(ARGUMENTS)), rng.choice(SIGNALS)
+    """End a run at a random moment, then run again; half of the runs find old results, some no kernels."""
+    command, number, cold = rng.choice(list(ARGUMENTS)), rng.choice(SIGNALS), rng.random() < 0.1
+    folder, cache = scratch / "folder", scratch / "cache" if cold else None
+    folder.mkdir()
     lay_out(folder, command)
     if rng.random() < 0.5:
         for name, data in whole[command].items():
