@@ -16,6 +16,7 @@ def random_scene(
     seed: int = 0,
     chain_cubics: int = 2,
     opacity_count: int = 1,
+    stroke_cubics: int = 3,
 ) -> Scene:
     """Wobbly blobs or strokes, some of them partly off the canvas."""
     rng = np.random.default_rng(seed)
@@ -28,7 +29,7 @@ def random_scene(
         radius = rng.uniform(4, 12, (count, points, 1)) * 1.15
         outline = centre + radius * ring
     else:
-        points = 10
+        points = 3 * stroke_cubics + 1
         direction = rng.uniform(0, 2 * np.pi, (count, 1, 1))
         along = np.linspace(-14, 14, points)[None, :, None]
         outline = centre + along * np.concatenate([np.cos(direction), np.sin(direction)], axis=2)

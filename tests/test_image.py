@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +116,96 @@ def test_bad_files_give_one_line_with_name_and_cause(tmp_path: Path) -> None:
 
 def test_decompression_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = save(tmp_path, Image.fromarray(RGB), "a.png")
+    before = Image.MAX_IMAGE_PIXELS
     for limit in (400, 100):  # a warning of Pillow's at the first, an error at the second
-        monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", limit)
-        with pytest.raises(ImageError, match="too large"):
+        monkeypatch.setattr("warpsplat.image.MAX_PIXELS", limit)
+        with pytest.raises(ImageError, match="too large: more than"):
             load_image(path)
+    assert before == Image.MAX_IMAGE_PIXELS
+
+
+def test_pillows_own_limit_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A photograph of 108 megapixels is no bomb."""
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
+    assert load_image(save(tmp_path, Image.fromarray(RGB), "a.png")).shape == (20, 33, 3)
+
+
+def test_bytes_are_read_as_a_file_is(tmp_path: Path) -> None:
+    path = save(tmp_path, Image.fromarray(RGB), "a.png")
+    np.testing.assert_array_equal(load_image(path.read_bytes()), load_image(path))
+    with pytest.raises(ImageError, match=r"^standard input: not an image"):
+        load_image(b"no image", "standard input")
+
+
+def test_strips_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rgba = np.dstack([RGB, RNG.integers(0, 256, (20, 33), dtype=np.uint8)])
+    deep = Image.fromarray(RNG.integers(0, 65536, (20, 33)).astype(np.uint16))
+    images = [Image.fromarray(RGB), Image.fromarray(rgba), Image.fromarray(RGB).quantize(16), deep]
+    paths = [save(tmp_path, image, f"{i}.png") for i, image in enumerate(images)]
+    whole = [load_image(path) for path in paths]
+    monkeypatch.setattr("warpsplat.image.STRIP_PIXELS", 7 * 33)
+    for path, pixels in zip(paths, whole, strict=True):
+        np.testing.assert_array_equal(load_image(path), pixels)
+
+
+def png(color: int, depth: int, samples: np.ndarray, transparent: list[int]) -> bytes:
+    """A PNG written by the letter: ``samples`` of shape (height, width, channels), tRNS as given."""
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    height, width = samples.shape[:2]
+    bits = (samples.reshape(height, -1, 1) >> np.arange(depth)[::-1]) & 1
+    lines = np.packbits(bits.reshape(height, -1).astype(np.uint8), axis=1)
+    header = struct.pack(">IIBBBBB", width, height, depth, color, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + chunk(b"tRNS", b"".join(struct.pack(">H", value) for value in transparent))
+        + chunk(b"IDAT", zlib.compress(b"".join(b"\0" + line.tobytes() for line in lines)))
+        + chunk(b"IEND", b"")
+    )
+
+
+@pytest.mark.parametrize("depth", [1, 2, 4, 8, 16])
+def test_transparent_grey_of_any_depth(depth: int) -> None:
+    top = 2**depth - 1
+    samples = RNG.integers(0, 2, (5, 9, 1)) * top
+    samples[:, 4] = max(top // 3, 0)
+    transparent = int(samples[0, 4, 0])
+    pixels = load_image(png(0, depth, samples, [transparent]))
+    want = np.where(samples == transparent, 1, samples / top)
+    np.testing.assert_allclose(pixels, np.repeat(want, 3, axis=2), atol=1e-6)
+
+
+def test_transparent_colour_of_16_bits_counts_all_of_them() -> None:
+    samples = np.tile(np.array([0x1234, 0x5678, 0x9ABC]), (4, 6, 1))
+    samples[:, 3:] += 1  # alike in the upper bytes
+    pixels = load_image(png(2, 16, samples, [0x1234, 0x5678, 0x9ABC]))
+    np.testing.assert_array_equal(pixels[:, :3], 1)
+    np.testing.assert_allclose(pixels[:, 3:], samples[:, 3:] / 65535, atol=1 / 255)
+
+
+def test_integers_of_32_bits(tmp_path: Path) -> None:
+    """What is white is the least of the usual ranges that holds all samples."""
+    ramp = np.linspace(0, 1, 63).reshape(7, 9)
+    for top in (255, 65535, 2**31 - 1):
+        image = Image.fromarray(np.round(ramp * top).astype(np.int32))
+        pixels = load_image(save(tmp_path, image, "a.tif"))
+        np.testing.assert_allclose(pixels[..., 1], ramp, atol=0.003, err_msg=str(top))
+
+
+def test_floats(tmp_path: Path) -> None:
+    ramp = np.linspace(-0.1, 1, 63, dtype=np.float32).reshape(7, 9)
+    for top in (1, 255, 65535):
+        pixels = load_image(save(tmp_path, Image.fromarray(ramp * np.float32(top)), "a.tif"))
+        np.testing.assert_allclose(pixels[..., 0], np.maximum(ramp, 0), atol=1e-6)
+
+
+@pytest.mark.parametrize(("bad", "count"), [(np.nan, 1), (np.inf, 1), (-np.inf, 3), (np.nan, 63)])
+def test_pixels_that_are_no_numbers(tmp_path: Path, bad: float, count: int) -> None:
+    samples = np.zeros(63, np.float32)
+    samples[:count] = bad
+    path = save(tmp_path, Image.fromarray(samples.reshape(7, 9)), "a.tif")
+    with pytest.raises(ImageError, match=rf"^{path}: {count} of 63 pixels are no numbers"):
+        load_image(path)

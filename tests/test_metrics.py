@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import tracemalloc
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
 from tests.scenes import random_scene
-from warpsplat.errors import ImageError
+from warpsplat import strips
+from warpsplat.errors import ImageError, Stopped
 from warpsplat.inspect_svg import count_nodes
 from warpsplat.metrics import ms_ssim, psnr, score_svg, ssim
 from warpsplat.svg import write_svg
@@ -88,6 +92,97 @@ def test_score() -> None:
     assert score.paths == 5
     assert score.bytes == len(text.encode())
     assert score.gzip_bytes < score.bytes
+
+
+def by_the_book(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    """PSNR, SSIM and MS-SSIM of whole images with 64 bits."""
+    weights, product, single = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333), 1.0, None
+    error = np.mean((a - b) ** 2)
+    for scale, weight in enumerate(weights):
+
+        def blur(x: np.ndarray) -> np.ndarray:
+            return cv2.GaussianBlur(x, (11, 11), 1.5)[5:-5, 5:-5]
+
+        c1, c2 = 2.55**2, 7.65**2
+        ma, mb = blur(a), blur(b)
+        contrast = (2 * (blur(a * b) - ma * mb) + c2) / (blur(a * a) - ma**2 + blur(b * b) - mb**2 + c2)
+        full = contrast * (2 * ma * mb + c1) / (ma**2 + mb**2 + c1)
+        single = full.mean() if single is None else single
+        product *= (full if scale == 4 else contrast).mean() ** weight
+        half = (a.shape[1] // 2, a.shape[0] // 2)
+        a, b = (cv2.resize(x, half, interpolation=cv2.INTER_AREA) for x in (a, b))
+    return 10 * np.log10(255**2 / error), float(single), product
+
+
+def scored_scene() -> tuple[str, np.ndarray]:
+    scene = random_scene("closed", count=40, width=371, height=357)
+    big = replace(scene, points=(2 * scene.points).astype(np.float32))
+    noise = np.random.default_rng(2).normal(0, 0.05, (357, 371, 3))
+    text = write_svg(big)
+    return text, np.clip(on_white(render_svg(text)) / 255 + noise, 0, 1).astype(np.float32)
+
+
+def test_score_in_strips_is_that_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    text, target = scored_scene()
+    want = by_the_book(on_white(render_svg(text)), np.round(target.astype(np.float64) * 255))
+    # Drawn in strips as thin as these, edges move a little.
+    cases = ((1 << 20, 1 << 22, 1e-4), (371 * 20, 1 << 22, 1e-4), (371 * 20, 0, 5e-3))
+    for strip, whole, tolerance in cases:
+        monkeypatch.setattr(strips, "STRIP_PIXELS", strip)
+        monkeypatch.setattr(strips, "WHOLE_PIXELS", whole)
+        score = score_svg(text, target)
+        np.testing.assert_allclose([score.psnr, score.ssim, score.ms_ssim], want, atol=tolerance)
+
+
+def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    text, _ = scored_scene()
+    whole = strips.draw(text, 371, 357)
+    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 50)
+    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
+    in_strips = strips.draw(text, 371, 357)
+    assert np.abs(in_strips.astype(int) - whole).mean() < 0.01
+    # Another program's units need not be pixels: its files are drawn in one piece.
+    foreign = text.replace("<metadata>warpsplat", "<metadata>another")
+    np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
+
+
+def test_transparent_files_are_scored_on_white() -> None:
+    shape = '<rect width="40" height="40" opacity=".4"/>'
+    text = f'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="40">{shape}</svg>'
+    score = score_svg(text, np.full((40, 40, 3), 153 / 255, np.float32))
+    assert score.psnr > 50
+
+
+def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In every stage: before drawing, between strips, between the strips of the figures."""
+    text, target = scored_scene()
+    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 100)
+    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
+    asked = 0
+
+    def count() -> bool:
+        nonlocal asked
+        asked += 1
+        return False
+
+    score_svg(text, target, stop=count)
+    assert asked > 12
+    for last in range(1, asked, 5):
+        left = iter(range(last))
+        with pytest.raises(Stopped):
+            score_svg(text, target, stop=lambda left=left: next(left, None) is None)  # type: ignore[misc]
+
+
+def test_memory_of_a_score_is_bounded() -> None:
+    """Beside the image less than 30 bytes a pixel; drawing is not seen by ``tracemalloc``."""
+    text = write_svg(random_scene("closed", width=2000, height=1500))
+    target = np.zeros((1500, 2000, 3), np.float32)
+    tracemalloc.start()
+    try:
+        score_svg(text, target)
+        assert tracemalloc.get_traced_memory()[1] < 30 * 2000 * 1500
+    finally:
+        tracemalloc.stop()
 
 
 def test_not_svg() -> None:

@@ -31,7 +31,7 @@ STRIP_PIXELS = 1 << 20
 """Pixels that are converted at a time."""
 
 LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
-"""What Pillow makes of a sample 1 of PNGs with fewer than 8 bits; it leaves their transparent grey as it is."""
+"""What Pillow makes of a sample 1 in PNGs of fewer than 8 bits; their transparent grey it leaves as it is."""
 
 
 def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
@@ -109,7 +109,7 @@ def _mend_transparency(image: Image.Image, rawmode: str, data: bytes) -> None:
         if deep is None or deep.ndim != 3 or deep.shape[2] != 4:
             raise ImageError("16-bit colours with a transparent one cannot be read")
         del image.info["transparency"]
-        image.putalpha(Image.fromarray((deep[..., 3] >> 8).astype(np.uint8)))
+        image.putalpha(Image.fromarray(np.where(deep[..., 3] == 0, 0, 255).astype(np.uint8)))
 
 
 def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:

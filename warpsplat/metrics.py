@@ -6,6 +6,7 @@ All figures are taken in 8-bit sRGB from a render by resvg, an independent rende
 from __future__ import annotations
 
 import gzip
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,65 +14,118 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.errors import ImageError
 from warpsplat.inspect_svg import DRAWN, count_nodes
-from warpsplat.viewer import Pixels, on_white, render_svg
+from warpsplat.strips import Bytes, Stop, check, draw, rows_of
+
+Floats = npt.NDArray[np.floating]
+Planes = Iterable[tuple[Floats, Floats]]
+"""The two images channel by channel: 0..255, each of shape (height, width)."""
 
 SSIM_WINDOW = 11
 
-
-def psnr(a: Pixels, b: Pixels) -> float:
-    """Peak signal-to-noise ratio [dB] of two arrays in 0..255; infinite where they are equal."""
-    error = float(np.mean((a - b) ** 2))
-    return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
-
-
-def ssim(a: Pixels, b: Pixels) -> float | None:
-    """Structural similarity (Wang et al. 2004), Gaussian window of 11x11, sigma 1.5, mean over channels.
-
-    None for an image smaller than the window.
-    """
-    if min(a.shape[:2]) <= SSIM_WINDOW:
-        return None
-    return float(_ssim_maps(a, b)[0].mean())
-
-
-def _ssim_maps(a: Pixels, b: Pixels) -> tuple[Pixels, Pixels]:
-    """SSIM and its contrast-structure factor where the window fits."""
-    inner = SSIM_WINDOW // 2
-
-    def blur(x: Pixels) -> Pixels:
-        return np.asarray(cv2.GaussianBlur(x, (SSIM_WINDOW, SSIM_WINDOW), 1.5)[inner:-inner, inner:-inner])
-
-    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-    mean_a, mean_b = blur(a), blur(b)
-    var_a, var_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
-    covariance = blur(a * b) - mean_a * mean_b
-    luminance = (2 * mean_a * mean_b + c1) / (mean_a**2 + mean_b**2 + c1)
-    contrast = (2 * covariance + c2) / (var_a + var_b + c2)
-    return luminance * contrast, contrast
-
+MIDDLE = np.float32(128)
+"""Variances are taken about it, so that 32 bits are enough for them."""
 
 MS_SSIM_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Of the five scales (Wang et al. 2003, section 3.2)."""
 
 
-def ms_ssim(a: Pixels, b: Pixels) -> float | None:
+def psnr(a: Floats, b: Floats) -> float:
+    """Peak signal-to-noise ratio [dB] of two arrays in 0..255; infinite where they are equal."""
+    return _decibels(float(np.mean((a - b) ** 2, dtype=np.float64)))
+
+
+def _decibels(error: float) -> float:
+    return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
+
+
+def ssim(a: Floats, b: Floats) -> float | None:
+    """Structural similarity (Wang et al. 2004), Gaussian window of 11x11, sigma 1.5, mean over channels.
+
+    None for an image smaller than the window.
+    """
+    return _figures(_planes(a, b))[1]
+
+
+def ms_ssim(a: Floats, b: Floats) -> float | None:
     """Multi-scale structural similarity (Wang et al. 2003); scales are halved by area.
 
     None for an image of which the smallest scale has no room for the window.
     """
-    value = 1.0
-    for scale, weight in enumerate(MS_SSIM_WEIGHTS):
-        if min(a.shape[:2]) < 2 * SSIM_WINDOW:
-            return None
-        full, contrast = _ssim_maps(a, b)
-        last = scale == len(MS_SSIM_WEIGHTS) - 1
-        value *= max(float((full if last else contrast).mean()), 0.0) ** weight
+    return _figures(_planes(a, b))[2]
+
+
+def _planes(a: Floats, b: Floats) -> Iterator[tuple[Floats, Floats]]:
+    for channel in range(a.shape[2]):
+        yield tuple(np.ascontiguousarray(x[..., channel], np.float32) for x in (a, b))  # type: ignore[misc]
+
+
+def _figures(planes: Planes, stop: Stop | None = None) -> tuple[float, float | None, float | None]:
+    """PSNR, SSIM and MS-SSIM. One channel is held at a time, and the maps of one strip.
+
+    Raises:
+        Stopped: ``stop`` says so.
+    """
+    errors, scales = [], []
+    for a, b in planes:
+        errors.append(_squared_error(a, b))
+        scales.append(_similarities(a, b, stop))
+    similar = np.mean(scales, axis=0)  # [scale, (SSIM, contrast)]
+    single = None if len(similar) == 0 else float(similar[0, 0])
+    multiple = None
+    if len(similar) == len(MS_SSIM_WEIGHTS):
+        factors = np.append(similar[:-1, 1], similar[-1, 0])
+        multiple = float(np.prod(np.maximum(factors, 0.0) ** MS_SSIM_WEIGHTS))
+    return _decibels(float(np.mean(errors))), single, multiple
+
+
+def _squared_error(a: Floats, b: Floats) -> float:
+    """Mean over the pixels."""
+    total = 0.0
+    for rows in rows_of(a.shape[1], a.shape[0]):
+        total += float(np.square(a[rows] - b[rows]).sum(dtype=np.float64))
+    return total / a.size
+
+
+def _similarities(a: Floats, b: Floats, stop: Stop | None) -> list[tuple[float, float]]:
+    """Mean SSIM and mean contrast-structure factor of each scale that has room for the window."""
+    values: list[tuple[float, float]] = []
+    while min(a.shape) >= (2 * SSIM_WINDOW if values else SSIM_WINDOW + 1):
+        values.append(_similarity(a, b, stop))
+        if len(values) == len(MS_SSIM_WEIGHTS) or min(a.shape) < 2 * SSIM_WINDOW:
+            break
         half = (a.shape[1] // 2, a.shape[0] // 2)
-        a = np.asarray(cv2.resize(a, half, interpolation=cv2.INTER_AREA))
-        b = np.asarray(cv2.resize(b, half, interpolation=cv2.INTER_AREA))
-    return value
+        a = np.asarray(cv2.resize(a, half, interpolation=cv2.INTER_AREA), np.float32)
+        b = np.asarray(cv2.resize(b, half, interpolation=cv2.INTER_AREA), np.float32)
+    return values
+
+
+def _similarity(a: Floats, b: Floats, stop: Stop | None) -> tuple[float, float]:
+    """Means of SSIM and of its contrast-structure factor, where the window fits."""
+    height, width = a.shape
+    total = np.zeros(2)
+    for rows in rows_of(width, height, SSIM_WINDOW - 1):
+        check(stop)
+        total += _similarity_sums(a[rows] - MIDDLE, b[rows] - MIDDLE)
+    total /= (height - SSIM_WINDOW + 1) * (width - SSIM_WINDOW + 1)
+    return float(total[0]), float(total[1])
+
+
+def _similarity_sums(a: Floats, b: Floats) -> tuple[float, float]:
+    """Sums over a strip of values about ``MIDDLE``."""
+    inner = SSIM_WINDOW // 2
+
+    def blur(x: Floats) -> Floats:
+        return np.asarray(cv2.GaussianBlur(x, (SSIM_WINDOW, SSIM_WINDOW), 1.5)[inner:-inner, inner:-inner])
+
+    c1, c2 = np.float32((0.01 * 255) ** 2), np.float32((0.03 * 255) ** 2)
+    mean_a, mean_b = blur(a), blur(b)
+    variances = blur(a * a + b * b) - mean_a * mean_a - mean_b * mean_b
+    covariance = blur(a * b) - mean_a * mean_b
+    contrast = (2 * covariance + c2) / (variances + c2)
+    mean_a, mean_b = mean_a + MIDDLE, mean_b + MIDDLE
+    luminance = (2 * mean_a * mean_b + c1) / (mean_a * mean_a + mean_b * mean_b + c1)
+    return float((luminance * contrast).sum(dtype=np.float64)), float(contrast.sum(dtype=np.float64))
 
 
 @dataclass(frozen=True)
@@ -97,25 +151,44 @@ class Score:
         return values
 
 
-def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
+def score_svg(
+    text: str, target: npt.NDArray[np.floating], *, stop: Callable[[], bool] | None = None
+) -> Score:
     """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare.
+
+    Besides ``target`` this takes about 15 bytes a pixel.
+
+    Args:
+        text: the SVG.
+        target: the image.
+        stop: asked every few tenths of a second; once true, the work is given up.
 
     Raises:
         ImageError: not an SVG, or one of other proportions.
+        Stopped: ``stop`` said so; there are no figures.
     """
     height, width = target.shape[:2]
-    image = render_svg(text, width=width, height=height)
-    if image.size != (width, height):
-        raise ImageError(f"renders as {image.width}x{image.height}, the image has {width}x{height} pixels")
-    shown = on_white(image)
-    wanted = np.round(target.astype(np.float64) * 255)
+    shown = draw(text, width, height, stop)
+    fidelity, single, multiple = _figures(_shown_and_wanted(shown, target), stop)
     data = text.encode()
     return Score(
-        psnr=psnr(shown, wanted),
-        ssim=ssim(shown, wanted),
-        ms_ssim=ms_ssim(shown, wanted),
+        psnr=fidelity,
+        ssim=single,
+        ms_ssim=multiple,
         paths=len(DRAWN.findall(data)),
         nodes=count_nodes(text),
         bytes=len(data),
         gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
     )
+
+
+def _shown_and_wanted(shown: Bytes, target: Floats) -> Iterator[tuple[Floats, Floats]]:
+    """Channels of ``shown`` on white, and of ``target`` in the levels of 8 bits."""
+    height, width = target.shape[:2]
+    a, b = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    for channel in range(3):
+        for rows in rows_of(width, height):
+            alpha = shown[rows, :, 3] / np.float32(255)
+            a[rows] = shown[rows, :, channel] * alpha + np.float32(255) * (1 - alpha)
+            b[rows] = np.round(target[rows, :, channel] * np.float32(255))
+        yield a, b

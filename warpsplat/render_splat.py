@@ -8,7 +8,6 @@ from warpsplat.kernels import gaussian, sample, splat
 from warpsplat.launch import Program
 from warpsplat.parameters import Parameters
 from warpsplat.render import Capacity, TileRenderer
-from warpsplat.scene import OPEN_SEGMENTS
 
 
 class SplatRenderer(TileRenderer):
@@ -50,7 +49,9 @@ class SplatRenderer(TileRenderer):
         self.column_width_grad = self.floats(gaussians)
 
     def _grid_inputs(self) -> list[object]:
-        runs = OPEN_SEGMENTS // self.parameters.opacity_count if self.parameters.kind == "open" else 1
+        p = self.parameters
+        # Each cubic of a stroke is a strip of its own.
+        runs = (p.point_count - 1) // (3 * p.opacity_count) if p.kind == "open" else 1
         return [self.gaussian_part, self.part_first, self.part_columns, self.part_rows, runs]
 
     def _record_items(self, program: Program) -> tuple[wp.array, wp.array]:

@@ -21,17 +21,23 @@ CASES = [
     ("closed", 1, 1, 1.0),
     ("closed", 2, 1, 1.0),
     ("closed", 2, 1, 0.6),
+    ("open", 1, 1, 1.0),
     ("open", 2, 1, 1.0),
-    ("open", 2, 3, 1.7),
+    ("open", 3, 1, 1.0),
+    ("open", 3, 3, 1.7),
+    ("open", 4, 1, 1.0),
+    ("open", 5, 1, 1.0),
+    ("open", 6, 3, 1.0),
 ]
+"""Kind, cubics of a stroke or of a chain of an outline, opacities, scale."""
 
 
-@pytest.mark.parametrize(("kind", "chain_cubics", "opacity_count", "scale"), CASES)
+@pytest.mark.parametrize(("kind", "cubics", "opacity_count", "scale"), CASES)
 @pytest.mark.parametrize("detach", [False, True])
 def test_image_and_gradients(
-    device: str, kind: Kind, chain_cubics: int, opacity_count: int, scale: float, detach: bool
+    device: str, kind: Kind, cubics: int, opacity_count: int, scale: float, detach: bool
 ) -> None:
-    scene = random_scene(kind, chain_cubics=chain_cubics, opacity_count=opacity_count, seed=3)
+    scene = random_scene(kind, chain_cubics=cubics, stroke_cubics=cubics, opacity_count=opacity_count, seed=3)
     renderer = renderer_for(scene, device, scale, through_scales=not detach)
     p, image = reference_image(scene, renderer, detach)
     np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-3)

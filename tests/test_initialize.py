@@ -1,0 +1,60 @@
+"""First shapes: the same as ever on small images, from a reduced one on large images."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from warpsplat import initialize
+from warpsplat.config import make_settings
+from warpsplat.initialize import background_color, contour_angles, grid_scene, survey
+from warpsplat.scene import Kind
+
+
+def picture(height: int, width: int) -> np.ndarray:
+    """Smooth blobs: a reduced copy has the same colours."""
+    rng = np.random.default_rng(0)
+    small = rng.uniform(0, 1, (6, 8, 3)).astype(np.float32)
+    return np.clip(cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC), 0, 1)
+
+
+def test_small_images_are_surveyed_as_they_are() -> None:
+    target = picture(60, 80)
+    same, span = survey(target, 30.0)
+    assert same is target
+    assert span == 1.0
+    assert survey(np.zeros((512, 768, 3), np.float32), 120.0)[1] == 1.0, "photographs of the Kodak set"
+
+
+@pytest.mark.parametrize(("shape", "sigma"), [((3000, 4000), 5.0), ((60, 80), 1000.0), ((2, 9000), 500.0)])
+def test_what_is_surveyed_is_bounded(shape: tuple[int, int], sigma: float) -> None:
+    small, span = survey(np.zeros((*shape, 1), np.float32), sigma)
+    assert small.shape[0] * small.shape[1] <= 1.01 * initialize.SURVEY_PIXELS
+    assert sigma / span <= initialize.SURVEY_SIGMA * 1.001
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+def test_reduced_colours_and_directions_are_those_of_the_image(
+    kind: Kind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = picture(192, 256)
+    settings = make_settings(kind=kind)
+    whole = grid_scene(settings, target, 12, np.random.default_rng(1))
+    monkeypatch.setattr(initialize, "SURVEY_PIXELS", 128 * 96)
+    reduced = grid_scene(settings, target, 12, np.random.default_rng(1))
+    np.testing.assert_allclose(reduced.colors, whole.colors, atol=0.03)
+    np.testing.assert_allclose(reduced.points, whole.points, atol=5 if kind == "open" else 0)
+
+
+def test_the_mean_of_many_pixels_is_their_mean() -> None:
+    """A sum of 32 bits over all pixels stops growing long before their end."""
+    target = np.full((3000, 4000, 3), 0.5, np.float32)
+    target[:, ::2] = [0.2, 0.3, 0.4]
+    np.testing.assert_allclose(background_color(target), [0.35, 0.4, 0.45], atol=0.004)
+
+
+def test_strokes_lie_along_contours() -> None:
+    stripes = np.repeat(np.sin(np.arange(96) / 3)[:, None, None], 96, axis=1).repeat(3, axis=2)
+    angle = contour_angles(stripes.astype(np.float32), np.array([[48.0, 48.0]]), 6.0)
+    assert abs(np.cos(angle[0])) > 0.99
