@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.cli.options import overwrite_option, threads_option, voice_options
+from warpsplat.cli.options import FILE, overwrite_option, threads_option, voice_options
 from warpsplat.cli.say import say
 from warpsplat.errors import ExitCode, OutputError, UsageError, explain
 
@@ -72,7 +72,7 @@ def run_job(job: Job, count: str, *, quiet: bool, talk: bool, **options: Any) ->
 
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("jobs", type=click.Path(path_type=Path))
+@click.argument("jobs", type=FILE)
 @click.option("--device", help="Overrides the file's device.")
 @overwrite_option
 @threads_option

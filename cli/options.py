@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -13,6 +14,9 @@ from warpsplat.config import QUALITIES, Settings, make_settings
 Function = TypeVar("Function", bound=Callable[..., Any])
 _defaults = Settings()
 
+
+FILE: click.Path = click.Path(path_type=Path, readable=False)
+"""A file's name. Whether it can be read is for the command to say, with the exit code that is due."""
 
 threads_option = click.option(
     "--threads",

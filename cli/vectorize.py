@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import overwrite_option, quality_options, run_options, settings_from
+from warpsplat.cli.options import FILE, overwrite_option, quality_options, run_options, settings_from
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 
@@ -31,11 +31,11 @@ def summary(output: Path, values: dict[str, Any]) -> str:
 
 
 @click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("image", type=click.Path(path_type=Path))
+@click.argument("image", type=FILE)
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="SVG to write; - is the standard output.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option

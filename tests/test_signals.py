@@ -1,140 +1,199 @@
-"""Runs that a signal ends: the old file, none or a whole one, the code of the signal, and nothing stray."""
+"""Ctrl-C and SIGTERM at chosen moments: what is written, what is said, what the exit code is."""
 
 from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from dataclasses import asdict
+import time
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
-from tests.forks import MOMENTS, QUICK, ROOT, Forks, Task, make_image
 from warpsplat.viewer import render_svg
 
-CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
-GENTLE = [signal.SIGINT, signal.SIGTERM]
-BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {QUICK[-1]}}}\njobs: [{{images: '*.png'}}]\n"
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+MOMENTS = {
+    "import": """
+class Finder:
+    def find_spec(self, name, *rest):
+        if name == "numpy":
+            strike()
+sys.meta_path.insert(0, Finder())
+""",
+    "reading": """
+import warpsplat.inputs
+strike_in(warpsplat.inputs, "read_input")
+""",
+    "reading the second input": """
+import warpsplat.inputs
+strike_in(warpsplat.inputs, "read_input", 2)
+""",
+    "compiling": """
+import warp
+strike_in(warp, "load_module")
+""",
+    "training": """
+from warpsplat.train import Trainer
+strike_in(Trainer, "advance", 5)
+""",
+    "writing": """
+strike_in(os, "fsync")
+""",
+    "scoring": """
+import warpsplat.pipeline
+strike_in(warpsplat.pipeline, "score_svg")
+""",
+    "writing, twice": """
+strike_in(os, "fsync", times=2)
+""",
+    "training, ignored": """
+import signal
+from warpsplat.train import Trainer
+strike_in(Trainer, "advance", 5)
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+""",
+}
+"""What to do so that the signal arrives at that moment."""
+
+DRIVER = """
+import os, sys
+def strike(times=1):
+    for _ in range(times):
+        os.kill(os.getpid(), {number})
+def strike_in(owner, name, call=1, times=1):
+    function, calls = getattr(owner, name), []
+    def struck(*arguments, **options):
+        calls.append(name)
+        if len(calls) == call:
+            strike(times)
+        return function(*arguments, **options)
+    setattr(owner, name, struck)
+{moment}
+from warpsplat.cli.main import main
+main({arguments!r})
+"""
 
 
-def lay_out(folder: Path, command: str) -> list[str]:
-    """Make the inputs of a command; its arguments."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for seed, name in enumerate(("a.png", "b.png") if command == "batch" else ("a.png",)):
-        make_image(folder / name, seed)
-    if command == "batch":
-        (folder / "jobs.yaml").write_text(BATCH)
-        return ["batch", "jobs.yaml"]
-    return ["vectorize", "a.png", "-o", "a.svg", *QUICK]
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    path = tmp_path / "photo.png"
+    y, x = np.mgrid[:40, :60]
+    Image.fromarray(np.stack([4 * x, 6 * y, 0 * x + 90], axis=2).astype(np.uint8)).save(path)
+    return path
 
 
-def results(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.glob("*.svg")}
+def strike(number: int, moment: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    code = DRIVER.format(number=int(number), moment=MOMENTS[moment], arguments=[str(a) for a in arguments])
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert "Traceback" not in done.stderr
+    return done
 
 
-class Runner(Forks):
-    """With the results of undisturbed runs."""
-
-    def __init__(self, scratch: Path) -> None:
-        super().__init__(scratch)
-        self.whole: dict[str, dict[str, bytes]] = {}
-        for command in ("vectorize", "batch"):
-            folder = scratch / command
-            code, _, said = self.run(lay_out(folder, command), folder)
-            assert code == 0, said
-            self.whole[command] = results(folder)
-            assert self.whole[command]
+def stray(folder: Path) -> list[str]:
+    return [name for name in os.listdir(folder) if name.startswith(".warpsplat")]
 
 
-@pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runner]:
-    made = Runner(tmp_path_factory.mktemp("signals"))
-    yield made
-    made.close()
+RUN = ("--curves", 6, "--iterations", 30, "--device", "cpu", "--json")
 
 
-def assert_whole(folder: Path) -> None:
-    """Every result that is there is a whole SVG, and there is nothing but inputs and results."""
-    for data in results(folder).values():
-        assert data.rstrip().endswith(b"</svg>")
-        assert render_svg(data.decode(), width=32).size == (32, 24)
-    stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml"))]
-    assert not stray
+@pytest.mark.parametrize(
+    ("number", "moment"),
+    [
+        (signal.SIGINT, "import"),
+        (signal.SIGTERM, "reading"),
+        (signal.SIGINT, "compiling"),
+        (signal.SIGINT, "writing, twice"),
+    ],
+)
+def test_with_nothing_to_save_nothing_is_written(image: Path, number: signal.Signals, moment: str) -> None:
+    done = strike(number, moment, "vectorize", image, "-o", image.parent / "a.svg", *RUN)
+    assert done.returncode == 128 + number
+    assert done.stderr.split() == ["warpsplat:", "interrupted"]
+    assert done.stdout == ""
+    assert os.listdir(image.parent) == ["photo.png"]
 
 
-def assert_mended(runner: Runner, command: str, arguments: list[str], folder: Path) -> None:
-    """The next run makes what an undisturbed one makes, and clears away what was left."""
-    code, _, said = runner.run(arguments, folder)
-    assert code == 0, said
-    assert results(folder) == runner.whole[command]
-    assert_whole(folder)
+@pytest.mark.parametrize(
+    ("number", "moment", "finished"),
+    [
+        (signal.SIGTERM, "training", False),
+        (signal.SIGTERM, "writing", True),
+        (signal.SIGINT, "scoring", True),
+    ],
+)
+def test_what_is_there_is_written(image: Path, number: signal.Signals, moment: str, finished: bool) -> None:
+    output = image.parent / "a.svg"
+    done = strike(number, moment, "vectorize", image, "-o", output, *RUN)
+    assert done.returncode == 128 + number, done.stderr
+    values = json.loads(done.stdout)
+    assert values["stopped"] is not finished
+    assert values["iterations"] == (30 if finished else 5)
+    assert (values["psnr"] is None) == (moment == "writing"), (
+        "the score is given up, but a started one is short"
+    )
+    text = output.read_text()
+    assert ("key=" in text) == finished, "what was cut short does not pass for a finished result"
+    assert values["bytes"] == len(text)
+    render_svg(text)
+    assert not stray(image.parent)
 
 
-@pytest.mark.parametrize("number", CODES)
-@pytest.mark.parametrize("moment", MOMENTS)
-@pytest.mark.parametrize("command", ["vectorize", "batch"])
-def test_a_signal_at_a_stage(
-    runner: Runner, tmp_path: Path, command: str, moment: str, number: signal.Signals
-) -> None:
-    arguments = lay_out(tmp_path, command)
-    # Into the middle of the training; into the second half of a batch's images.
-    count = {"training": 300, "loading": 1}.get(moment, 2 if command == "batch" else 1)
-    code, _, said = runner.run(arguments, tmp_path, moment=moment, count=count, signal=number)
-    assert code == CODES[number], said
-    assert "Traceback" not in said
-    if number in GENTLE:
-        assert_whole(tmp_path)
-        if moment != "loading":
-            made = runner.whole[command] if command == "vectorize" else {"a.svg": b""}
-            assert set(results(tmp_path)) >= set(made), "the best so far is written"
-    assert_mended(runner, command, arguments, tmp_path)
+@pytest.mark.parametrize(
+    ("number", "moment"), [(signal.SIGTERM, "training"), (signal.SIGINT, "reading the second input")]
+)
+def test_a_batch_ends_with_its_summary(image: Path, number: signal.Signals, moment: str) -> None:
+    """The first input is the list of jobs, the second the first image."""
+    (image.parent / "b.png").write_bytes(image.read_bytes())
+    jobs = image.parent / "jobs.yaml"
+    jobs.write_text("jobs: [{images: '*.png', curves: 6, iterations: 30, device: cpu}]")
+    done = strike(number, moment, "batch", jobs, "--json")
+    assert done.returncode == 128 + number
+    results = json.loads(done.stdout)["results"]
+    assert [(Path(r["image"]).name, r["status"]) for r in results] == [("b.png", "stopped")]
+    assert (image.parent / "b.svg").exists() == (moment == "training")
+    assert not (image.parent / "photo.svg").exists()
 
 
-@pytest.mark.parametrize("number", CODES)
-@pytest.mark.parametrize("moment", ["writing", "renaming"])
-def test_an_old_result_is_kept_or_replaced(
-    runner: Runner, tmp_path: Path, moment: str, number: signal.Signals
-) -> None:
-    arguments = lay_out(tmp_path, "vectorize")
-    old = runner.whole["vectorize"]["a.svg"]
-    (tmp_path / "a.svg").write_bytes(old)
-    arguments += ["--curves", "5"]
-    code, _, said = runner.run(arguments, tmp_path, moment=moment, signal=number)
-    assert code == CODES[number], said
-    after = (tmp_path / "a.svg").read_bytes()
-    assert after == old or (number in GENTLE and after.count(b"<path") == 5)
-    assert runner.run(arguments, tmp_path)[0] == 0
-    assert (tmp_path / "a.svg").read_bytes().count(b"<path") == 5
-    assert_whole(tmp_path)
+def test_an_ignored_signal_stays_ignored(image: Path) -> None:
+    """As ``nohup`` and a shell's background jobs set it."""
+    done = strike(signal.SIGINT, "training, ignored", "vectorize", image, "-o", image.parent / "a.svg", *RUN)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["iterations"] == 30
 
 
-@pytest.mark.parametrize("command", ["vectorize", "batch"])
-def test_an_ignored_ctrl_c_stays_ignored(runner: Runner, tmp_path: Path, command: str) -> None:
-    """Under ``nohup``, or in the background of a script."""
-    arguments = lay_out(tmp_path, command)
-    trip: dict[str, Any] = {"moment": "training", "count": 300, "signal": signal.SIGINT}
-    code, _, said = runner.run(arguments, tmp_path, ignored=True, **trip)
-    assert code == 0, said
-    assert results(tmp_path) == runner.whole[command]
+@pytest.mark.parametrize("seed", range(2))
+def test_ctrl_c_at_any_early_moment_shows_no_traceback(image: Path, seed: int) -> None:
+    command = [sys.executable, "-X", "importtime", "-m", "warpsplat", "vectorize", str(image), "-q"]
+    process = subprocess.Popen(
+        [*command, "-o", str(image.parent / "a.svg"), "--iterations", "900000", "--device", "cpu"],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+    )
+    assert process.stderr
+    for line in process.stderr:
+        if b"click" in line:  # the first import after the one that prepares for signals
+            break
+    time.sleep(random.Random(seed).uniform(0, 0.3))
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert b"Traceback" not in said
+    assert process.returncode in {130, -signal.SIGINT}
 
 
-@pytest.mark.parametrize("number", GENTLE)
-@pytest.mark.parametrize("moment", ["import click", "import numpy", "import warp", "loading"])
-def test_a_signal_at_the_start(tmp_path: Path, moment: str, number: signal.Signals) -> None:
-    folder = tmp_path / "folder"
-    arguments = lay_out(folder, "vectorize")
-    err = tmp_path / "stderr"
-    task = Task(arguments, str(folder), os.devnull, str(err), moment=moment, signal=number)
-    command = [sys.executable, "-m", "tests.forks", json.dumps(asdict(task))]
-    done = subprocess.run(command, cwd=ROOT, check=False)
-    said = err.read_text()
-    # Before the program's first line the system's own answer is the right one; a shell says the same of both.
-    assert done.returncode in (CODES[number], -number), said
-    assert "Traceback" not in said
-    assert len(said.strip().splitlines()) <= 1, said
-    assert_whole(folder)
+def test_killed_while_writing_leaves_nothing_for_long(image: Path) -> None:
+    output = image.parent / "a.svg"
+    done = strike(signal.SIGKILL, "writing", "vectorize", image, "-o", output, *RUN)
+    assert done.returncode == -signal.SIGKILL
+    assert len(stray(image.parent)) == 1
+    assert not output.exists()
+    assert strike(0, "writing", "vectorize", image, "-o", output, *RUN).returncode == 0
+    assert not stray(image.parent)

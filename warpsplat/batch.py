@@ -31,7 +31,7 @@ import yaml
 
 from warpsplat.config import Settings, make_settings
 from warpsplat.errors import ImageError, UsageError
-from warpsplat.files import HEAD, check_output, check_target, may_replace
+from warpsplat.files import HEAD, check_folder, check_target, may_replace
 from warpsplat.inputs import read_input
 from warpsplat.pipeline import job_key
 from warpsplat.svg import read_metadata
@@ -345,7 +345,7 @@ def _check_outputs(file: _File, lines: list[int], jobs: list[Job]) -> None:
 def _check_folder(folder: Path) -> None:
     """Check that ``folder`` can be written, or made."""
     if folder.is_dir():
-        check_output(folder / "result.svg")
+        check_folder(folder)
         return
     above = folder
     while not os.path.lexists(above):

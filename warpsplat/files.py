@@ -69,12 +69,23 @@ def _check_output(path: Path, sources: tuple[Path, ...]) -> None:
     for source in sources:
         if source.exists() and target == Path(os.path.realpath(source)):
             raise UsageError(f"{path}: is the input itself; give another output")
-    folder = target.parent
+    try:
+        check_folder(target.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def check_folder(folder: Path) -> None:
+    """Find out whether files can be made in ``folder``, and remove what dead runs left there.
+
+    Raises:
+        UsageError: they cannot.
+    """
     remove_stale(folder)
     try:
         handle, name = _temporary(folder)
     except OSError as error:
-        raise UsageError(f"{path}: cannot write to {folder}: {error.strerror}") from error
+        raise UsageError(f"cannot write to {folder}: {error.strerror}") from error
     os.close(handle)
     _discard(name)
 

@@ -7,6 +7,7 @@ so damage from before that moment is found only where the file cannot be loaded 
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import errno
 import hashlib
@@ -30,7 +31,7 @@ CHECKSUMS = "warpsplat.sha256.json"
 LOADED = (".o", ".meta", ".cubin", ".ptx")
 """Endings of the files that Warp loads; sources are only for reading."""
 
-_temporary: list[tempfile.TemporaryDirectory[str]] = []
+_temporary: list[str] = []
 """The folder that stands in for a cache that cannot be used, while this process lives."""
 
 
@@ -85,13 +86,17 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
         return
     raise ResourceError(
         f"kernel cache {wp.config.kernel_cache_dir}: kernels cannot be compiled or loaded: "
-        f"{str(failure).splitlines()[0]}; set WARP_CACHE_PATH to another folder"
+        f"{_cause(failure)}; set WARP_CACHE_PATH to another folder"
     ) from failure
 
 
 def _place() -> Path:
     assert wp.config.kernel_cache_dir, "Warp chooses one when it starts"
     return Path(wp.config.kernel_cache_dir)
+
+
+def _cause(failure: BaseException | None) -> str:
+    return getattr(failure, "strerror", None) or str(failure).splitlines()[0]
 
 
 def use_temporary_folder(failure: BaseException | None) -> None:
@@ -102,10 +107,10 @@ def use_temporary_folder(failure: BaseException | None) -> None:
     """
     if _temporary:
         return
-    cause = getattr(failure, "strerror", None) or str(failure).splitlines()[0]
+    cause = _cause(failure)
     place = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH") or "in the home folder"
     try:
-        made = tempfile.TemporaryDirectory(prefix="warpsplat-kernels-", ignore_cleanup_errors=True)
+        made = tempfile.mkdtemp(prefix="warpsplat-kernels-")
     except OSError as error:
         raise ResourceError(
             f"kernel cache {place}: {cause}; set WARP_CACHE_PATH to a folder that can be written"
@@ -115,8 +120,9 @@ def use_temporary_folder(failure: BaseException | None) -> None:
         place,
         cause,
     )
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
     _temporary.append(made)
-    wp.config.kernel_cache_dir = made.name
+    wp.config.kernel_cache_dir = made
 
 
 def _checksums(folder: Path) -> dict[str, str]:
@@ -132,7 +138,7 @@ def damaged(folder: Path) -> bool:
     try:
         noted = json.loads((folder / CHECKSUMS).read_bytes())
         found = _checksums(folder)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return False
     except (OSError, ValueError):
         return True
