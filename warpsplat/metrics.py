@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import ImageError
-from warpsplat.inspect_svg import DRAWN, count_nodes
-from warpsplat.viewer import Pixels, on_white, render_svg
+from warpsplat.inspect_svg import inspect_svg
+from warpsplat.viewer import Pixels, on_white, render_own, render_svg
 
 SSIM_WINDOW = 11
 
@@ -97,25 +97,28 @@ class Score:
         return values
 
 
-def score_svg(text: str, target: npt.NDArray[np.floating]) -> Score:
+def score_svg(text: str, target: npt.NDArray[np.floating], *, own: bool = False) -> Score:
     """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare.
 
+    ``own`` says that this program wrote the text just now: it is drawn without precautions.
+
     Raises:
-        ImageError: not an SVG, or one of other proportions.
+        ImageError: not an SVG, one that cannot be drawn, or one of other proportions.
     """
     height, width = target.shape[:2]
-    image = render_svg(text, width=width, height=height)
+    image = render_own(text) if own else render_svg(text, width=width, height=height)
     if image.size != (width, height):
         raise ImageError(f"renders as {image.width}x{image.height}, the image has {width}x{height} pixels")
     shown = on_white(image)
     wanted = np.round(target.astype(np.float64) * 255)
     data = text.encode()
+    facts = inspect_svg(text)
     return Score(
         psnr=psnr(shown, wanted),
         ssim=ssim(shown, wanted),
         ms_ssim=ms_ssim(shown, wanted),
-        paths=len(DRAWN.findall(data)),
-        nodes=count_nodes(text),
+        paths=facts.paths,
+        nodes=facts.nodes,
         bytes=len(data),
         gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
     )

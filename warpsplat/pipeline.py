@@ -99,7 +99,7 @@ def vectorize(
         seen = scene.areas() * scene.opacities.max(axis=1)
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
         svg = export(scene, settings, metadata)
-    score = score_svg(svg, target)
+    score = score_svg(svg, target, own=True)
     seconds = time.monotonic() - started
     return Result(
         svg=svg,
