@@ -7,28 +7,32 @@ from pathlib import Path
 
 import click
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, UsageError
 
 
 @click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("image", type=click.Path(path_type=Path))
-@click.argument("svg", type=click.Path(path_type=Path))
+@click.argument("image", type=click.Path(path_type=Path, allow_dash=True))
+@click.argument("svg", type=click.Path(path_type=Path, allow_dash=True))
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(image: Path, svg: Path, as_json: bool) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
 
     The SVG is rendered at the image's size; transparency is on white.
+    One of the two may be - for the standard input.
     """
     from warpsplat.image import load_image
+    from warpsplat.inputs import STANDARD, input_name
     from warpsplat.inspect_svg import read_svg_text
     from warpsplat.metrics import score_svg
 
+    if image == svg == STANDARD:
+        raise UsageError("only one of image and SVG can come from the standard input")
     target = load_image(image)
+    text = read_svg_text(svg)
     try:
-        values = score_svg(read_svg_text(svg), target).as_dict()
+        values = score_svg(text, target).as_dict()
     except ImageError as error:
-        text = str(error)
-        raise ImageError(text if text.startswith(str(svg)) else f"{svg}: {text}") from error
+        raise ImageError(f"{input_name(svg)}: {error}") from error
     if as_json:
         click.echo(json.dumps({"image": str(image), "svg": str(svg), **values}))
         return

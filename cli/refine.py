@@ -8,14 +8,19 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import run_options
+from warpsplat.cli.options import FILE, overwrite_option, run_options
+from warpsplat.cli.say import say
 from warpsplat.config import Settings, make_settings
+from warpsplat.errors import UsageError
+from warpsplat.files import check_output, write_result
+from warpsplat.inputs import STANDARD, input_name
 
 
 @click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("svg", type=click.Path(path_type=Path))
-@click.argument("image", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="SVG to write.")
+@click.argument("svg", type=FILE)
+@click.argument("image", type=FILE)
+@click.option("-o", "--output", type=FILE, required=True, help="SVG to write; - is the standard output.")
+@overwrite_option
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @click.option("--time-budget", metavar="TIME", help="Size the run to end within 60s, 2m ...")
 @click.option(
@@ -27,6 +32,7 @@ def command(
     svg: Path,
     image: Path,
     output: Path,
+    overwrite: bool,
     device: str,
     threads: int | None,
     verbose: int,
@@ -37,29 +43,41 @@ def command(
     """Improve SVG (ours, VTracer's ...) against IMAGE by gradient descent.
 
     Its paths are kept, none is added: outlines, colours, opacities and
-    widths move. A result that is no better is not taken.
+    widths move. A result that is no better is not taken. Either of SVG and
+    IMAGE may be - for the standard input. The figures go to stderr where the
+    SVG goes to stdout.
     """
     settings = make_settings(**given)
+    if svg == image == STANDARD:
+        raise UsageError("only one of SVG and image can come from the standard input")
+    check_output(output, svg, image, ending=".svg", overwrite=overwrite)
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.vectorize import summary
     from warpsplat.device import choose_device, start_warp
-    from warpsplat.files import check_output, write_atomically
-    from warpsplat.refine import read_pair, refine
+    from warpsplat.image import load_image
+    from warpsplat.inspect_svg import read_svg_text
+    from warpsplat.refine import refine
 
-    text, target = read_pair(svg, image)
-    check_output(output, image)
+    text, target = read_svg_text(svg), load_image(image)
     start_warp()
     chosen = choose_device(device)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as report:
         result, before = refine(
-            text, target, settings, chosen, name=str(svg), threads=threads, report=report, stop=interrupt
+            text,
+            target,
+            settings,
+            chosen,
+            name=input_name(svg),
+            threads=threads,
+            report=report,
+            stop=interrupt,
         )
-    write_atomically(output, result.svg.encode())
+    write_result(output, result.svg.encode())
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if as_json:
-        click.echo(json.dumps(values))
+        say(json.dumps(values), err=output == STANDARD)
     elif not quiet:
-        click.echo(f"{summary(output, values)} (before: {before:.2f} dB)")
+        say(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
     leave(result)

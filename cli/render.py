@@ -6,41 +6,35 @@ from pathlib import Path
 
 import click
 
+from warpsplat.cli.options import FILE, overwrite_option
 from warpsplat.errors import ImageError, UsageError
 
 
 @click.command("render", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("svg", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="PNG to write.")
+@click.argument("svg", type=FILE)
+@click.option("-o", "--output", type=FILE, required=True, help="PNG to write; - is the standard output.")
+@overwrite_option
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
-def command(svg: Path, output: Path, scale: float) -> None:
-    """Render SVG (any, not only ours) to a PNG, as a viewer shows it."""
-    import io
+def command(svg: Path, output: Path, overwrite: bool, scale: float) -> None:
+    """Render SVG (any, not only ours; - for the standard input) to a PNG, as a viewer shows it."""
     import math
 
-    from warpsplat.files import check_output, write_atomically
-    from warpsplat.inspect_svg import read_svg_text
-    from warpsplat.viewer import render_svg, svg_size
+    from warpsplat.files import check_output, mark_png, write_result
+    from warpsplat.inputs import input_name
+    from warpsplat.inspect_svg import MAX_PIXELS, inspect_svg, read_svg_text, svg_size
+    from warpsplat.viewer import draw_png
 
-    text = read_svg_text(svg)
-    check_output(output, svg)
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
-    width, height = svg_size(text, svg)
-    if width * height > MAX_PIXELS:
-        raise ImageError(f"{svg}: is {width}x{height} pixels, more than {MAX_PIXELS // 1_000_000} million")
-    if width * scale * height * scale > MAX_PIXELS:
-        raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
-    if min(width, height) * scale < 0.5:
-        raise UsageError(f"scale {scale} leaves no pixel of {width}x{height}")
+    check_output(output, svg, ending=".png", overwrite=overwrite)
+    text = read_svg_text(svg)
     try:
-        image = render_svg(text, zoom=scale)
+        size = svg_size(inspect_svg(text).root)
+        if size and max(size[0], 1.0) * scale * max(size[1], 1.0) * scale > MAX_PIXELS:
+            raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
+        if size and min(max(1.0, side) for side in size) * scale < 0.5:
+            raise UsageError(f"scale {scale} leaves no pixel of {size[0]:g}x{size[1]:g}")
+        png = draw_png(text, zoom=scale)
     except ImageError as error:
-        raise ImageError(f"{svg}: {error}") from error
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    write_atomically(output, buffer.getvalue())
-
-
-MAX_PIXELS = 400_000_000
-"""Largest picture [pixels]; four bytes each."""
+        raise ImageError(f"{input_name(svg)}: {error}") from error
+    write_result(output, mark_png(png))

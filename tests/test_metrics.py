@@ -11,7 +11,7 @@ from PIL import Image
 from tests.scenes import random_scene
 from warpsplat import strips
 from warpsplat.errors import ImageError, Stopped
-from warpsplat.inspect_svg import count_nodes
+from warpsplat.inspect_svg import inspect_svg
 from warpsplat.metrics import ms_ssim, psnr, score_svg, ssim
 from warpsplat.svg import write_svg
 from warpsplat.viewer import on_white, render_svg
@@ -75,7 +75,7 @@ NODES = [
 
 @pytest.mark.parametrize(("text", "count"), NODES)
 def test_nodes(text: str, count: int) -> None:
-    assert count_nodes(text) == count
+    assert inspect_svg(f'<svg xmlns="http://www.w3.org/2000/svg">{text}</svg>').nodes == count
 
 
 def test_white_behind_transparency() -> None:

@@ -40,7 +40,7 @@ FOREIGN = {
 def test_foreign_files_look_the_same(name: str) -> None:
     """What resvg shows of the file, against our own renderer on the scene read from it."""
     text = HEAD + FOREIGN[name]
-    scene = load_scene(text, 40, 30, name)
+    scene, _ = load_scene(text, 40, 30, name)
     shown = on_white(render_svg(text, width=40, height=30))
     # Strokes: resvg's own anti-aliasing has 16 levels, and much of so small an image is edge.
     assert psnr(render(scene, device="cpu").astype(np.float64) * 255, shown) > (
@@ -53,8 +53,8 @@ REFUSED = {
     "hello": "cannot be rendered",
     HEAD + 'width="40" height="30"/>': "draws no",
     HEAD + 'width="40" height="40"><path d="M0 0H9V9Z"/></svg>': "proportions",
-    HEAD
-    + 'width="40" height="30"><path d="M0 0H9V9Z"/><path d="M0 0H9" fill="none" stroke="red"/></svg>': "both",
+    HEAD + 'width="40" height="30"><path d="M0 0H9V9Z"/><path d="M0 0H9" fill="none" stroke="red" '
+    'stroke-linecap="round"/></svg>': "both",
     HEAD + 'width="40" height="30"><path d="M0 0H9V9Z" stroke="red"/></svg>': "both",
 }
 

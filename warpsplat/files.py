@@ -15,8 +15,10 @@ import platform
 import re
 import secrets
 import stat
+import struct
 import sys
 import time
+import zlib
 from pathlib import Path
 
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
@@ -138,6 +140,17 @@ def may_replace(path: Path) -> bool:
     except FileNotFoundError:
         return True
     return not head or SVG_MARK in head or b"tEXtSoftware\0" + PNG_SOFTWARE.encode() in head
+
+
+def mark_png(png: bytes) -> bytes:
+    """A PNG with a ``Software`` chunk behind its header, by which ``may_replace`` knows it."""
+    chunk = b"tEXtSoftware\0" + PNG_SOFTWARE.encode()
+    whole = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    return png[:PNG_HEADER] + whole + png[PNG_HEADER:]
+
+
+PNG_HEADER = 33
+"""Length of a PNG's signature and header chunk [bytes]."""
 
 
 def write_result(path: Path, data: bytes) -> None:

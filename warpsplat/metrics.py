@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.inspect_svg import DRAWN, count_nodes
+from warpsplat.inspect_svg import inspect_svg
 from warpsplat.strips import Bytes, Stop, check, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
@@ -152,7 +152,11 @@ class Score:
 
 
 def score_svg(
-    text: str, target: npt.NDArray[np.floating], *, stop: Callable[[], bool] | None = None
+    text: str,
+    target: npt.NDArray[np.floating],
+    *,
+    own: bool = False,
+    stop: Callable[[], bool] | None = None,
 ) -> Score:
     """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare.
 
@@ -161,22 +165,24 @@ def score_svg(
     Args:
         text: the SVG.
         target: the image.
+        own: this program wrote the text just now: it is drawn without precautions.
         stop: asked every few tenths of a second; once true, the work is given up.
 
     Raises:
-        ImageError: not an SVG, or one of other proportions.
+        ImageError: not an SVG, one that cannot be drawn, or one of other proportions.
         Stopped: ``stop`` said so; there are no figures.
     """
     height, width = target.shape[:2]
-    shown = draw(text, width, height, stop)
+    shown = draw(text, width, height, stop, own=own)
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target), stop)
     data = text.encode()
+    facts = inspect_svg(text)
     return Score(
         psnr=fidelity,
         ssim=single,
         ms_ssim=multiple,
-        paths=len(DRAWN.findall(data)),
-        nodes=count_nodes(text),
+        paths=facts.paths,
+        nodes=facts.nodes,
         bytes=len(data),
         gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
     )

@@ -135,11 +135,11 @@ def _score(
 ) -> Score | None:
     """The score of a file, or None where there is no time for it."""
     if interrupted:
-        return score_svg(svg, target) if target.shape[0] * target.shape[1] <= QUICK_PIXELS else None
+        return score_svg(svg, target, own=True) if target.shape[0] * target.shape[1] <= QUICK_PIXELS else None
     if stop and stop():
         return None
     try:
-        return score_svg(svg, target)
+        return score_svg(svg, target, own=True, stop=stop)
     except Stopped:
         return None
 

@@ -6,92 +6,43 @@ area is the same. Paths of different length are padded to one length by cubics w
 
 from __future__ import annotations
 
-import io
 import math
-import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import svgelements as se
 import warp as wp
 
 from warpsplat.config import Density, Settings
 from warpsplat.errors import ImageError
 from warpsplat.metrics import score_svg
 from warpsplat.pipeline import Result, vectorize
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg import write_svg
-from warpsplat.viewer import render_svg
+from warpsplat.svg_path import Points, line
+from warpsplat.svg_shapes import Shape, read_shapes
 
-MAX_POINTS = 60_000
-"""Most control points of one path; beyond, the padding of the others would fill the memory."""
-
-
-UNSUPPORTED = re.compile(
-    r"(clip-path|mask|filter)\s*[=:]\s*[\"']?\s*url\(|(?:fill|stroke)\s*[=:]\s*[\"']?\s*(url)\(|<(image|text|use)\b"
-)
-"""What the picture would lose without a word."""
+MAX_PADDED = 20_000_000
+"""Most control points of all paths, each counted as long as the longest (TODO)."""
 
 
-def _opacity(values: Any, name: str) -> float:
-    """An opacity attribute: a number or a percentage.
-
-    Raises:
-        ImageError: neither.
-    """
-    text = str(values.get(name, 1)).strip()
-    try:
-        number = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        raise ImageError(f"{name} {text!r} is not a number") from None
-    return min(max(number, 0.0), 1.0)
+def _bridge(start: Points, end: Points) -> Points:
+    return np.array([(p.real, p.imag) for p in line(complex(*start), complex(*end))])
 
 
-def _cubics(path: Any) -> list[list[np.ndarray]]:
-    """Subpaths of an svgelements path, each as points p0, c, c, p3, c, c, p6 ..."""
-    path.approximate_arcs_with_cubics()
-    subpaths: list[list[np.ndarray]] = []
-
-    def at(point: Any) -> np.ndarray:
-        return np.array([point.x, point.y], np.float64)
-
-    for segment in path:
-        if isinstance(segment, se.Move):
-            subpaths.append([at(segment.end)])
-            continue
-        p0, p3 = at(segment.start), at(segment.end)
-        if isinstance(segment, se.CubicBezier):
-            inner = [at(segment.control1), at(segment.control2)]
-        elif isinstance(segment, se.QuadraticBezier):
-            control = at(segment.control)
-            inner = [p0 + 2 / 3 * (control - p0), p3 + 2 / 3 * (control - p3)]
-        else:  # lines, and the line that closes a subpath
-            inner = [p0 + (p3 - p0) / 3, p0 + 2 / 3 * (p3 - p0)]
-            if isinstance(segment, se.Close) and np.allclose(p0, p3):
-                continue
-        subpaths[-1] += [*inner, p3]
-    return [s for s in subpaths if len(s) > 1]
-
-
-def _line(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
-    return [a + (b - a) / 3, a + 2 / 3 * (b - a), b]
-
-
-def _ring(subpaths: list[list[np.ndarray]]) -> np.ndarray:
+def _ring(subpaths: list[Points]) -> Points:
     """One closed ring of cubics around all subpaths, without the repeated end."""
     start = subpaths[0][0]
-    ring: list[np.ndarray] = [start]
+    ring = [start[None]]
     for number, subpath in enumerate(subpaths):
         if number:
-            ring += _line(ring[-1], subpath[0])
-        ring += subpath[1:]
-        if not np.allclose(subpath[-1], subpath[0]):
-            ring += _line(subpath[-1], subpath[0])
+            ring.append(_bridge(start, subpath[0]))
+        ring.append(subpath[1:])
+        if not np.allclose(subpath[-1], subpath[0], rtol=0, atol=1e-6):
+            ring.append(_bridge(subpath[-1], subpath[0]))
         if number:
-            ring += _line(ring[-1], start)
-    return np.array(ring[:-1])
+            ring.append(_bridge(subpath[0], start))
+    return np.concatenate(ring)[:-1]
 
 
 def _pad(points: np.ndarray, count: int) -> np.ndarray:
@@ -110,84 +61,63 @@ def _without_padding(scene: Scene, start: Scene) -> Scene:
     return replace(scene, points=points)
 
 
-def load_scene(text: str, width: int, height: int, name: str) -> Scene:
+def _is_background(shape: Shape, width: int, height: int) -> bool:
+    """Whether an opaque upright rectangle covers the canvas."""
+    if not (shape.is_rect and shape.filled and shape.opacity == 1):
+        return False
+    corners = shape.subpaths[0][::3]
+    upright = (np.isclose(np.diff(corners, axis=0), 0, atol=1e-6).sum(axis=1) >= 1).all()
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return bool(upright and (low <= 0.5).all() and (high >= np.array([width, height]) - 0.5).all())
+
+
+def load_scene(text: str, width: int, height: int, name: str) -> tuple[Scene, bool]:
     """Read an SVG's paths (and basic shapes) as a scene of ``width`` x ``height`` canvas units.
 
+    Returns:
+        the scene, and whether the SVG itself has a background; where it has none, the scene's is white.
+
     Raises:
-        ImageError: not an SVG, nothing drawn, fills and strokes mixed, or a fill that is no colour.
+        ImageError: not an SVG, nothing drawn, something that the scene cannot hold (the message says
+            what), or more than ``MAX_PADDED`` points.
     """
     try:
-        render_svg(text, width=8)
-        document = se.SVG.parse(io.StringIO(text), reify=True, width=width, height=height)
-        found = UNSUPPORTED.search(text)
-        if found:
-            what = next(group for group in found.groups() if group)
-            raise ImageError(f"uses {'a gradient or pattern' if what == 'url' else what}, not supported")
+        return _load_scene(text, width, height)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
-    except Exception as error:  # the parser raises what its helpers raise
-        raise ImageError(f"{name}: not an SVG that can be read: {error}") from error
-    own_width, own_height = float(document.width), float(document.height)
-    box = document.viewbox
-    if box is not None and box.width and box.height:
-        own_width, own_height = float(box.width), float(box.height)
-    if abs(own_width / own_height - width / height) > 0.02 * width / height:
-        raise ImageError(f"{name}: {own_width:g}x{own_height:g} does not have the proportions of the image")
+
+
+def _load_scene(text: str, width: int, height: int) -> tuple[Scene, bool]:
+    shapes = read_shapes(text, width, height)
     background = np.ones(3)
-    shapes: list[tuple[np.ndarray, np.ndarray, float, float]] = []
-    kinds: set[Kind] = set()
-    for element in document.elements():
-        if not isinstance(element, se.Shape) or isinstance(element, se.SVG):
-            continue
-        path = abs(se.Path(element))
-        filled = element.fill is not None and element.fill.value is not None
-        stroked = element.stroke is not None and element.stroke.value is not None
-        if not (filled or stroked) or element.values.get("visibility") == "hidden":
-            continue
-        if filled and stroked:
-            raise ImageError(f"{name}: a shape with both fill and stroke is not supported")
-        paint = element.fill if filled else element.stroke
-        color = np.array([paint.red, paint.green, paint.blue]) / 255
-        key = "fill-opacity" if filled else "stroke-opacity"
-        try:
-            opacity = paint.opacity * _opacity(element.values, "opacity")
-            if paint.opacity == 1:
-                opacity *= _opacity(element.values, key)
-        except ImageError as error:
-            raise ImageError(f"{name}: {error}") from error
-        if filled and isinstance(element, se.Rect) and not shapes and opacity == 1:
-            x0, y0, x1, y1 = path.bbox()
-            if x0 <= 0.5 and y0 <= 0.5 and x1 >= width - 0.5 and y1 >= height - 0.5:
-                background = color
-                continue
-        subpaths = _cubics(path)
-        if not subpaths:
-            continue
-        kinds.add("closed" if filled else "open")
-        if filled:
-            shapes.append((_ring(subpaths), color, opacity, 0.0))
-        else:
-            line = float(element.stroke_width or 1)
-            shapes += [(np.array(s), color, opacity, line) for s in subpaths]
+    has_background = bool(shapes) and _is_background(shapes[0], width, height)
+    if has_background:
+        background = np.array(shapes.pop(0).color)
     if not shapes:
-        raise ImageError(f"{name}: draws no filled or stroked path")
-    if len(kinds) > 1:
-        raise ImageError(f"{name}: has both fills and strokes; only one of them can be refined at a time")
-    kind = kinds.pop()
-    longest = max(len(points) for points, *_ in shapes)
-    if longest > MAX_POINTS:
-        raise ImageError(f"{name}: a path has {longest} points, more than {MAX_POINTS}")
-    count = 6 * math.ceil(longest / 6) if kind == "closed" else longest
+        raise ImageError("draws no filled or stroked path")
+    filled = shapes[0].filled
+    if any(shape.filled != filled for shape in shapes):
+        raise ImageError("has both fills and strokes; only one of them can be refined at a time")
+    rows: list[tuple[Points, Shape]] = []
+    for shape in shapes:
+        rows += [(p, shape) for p in ([_ring(shape.subpaths)] if filled else shape.subpaths)]
+    longest = max(len(points) for points, _ in rows)
+    count = 6 * math.ceil(longest / 6) if filled else longest
+    if count * len(rows) > MAX_PADDED:
+        raise ImageError(
+            f"{len(rows)} paths, the longest of {longest} points: all take as much memory as the longest, "
+            f"and more than {MAX_PADDED // 1_000_000} million points do not fit; split or simplify the longest"
+        )
     return Scene(
-        kind=kind,
+        kind="closed" if filled else "open",
         width=width,
         height=height,
-        points=np.stack([_pad(points, count) for points, *_ in shapes]).astype(np.float32),
-        colors=np.array([color for _, color, *_ in shapes], np.float32),
-        opacities=np.array([[opacity] for _, _, opacity, _ in shapes], np.float32),
-        widths=np.array([line for *_, line in shapes], np.float32),
+        points=np.stack([_pad(points, count).astype(np.float32) for points, _ in rows]),
+        colors=np.array([shape.color for _, shape in rows], np.float32),
+        opacities=np.array([[shape.opacity] for _, shape in rows], np.float32),
+        widths=np.array([shape.width for _, shape in rows], np.float32),
         background=background.astype(np.float32),
-    )
+    ), has_background
 
 
 def refine(
@@ -201,7 +131,7 @@ def refine(
         the result, and the PSNR of ``text`` itself [dB]. A result that is no better is ``text`` unchanged.
     """
     height, width = target.shape[:2]
-    scene = load_scene(text, width, height, name)
+    scene, has_background = load_scene(text, width, height, name)
     try:
         before = score_svg(text, target)
     except ImageError as error:
@@ -217,8 +147,8 @@ def refine(
     )
     result = vectorize(target, settings, device, scene=scene, **options)
     trimmed = _without_padding(result.scene, scene)
-    svg = write_svg(trimmed, precision=settings.precision)
-    score = score_svg(svg, target)
+    svg = write_svg(trimmed, precision=settings.precision, background=has_background)
+    score = score_svg(svg, target, own=True)
     result = replace(result, svg=svg, scene=trimmed, score=score)
     if score.psnr <= before.psnr:
         result = replace(result, svg=text, scene=scene, score=before)
@@ -227,11 +157,3 @@ def refine(
 
 REFINE_RATE = 0.5
 """Learning rate of points [px]: the shapes are nearly where they should be."""
-
-
-def read_pair(svg: Path, image: Path) -> tuple[str, FloatArray]:
-    """Text of the SVG and pixels of the image."""
-    from warpsplat.image import load_image
-    from warpsplat.inspect_svg import read_svg_text
-
-    return read_svg_text(svg), load_image(image)

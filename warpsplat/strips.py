@@ -12,7 +12,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from warpsplat.errors import ImageError, Stopped
-from warpsplat.viewer import render_svg
+from warpsplat.viewer import render_own, render_svg
 
 Bytes = npt.NDArray[np.uint8]
 Stop = Callable[[], bool]
@@ -52,10 +52,11 @@ def rows_of(width: int, height: int, overlap: int = 0) -> Iterator[slice]:
         yield slice(top, min(top + step + overlap, height))
 
 
-def draw(text: str, width: int, height: int, stop: Stop | None = None) -> Bytes:
+def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: bool = False) -> Bytes:
     """An SVG drawn by resvg at ``width`` x ``height`` px: sRGB and opacity, shape (height, width, 4).
 
-    A large one is drawn in strips if it is a file of ours of that size, else in one piece.
+    A large one is drawn in strips if it is a file of ours of that size, else in one piece. ``own`` says that
+    this program wrote the text just now, so that it needs no precautions.
 
     Raises:
         ImageError: not an SVG, or one of other proportions.
@@ -63,23 +64,28 @@ def draw(text: str, width: int, height: int, stop: Stop | None = None) -> Bytes:
     """
     check(stop)
     head = OUR_HEAD.match(text)
-    own = head is not None and (int(head[1]), int(head[2])) == (width, height)
-    if not own or width * height <= WHOLE_PIXELS:
-        return _pixels(render_svg(text, width=width, height=height), width, height)
+    cuttable = head is not None and (int(head[1]), int(head[2])) == (width, height)
+
+    def drawn(text: str, height: int) -> Bytes:
+        image = render_own(text) if own else render_svg(text, width=width, height=height)
+        return _pixels(image, width, height)
+
+    if not cuttable or width * height <= WHOLE_PIXELS:
+        return drawn(text, height)
 
     def strip(rows: slice) -> Bytes:
         check(stop)
         tall = rows.stop - rows.start
         view = f'width="{width}" height="{tall}" viewBox="0 {rows.start} {width} {tall}"'
         part = re.sub(r'width="\d+" height="\d+" viewBox="[^"]*"', view, text, count=1)
-        return _pixels(render_svg(part, width=width, height=tall), width, tall)
+        return drawn(part, tall)
 
     out = np.empty((height, width, 4), np.uint8)
     strips = list(rows_of(width, height))
     with ThreadPoolExecutor(min(DRAWERS, os.cpu_count() or 1)) as drawers:
         try:
-            for rows, drawn in zip(strips, drawers.map(strip, strips), strict=True):
-                out[rows] = drawn
+            for rows, part in zip(strips, drawers.map(strip, strips), strict=True):
+                out[rows] = part
         except BaseException:
             drawers.shutdown(wait=False, cancel_futures=True)
             raise

@@ -91,7 +91,14 @@ def _elements(scene: Scene, precision: int, opacity_scale: float) -> Iterator[st
             yield f'<path d="{path_data(points, scene.kind == "closed", precision)}" {style}{extra}/>'
 
 
-def write_svg(scene: Scene, *, precision: int = 1, metadata: str = "", opacity_scale: float = 1.0) -> str:
+def write_svg(
+    scene: Scene,
+    *,
+    precision: int = 1,
+    metadata: str = "",
+    opacity_scale: float = 1.0,
+    background: bool = True,
+) -> str:
     """The scene as an SVG document: a background and one path a shape, in painter's order.
 
     Args:
@@ -100,7 +107,10 @@ def write_svg(scene: Scene, *, precision: int = 1, metadata: str = "", opacity_s
         metadata: text for the ``metadata`` element, besides the program's name and version.
         opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
             below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
+        background: whether to write it; without, the picture is transparent where no shape is.
     """
+    fill = hex_color(scene.background)
+    behind = f'<rect width="{scene.width}" height="{scene.height}" fill="{fill}"/>\n' if background else ""
     shapes = "\n".join(_elements(scene, precision, opacity_scale))
     group = f"<g {STROKE_ATTRIBUTES}>" if scene.kind == "open" else "<g>"
     note = f"warpsplat {__version__} {metadata}".strip()
@@ -108,8 +118,7 @@ def write_svg(scene: Scene, *, precision: int = 1, metadata: str = "", opacity_s
         f'<svg xmlns="{NAMESPACE}" width="{scene.width}" height="{scene.height}" '
         f'viewBox="0 0 {scene.width} {scene.height}">\n'
         f"<metadata>{note}</metadata>\n"
-        f'<rect width="{scene.width}" height="{scene.height}" fill="{hex_color(scene.background)}"/>\n'
-        f"{group}\n{shapes}\n</g>\n</svg>\n"
+        f"{behind}{group}\n{shapes}\n</g>\n</svg>\n"
     )
 
 

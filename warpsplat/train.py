@@ -22,7 +22,7 @@ from warpsplat.render import TileRenderer, make_renderer
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg import export, resized
 from warpsplat.tiles import to_tiles
-from warpsplat.viewer import on_white, render_svg
+from warpsplat.viewer import on_white, render_own
 
 SIZE_CHOICES = 12
 """How many lengths of the shorter side are tried for a reduced image."""
@@ -279,7 +279,7 @@ class Trainer:
             self._assemble()
         size = (self.renderer.width, self.renderer.height)
         text = resized(export(self.scene(), self.settings), *size, self.scale)
-        shown = on_white(render_svg(text)) / 255
+        shown = on_white(render_own(text)) / 255
         aim = self.small - (shown - self.renderer.read_image())
         self.device_target.assign(to_tiles(np.asarray(aim, np.float32)))
 
