@@ -7,12 +7,13 @@ from pathlib import Path
 
 import click
 
+from warpsplat.cli.options import FILE
 from warpsplat.errors import ImageError, UsageError
 
 
 @click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("image", type=click.Path(path_type=Path, allow_dash=True))
-@click.argument("svg", type=click.Path(path_type=Path, allow_dash=True))
+@click.argument("image", type=FILE)
+@click.argument("svg", type=FILE)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(image: Path, svg: Path, as_json: bool) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.

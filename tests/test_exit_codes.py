@@ -7,6 +7,7 @@ import json
 import os
 import re
 import signal
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -136,8 +137,8 @@ TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
     (ExitCode.RESOURCES, "no memory", "bench --curves 4 --size 32x32", NO_MEMORY),
     (ExitCode.RESOURCES, "no memory for the pixels", f"vectorize photo.png {QUICK}", NO_MEMORY_FOR_PIXELS),
     (ExitCode.RESOURCES, "no memory for the pixels", "eval photo.png drawing.svg", NO_MEMORY_FOR_PIXELS),
-    (ExitCode.RESOURCES, "no memory for the picture", "render drawing.svg -o a.png",
-     _raising(Image.Image, "save", MemoryError())),
+    (ExitCode.RESOURCES, "no process to draw in", "render drawing.svg -o a.png",
+     _raising(subprocess, "Popen", OSError(errno.EAGAIN, os.strerror(errno.EAGAIN)))),
     (ExitCode.INTERRUPTED, "Ctrl-C", f"vectorize photo.png {QUICK}", CTRL_C),
     (ExitCode.INTERRUPTED, "Ctrl-C", "batch good.yaml", CTRL_C),
     (ExitCode.INTERRUPTED, "Ctrl-C", f"refine drawing.svg photo.png -o a.svg {REFINE}", CTRL_C),

@@ -62,7 +62,7 @@ def assert_whole(folder: Path) -> None:
     """Every result that is there is a whole SVG, and there is nothing but inputs and results."""
     for data in results(folder).values():
         assert data.rstrip().endswith(b"</svg>")
-        assert render_svg(data.decode(), width=32).size == (32, 24)
+        assert render_svg(data.decode(), width=32, height=24).size == (32, 24)
     stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml"))]
     assert not stray
 

@@ -127,19 +127,19 @@ def export_within(scene: Scene, settings: Settings, metadata: str) -> tuple[str,
 
 
 QUICK_PIXELS = 1_000_000
-"""Of an image up to this size, an interrupted run is still scored: it takes about a second."""
+"""Of an image up to this size, an interrupted run is still scored, and a score that has begun goes on: it
+takes about a second."""
 
 
 def _score(
     svg: str, target: FloatArray, stop: Callable[[], bool] | None, *, interrupted: bool
 ) -> Score | None:
     """The score of a file, or None where there is no time for it."""
-    if interrupted:
-        return score_svg(svg, target, own=True) if target.shape[0] * target.shape[1] <= QUICK_PIXELS else None
-    if stop and stop():
+    quick = target.shape[0] * target.shape[1] <= QUICK_PIXELS
+    if (interrupted and not quick) or (not interrupted and stop and stop()):
         return None
     try:
-        return score_svg(svg, target, own=True, stop=stop)
+        return score_svg(svg, target, own=True, stop=None if quick else stop)
     except Stopped:
         return None
 

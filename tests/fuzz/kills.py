@@ -59,7 +59,7 @@ def broken(folder: Path) -> list[str]:
     found = []
     for name, data in results(folder).items():
         try:
-            render_svg(data.decode(), width=32)
+            render_svg(data.decode(), width=32, height=24)
         except (WarpsplatError, UnicodeDecodeError):
             found.append(name)
         else:
@@ -98,8 +98,8 @@ class Kill:
     def line(self) -> str:
         """A row of the table."""
         return (
-            f"{self.command:10}{'cold' if self.cold else 'warm':5}{self.number.name:8}{self.moment:6.2f} s  {self.code:5}{self.wait:7.2f} s  "
-            f"{self.left:7}{'; '.join(self.faults) or 'ok'}"
+            f"{self.command:10}{'cold' if self.cold else 'warm':5}{self.number.name:8}{self.moment:6.2f} s  "
+            f"{self.code:5}{self.wait:7.2f} s  {self.left:7}{'; '.join(self.faults) or 'ok'}"
         )
 
 
@@ -156,9 +156,8 @@ def kill_once(
         faults.append("next run: other results")
     known = {*INPUTS[command], *whole[command], "jobs.yaml"}
     faults += [f"next run: left {name}" for name in os.listdir(folder) if name not in known]
-    return Kill(
-        command, number, moment, code, wait, _state(before, after, len(whole[command])), tuple(faults)
-    )
+    left = _state(before, after, len(whole[command]))
+    return Kill(command, cold, number, moment, code, wait, left, tuple(faults))
 
 
 def main() -> None:
