@@ -120,8 +120,7 @@ def parse_transform(text: str) -> Matrix:
         )
         if found is None or one is None:
             raise ImageError(f"transform {text[:40]!r} is not supported")
-        with np.errstate(all="ignore"):  # what overflows is found where the points are
-            matrix = matrix @ one
+        matrix = matrix @ one
         position = found.end()
     return matrix
 

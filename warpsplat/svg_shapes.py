@@ -71,7 +71,8 @@ def read_shapes(text: str, width: int, height: int) -> list[Shape]:
         root = ElementTree.fromstring(text)
         context = _Context(INHERITED, *_canvas(facts.root, width, height))
         sheet = StyleSheet(_css(root))
-        return _walk(root, context, sheet)
+        with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
+            return _walk(root, context, sheet)
     except (ImageError, MemoryError):
         raise
     except Exception as error:  # arithmetic on absurd numbers overflows in many ways
@@ -195,12 +196,11 @@ def _shape(element: ElementTree.Element, tag: str, style: Style, context: _Conte
     if not (filled or width > 0):
         return []
     data, is_rect = outline(tag, element.attrib, context.size)
-    with np.errstate(all="ignore"):  # what overflows is found below
-        scale = _similarity(context.matrix)
-        subpaths = [
-            (points @ context.matrix[:2, :2].T + context.matrix[:2, 2], is_closed)
-            for points, is_closed in cubics(data, keep_dots=not filled)
-        ]
+    scale = _similarity(context.matrix)
+    subpaths = [
+        (points @ context.matrix[:2, :2].T + context.matrix[:2, 2], is_closed)
+        for points, is_closed in cubics(data, keep_dots=not filled)
+    ]
     if not subpaths:
         return []
     if filled and width > 0:
