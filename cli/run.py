@@ -92,11 +92,16 @@ def run_file(
     """``vectorize_file`` with a progress bar."""
     interrupt = interrupt or Interrupt()
     if verbose:
-        click.echo(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
+        most = "at most " if settings.simplify or settings.max_bytes else ""
+        click.echo(f"{source}: {most}{settings.curves} {settings.kind} curves on {device}", err=True)
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
-        return vectorize_file(
+        result = vectorize_file(
             source, output, settings, device, threads=threads, report=report, stop=interrupt
         )
+    count = len(result.scene)
+    if settings.simplify and not settings.max_bytes and count < settings.curves and not quiet:
+        click.echo(f"{source}: a simple image: {count} shapes; --curves N for another number", err=True)
+    return result
 
 
 def leave(result: Result) -> None:
