@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import click
 
 from warpsplat.cli.say import set_voice
-from warpsplat.config import QUALITIES, Settings, make_settings
+from warpsplat.config import DEFAULT_QUALITY, QUALITIES, Settings, make_settings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _defaults = Settings()
@@ -51,12 +51,15 @@ def quality_options(function: Function) -> Function:
     """What decides the result."""
     options = [
         click.option(
-            "--curves", type=int, metavar="N", help=f"Number of shapes.  [default: {_defaults.curves}]"
+            "--curves",
+            type=int,
+            metavar="N",
+            help=f"Number of shapes.  [default: {_defaults.curves}; fewer for a simple image]",
         ),
         click.option("--closed", "kind", flag_value="closed", help="Filled shapes.  [default]"),
         click.option("--open", "kind", flag_value="open", help="Strokes."),
         click.option(
-            "--quality", type=click.Choice(QUALITIES), help=f"Effort.  [default: {_defaults.quality}]"
+            "--quality", type=click.Choice(QUALITIES), help=f"Effort.  [default: {DEFAULT_QUALITY}]"
         ),
         click.option(
             "--renderer",
@@ -103,5 +106,5 @@ def settings_from(given: dict[str, Any]) -> Settings:
     Raises:
         UsageError: a value is out of range.
     """
-    quality = given.pop("quality", None) or _defaults.quality
+    quality = given.pop("quality", None) or DEFAULT_QUALITY
     return make_settings(quality, **given)

@@ -69,10 +69,11 @@ def run_file(
 ) -> Result:
     """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
     if verbose:
-        say(f"{source}: {settings.curves} {settings.kind} curves on {device}", err=True)
+        most = "at most " if settings.simplify or settings.max_bytes else ""
+        say(f"{source}: {most}{settings.curves} {settings.kind} curves on {device}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
-        return vectorize_file(
+        result = vectorize_file(
             data,
             output,
             settings,
@@ -82,6 +83,11 @@ def run_file(
             report=report,
             stop=interrupt,
         )
+    count = len(result.scene)
+    if settings.simplify and not settings.max_bytes and count < settings.curves and not quiet:
+        hint = f"a simple image: {count} shapes; --curves N for another number"
+        say(f"warpsplat: {input_name(source)}: {hint}", err=True)
+    return result
 
 
 def leave(result: Result) -> None:

@@ -13,6 +13,7 @@ from PIL import Image
 import warpsplat.configs
 from tests.test_cli import run
 from warpsplat.batch import load_jobs
+from warpsplat.config import make_settings
 from warpsplat.errors import UsageError
 
 
@@ -57,7 +58,7 @@ jobs:
     ]
     assert [j.settings.kind for j in jobs] == ["closed"] * 3 + ["open"] * 2
     assert [j.settings.curves for j in jobs] == [9, 9, 9, 5, 5]
-    assert jobs[3].settings.quality == "draft"
+    assert jobs[3].settings.iterations == make_settings("draft").iterations
     assert {j.device for j in jobs} == {"cpu"}
 
 

@@ -11,7 +11,7 @@ from warpsplat.errors import UsageError
 def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
     for name, changes in PRESETS.items():
         settings = make_settings(name)
-        assert settings == replace(Settings(), quality=name, **changes)
+        assert settings == replace(Settings(), simplify=True, **changes)
 
 
 def test_splats_get_fewer_iterations_unless_told() -> None:
@@ -36,6 +36,7 @@ def test_bad_values(name: str, value: object) -> None:
 
 def test_times_and_sizes() -> None:
     assert [parse_duration(x) for x in ("60s", "2m", 90, "1.5h", "250ms")] == [60, 120, 90, 5400, 0.25]
+    assert [parse_bytes(x) for x in ("10GB", "1.5g", "2GiB")] == [10**10, 1_500_000_000, 2**31]
     assert [parse_bytes(x) for x in ("100KB", "1MiB", 500, "2k")] == [100_000, 1_048_576, 500, 2000]
     for bad in ("soon", "-3s", "", True):
         with pytest.raises(UsageError):
@@ -58,3 +59,17 @@ def test_fingerprint_sees_every_setting() -> None:
         replace(base, kind="open"),
     ]
     assert len({s.fingerprint() for s in (base, *others)}) == 4
+
+
+def test_goals_may_be_as_large_as_anyone_likes() -> None:
+    assert make_settings(max_bytes=999_999_999_999_999).max_bytes == 999_999_999_999_999
+    assert make_settings(max_bytes="10GB").max_bytes == 10**10
+    for bad in (0, float("inf"), float("nan"), True):
+        with pytest.raises(UsageError, match="target-psnr must be a positive number"):
+            make_settings(target_psnr=bad)
+
+
+def test_curves_that_are_given_stay() -> None:
+    assert make_settings().simplify
+    assert not make_settings(curves=512).simplify
+    assert not make_settings(curves=9).simplify

@@ -8,7 +8,7 @@ import pytest
 
 from warpsplat import initialize
 from warpsplat.config import make_settings
-from warpsplat.initialize import background_color, contour_angles, grid_scene, survey
+from warpsplat.initialize import background_color, contour_angles, grid_scene, simple_curves, survey
 from warpsplat.scene import Kind
 
 
@@ -58,3 +58,28 @@ def test_strokes_lie_along_contours() -> None:
     stripes = np.repeat(np.sin(np.arange(96) / 3)[:, None, None], 96, axis=1).repeat(3, axis=2)
     angle = contour_angles(stripes.astype(np.float32), np.array([[48.0, 48.0]]), 6.0)
     assert abs(np.cos(angle[0])) > 0.99
+
+
+def flag(bands: int) -> np.ndarray:
+    """Stripes in two colours with soft edges."""
+    hard = np.repeat(np.arange(bands) % 2, 400 // bands)[:, None, None] * np.ones((1, 300, 3))
+    return cv2.GaussianBlur(hard.astype(np.float32), (0, 0), 0.4)
+
+
+def test_few_flat_regions_need_few_curves() -> None:
+    assert simple_curves(flag(2)) == initialize.LEAST_CURVES
+    assert simple_curves(flag(10)) == 10 * initialize.SHAPES_A_REGION
+
+
+def test_photographs_and_soft_pictures_get_the_default() -> None:
+    soft = np.linspace(0, 1, 300, dtype=np.float32)[None, :, None] * np.ones((400, 1, 3), np.float32)
+    noise = np.random.default_rng(0).uniform(0, 1, (400, 300, 3)).astype(np.float32)
+    moon = np.zeros((400, 300, 3), np.float32)
+    moon[:120, :100] = soft[:120, ::3]
+    for target in (soft, noise, moon, picture(400, 300)):
+        assert simple_curves(target) >= make_settings().curves
+
+
+def test_tiny_images_have_room_for_few_curves() -> None:
+    assert simple_curves(picture(16, 16)) == 256 // initialize.PIXELS_A_CURVE
+    assert simple_curves(picture(2, 2)) == 1

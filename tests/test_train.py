@@ -54,7 +54,7 @@ def test_the_loss_falls_and_the_count_stays(device: str, kind: Kind) -> None:
     assert seen[-1].step == seen[-1].steps == 80
     assert seen[-1].psnr > seen[0].psnr + 2
     assert result.score.psnr > 24
-    assert abs(result.score.psnr - result.internal_psnr) < 2
+    assert abs(result.score.psnr - result.render_psnr) < 2
 
 
 def test_paper_options_run(device: str) -> None:
@@ -126,7 +126,7 @@ def test_a_photograph_reaches_its_figure(renderer: Renderer, kind: Kind, figure:
     result = vectorize(load_image(CAT), settings, wp.get_device("cpu"))
     assert result.score
     assert result.score.psnr > figure
-    assert abs(result.internal_psnr - result.score.psnr) < gap
+    assert abs(result.render_psnr - result.score.psnr) < gap
 
 
 def test_time_budget_sizes_the_run(device: str) -> None:
@@ -147,6 +147,37 @@ def test_target_psnr_ends_the_run(device: str) -> None:
     assert not result.missed
     missed = vectorize(picture(), replace(settings, iterations=10, target_psnr=60.0), wp.get_device(device))
     assert missed.missed[0].startswith("target-psnr 60 dB: reached ")
+
+
+@pytest.mark.parametrize("kind", ["closed", "open"])
+@pytest.mark.parametrize("precision", [0, 1, 2])
+def test_max_bytes_are_used(device: str, kind: Kind, precision: int) -> None:
+    """On a photograph; its curves fit a little more than the limit, and the least of them go."""
+    settings = make_settings("draft", curves=900, kind=kind, precision=precision, max_bytes="20KB")
+    result = vectorize(load_image(CAT), replace(settings, iterations=30), wp.get_device(device))
+    assert 0.95 * 20_000 < result.score.bytes <= 20_000
+    assert result.missed == ()
+
+
+def test_a_simple_image_gets_fewer_curves_unless_told(device: str) -> None:
+    target = np.ones((64, 64, 3), np.float32)
+    target[16:40, 20:50] = [1, 0, 0]
+    settings = make_settings(iterations=5)
+    assert len(vectorize(target, settings, wp.get_device(device)).scene) == 32
+    told = make_settings(iterations=5, curves=50)
+    assert len(vectorize(target, told, wp.get_device(device)).scene) == 50
+
+
+def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str) -> None:
+    """Translucent layers, coarsely rounded: the file is worse than the render, and the estimate knows."""
+    settings = make_settings(curves=60, iterations=120, precision=0)
+    trainer = Trainer(picture(), settings, wp.get_device(device))
+    trainer.run()
+    shown = on_white(render_svg(export(trainer.scene(), settings)))
+    file = psnr(shown, 255 * picture())
+    assert trainer.render_psnr() == pytest.approx(psnr(255 * trainer.renderer.read_image(), 255 * picture()))
+    assert trainer.render_psnr() > file + 0.3
+    assert abs(trainer.psnr() - file) < abs(trainer.render_psnr() - file)
 
 
 def test_max_bytes_is_kept(device: str) -> None:

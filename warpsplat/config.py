@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal
@@ -64,7 +65,8 @@ class Settings:
 
     kind: Kind = "closed"
     curves: int = 512
-    quality: Quality = "balanced"
+    simplify: bool = False
+    """Whether an image that is simple gets fewer curves (``initialize.simple_curves``)."""
     iterations: int = 1000
     coarse: float = 0.7
     """Fraction of the iterations on a reduced image."""
@@ -130,9 +132,9 @@ class Settings:
         )
         for name, goal in goals:
             if goal is not None and (
-                isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < 1e12
+                isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < math.inf
             ):
-                raise UsageError(f"{name.replace('_', '-')} must be a positive number, not {goal!r}")
+                raise UsageError(f"{name} must be a positive number, not {goal!r}")
         choices = (
             ("kind", self.kind, ("closed", "open")),
             ("order", self.order, ("age", "area")),
@@ -143,15 +145,20 @@ class Settings:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
 
     def fingerprint(self) -> str:
-        """A short hash of all settings."""
+        """A short hash of all that decides the result."""
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
-SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|b)?", re.IGNORECASE)
+SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
 UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
-BYTES = {"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2}
+BYTES = {
+    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
+    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
+}
+MAX_DIGITS = 15
+"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
 
 
 def parse_duration(value: str | float) -> float:
@@ -161,7 +168,7 @@ def parse_duration(value: str | float) -> float:
         UsageError: none of these.
     """
     found = DURATION.fullmatch(str(value).strip())
-    if isinstance(value, bool) or not found or len(found[1]) > 15:
+    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
         raise UsageError(f"not a time: {value!r}; write 60s or 2m")
     return float(found[1]) * UNITS[(found[2] or "s").lower()]
 
@@ -173,8 +180,8 @@ def parse_bytes(value: str | int) -> int:
         UsageError: none of these.
     """
     found = SIZE.fullmatch(str(value).strip())
-    if isinstance(value, bool) or not found or len(found[1]) > 15:
-        raise UsageError(f"not a size: {value!r}; write 100KB or 1MB")
+    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
+        raise UsageError(f"not a size: {value!r}; write 100KB, 1MB or 1GB")
     return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
 
 
@@ -190,9 +197,13 @@ SPLAT_SHARE = 0.5
 
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
+DEFAULT_QUALITY: Quality = "balanced"
 
-def make_settings(quality: Quality = "balanced", **overrides: Any) -> Settings:
+
+def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Settings:
     """The preset ``quality`` with ``overrides`` on top; overrides that are None are left out.
+
+    Without ``curves`` among them, a simple image gets fewer than the default (``Settings.simplify``).
 
     Raises:
         UsageError: an unknown name or a value out of range.
@@ -208,7 +219,7 @@ def make_settings(quality: Quality = "balanced", **overrides: Any) -> Settings:
         given["time_budget"] = parse_duration(given["time_budget"])
     if "max_bytes" in given:
         given["max_bytes"] = parse_bytes(given["max_bytes"])
-    preset = Settings(quality=quality, **PRESETS[quality])
+    preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     if given.get("renderer") == "splat":
         preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations))
     return replace(preset, **given)

@@ -26,6 +26,27 @@ SURVEY_PIXELS = 400_000
 SURVEY_SIGMA = 128.0
 """Widest blur of that image [px]: its cost grows with the width."""
 
+LEVELS = 32
+"""Of a channel, to tell a drawing's colours."""
+
+FLAT_SHARE = 0.98
+"""Share of a drawing's pixels that its few colours hold; the rest are the soft pixels of outlines."""
+
+FLAT_COLORS = 12
+"""Most colours of a drawing whose shapes are counted."""
+
+LEAST_REGION = 1e-4
+"""Least area of a region that counts, over the area of the image."""
+
+SHAPES_A_REGION = 8
+"""Curves for a region of one colour: an outline has corners and holes."""
+
+LEAST_CURVES = 32
+"""For the simplest of drawings."""
+
+PIXELS_A_CURVE = 8
+"""Least pixels of an image for each curve: a curve has about as many numbers as these have."""
+
 Floats = npt.NDArray[np.floating]
 
 
@@ -41,6 +62,27 @@ def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
         return target, 1.0
     size = (max(1, round(width / span)), max(1, round(height / span)))
     return np.asarray(cv2.resize(target, size, interpolation=cv2.INTER_AREA), np.float32), float(span)
+
+
+def simple_curves(target: FloatArray) -> int:
+    """The most curves that make sense: few for a drawing in a few flat colours, or for a tiny image.
+
+    A drawing gets ``SHAPES_A_REGION`` curves for each region of one colour, any image at the most one for
+    ``PIXELS_A_CURVE`` of its pixels.
+    """
+    height, width = target.shape[:2]
+    room = max(1, width * height // PIXELS_A_CURVE)
+    steps = np.round(survey(target)[0] * (LEVELS - 1)).astype(np.int32)
+    codes = (steps * [LEVELS * LEVELS, LEVELS, 1]).sum(axis=2)
+    counts = np.bincount(codes.ravel())
+    colors = np.argsort(-counts, kind="stable")[:FLAT_COLORS]
+    if counts[colors].sum() < FLAT_SHARE * codes.size:
+        return room
+    regions = 0
+    for color in colors[counts[colors] > 0]:
+        _, _, stats, _ = cv2.connectedComponentsWithStats((codes == color).astype(np.uint8), connectivity=4)
+        regions += int((stats[1:, cv2.CC_STAT_AREA] >= LEAST_REGION * codes.size).sum())
+    return min(room, max(LEAST_CURVES, SHAPES_A_REGION * regions))
 
 
 def background_color(target: FloatArray) -> FloatArray:

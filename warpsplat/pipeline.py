@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -17,6 +18,7 @@ from warpsplat.config import Settings
 from warpsplat.errors import Stopped
 from warpsplat.files import write_result
 from warpsplat.image import load_image
+from warpsplat.initialize import simple_curves
 from warpsplat.inputs import input_name, read_input
 from warpsplat.metrics import Score, score_svg
 from warpsplat.scene import FloatArray, Scene
@@ -32,8 +34,10 @@ class Result:
     scene: Scene
     score: Score | None
     """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
-    internal_psnr: float
-    """Of the last training render, at its size [dB]."""
+    render_psnr: float
+    """Of the last training render against the image, at its size [dB]."""
+    estimated_psnr: float
+    """Of the file, as the training saw it: that of the render, less what a viewer's rounding costs [dB]."""
     iterations: int
     """Steps done; fewer than asked for when stopped."""
     seconds: float
@@ -47,7 +51,8 @@ class Result:
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
             **(self.score.as_dict() if self.score else figures),
-            "internal_psnr": round(self.internal_psnr, 3),
+            "render_psnr": round(self.render_psnr, 3),
+            "estimated_psnr": round(self.estimated_psnr, 3),
             "curves": len(self.scene),
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
@@ -89,8 +94,11 @@ def vectorize(
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
     """
     started = time.monotonic()
+    if settings.simplify and scene is None:
+        settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
     if settings.max_bytes:
-        settings = replace(settings, curves=affordable_curves(settings))
+        height, width = target.shape[:2]
+        settings = replace(settings, curves=affordable_curves(settings, width, height))
     trainer = Trainer(target, settings, device, threads=threads, scene=scene)
     if settings.time_budget:
         tail = TAIL_SECONDS + TAIL_PER_PIXEL * target.shape[0] * target.shape[1]
@@ -106,7 +114,8 @@ def vectorize(
         svg=svg,
         scene=scene,
         score=score,
-        internal_psnr=trainer.psnr(),
+        render_psnr=trainer.render_psnr(),
+        estimated_psnr=trainer.psnr(),
         iterations=trainer.step,
         seconds=seconds,
         stopped=trainer.interrupted,
@@ -145,16 +154,33 @@ def _score(
 
 
 TAIL_SECONDS = 0.3
-TAIL_PER_PIXEL = 1.5e-6
+TAIL_PER_PIXEL = 3e-7
 """Of a time budget: what the last step, exporting and scoring take [s]."""
 
+HEAD_BYTES = 400
+"""Of a file, besides its shapes."""
 
-def affordable_curves(settings: Settings) -> int:
-    """Curves that fit into ``max_bytes``: about 8 + 2 precision bytes a point and 40 for the rest."""
+STYLE_BYTES = {"closed": 45, "open": 65}
+"""Of a shape, besides its coordinates."""
+
+SPARE_CURVES = 1.04
+"""Curves trained over those expected to fit; shapes of a simple image are shorter."""
+
+
+def affordable_curves(settings: Settings, width: int, height: int) -> int:
+    """Curves that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
+
+    Coordinates are relative: each has as many digits before the point as the distance of two curves.
+    """
     assert settings.max_bytes
-    points = 6 * settings.chain_cubics if settings.kind == "closed" else 10
-    each = 40 + points * (8 + 2 * settings.precision)
-    return max(1, min(settings.curves, (settings.max_bytes - 400) // each))
+    numbers = 2 + (24 * settings.chain_cubics // 2 if settings.kind == "closed" else 18)
+    separators = 2.0 + settings.precision if settings.precision else 1.3
+    room = settings.max_bytes - HEAD_BYTES
+    count = float(settings.curves)
+    for _ in range(8):  # settles within a curve
+        digits = max(0.0, 0.5 * math.log10(width * height / max(count, 1.0)))
+        count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (separators + digits)))
+    return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 
 
 def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:

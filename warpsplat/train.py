@@ -17,6 +17,7 @@ from warpsplat.initialize import grid_scene
 from warpsplat.kernels import adam, loss
 from warpsplat.kernels.tile import column
 from warpsplat.launch import Program, capture
+from warpsplat.metrics import psnr
 from warpsplat.parameters import Parameters
 from warpsplat.render import TileRenderer, make_renderer
 from warpsplat.scene import FloatArray, Scene
@@ -120,7 +121,6 @@ class Trainer:
         self.measure: Program | None = None
         self.update: Program | None = None
         self.graph: wp.Graph | None = None
-        self.overflows = 0
         self.step = 0
         self.interrupted = False
         self._deadline = math.inf
@@ -284,10 +284,17 @@ class Trainer:
         self.device_target.assign(to_tiles(np.asarray(aim, np.float32)))
 
     def psnr(self) -> float:
-        """Of the render in the last step, at its size [dB]. Reads a number a tile back from the device."""
+        """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
+        look at the file on, an estimate of the file's. Reads a number a tile back from the device.
+        """
         assert self.renderer and self.loss
         squares = float(self.loss.numpy().sum(dtype=np.float64))
         return -10 * math.log10(max(squares / (3 * self.renderer.width * self.renderer.height), 1e-12))
+
+    def render_psnr(self) -> float:
+        """Of the last render against the image, at its size [dB]. Reads the render back from the device."""
+        assert self.renderer
+        return psnr(255 * self.renderer.read_image(), 255 * self.small)
 
     def size_to(self, seconds: float) -> None:
         """Choose the number of iterations so that ``run`` ends about ``seconds`` from now.
@@ -349,7 +356,6 @@ class Trainer:
             self.step += 1
             if self.step % CHECK_INTERVAL == 0 or self.step == s.iterations:
                 if self.renderer.grow():
-                    self.overflows += 1
                     self._assemble()
                 if report:
                     spent = time.monotonic() - started
