@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import hashlib
+import io
 import os
 import platform
 import re
@@ -18,6 +19,9 @@ import stat
 import sys
 import time
 from pathlib import Path
+
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.inputs import STANDARD
@@ -138,6 +142,15 @@ def may_replace(path: Path) -> bool:
     except FileNotFoundError:
         return True
     return not head or SVG_MARK in head or b"tEXtSoftware\0" + PNG_SOFTWARE.encode() in head
+
+
+def encode_png(image: Image.Image) -> bytes:
+    """A picture as a PNG file that says who wrote it."""
+    note = PngInfo()
+    note.add_text("Software", PNG_SOFTWARE)
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG", pnginfo=note)
+    return buffer.getvalue()
 
 
 def write_result(path: Path, data: bytes) -> None:
