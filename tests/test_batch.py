@@ -11,10 +11,13 @@ import pytest
 from PIL import Image
 
 import warpsplat.configs
+from tests.scenes import random_scene
 from tests.test_cli import run
-from warpsplat.batch import load_jobs
+from warpsplat.batch import MAX_FILE, load_jobs
 from warpsplat.config import make_settings
 from warpsplat.errors import UsageError
+from warpsplat.pipeline import job_key
+from warpsplat.svg import write_svg
 
 
 @pytest.fixture
@@ -98,6 +101,20 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    target-psnr: true\n", 3, "target-psnr"),
     ("jobs:\n  - images: in/a.png\n    time-budget: soon\n", 3, "time-budget"),
     ("jobs:\n  - images: in/deep/../pic.svg\n", 1, "overwritten"),
+    ("jobs: " + "[" * 2000, 1, "nested"),
+    ("\n".join(" " * i + "- " for i in range(900)), 17, "nested"),
+    ('jobs:\n  - images: "\\U00110000"\n', 2, "YAML"),
+    ('jobs:\n  - images: "in/\\0.png"\n', 2, "no name can have"),
+    ('jobs:\n  - images: "in/\\ud800.png"\n', 2, "no name can have"),
+    ('jobs:\n  - images: in/a.png\n    output: "\\ud800"\n', 3, "no name can have"),
+    ("jobs:\n  - images: in/a.png\n    output: " + "x" * 300 + "\n", 3, "too long"),
+    ("jobs:\n  - images: in/a.png\n    output: new/" + "x" * 300 + "\n", 3, "too long"),
+    ("jobs:\n  - images: " + "x" * 300 + ".png\n", 2, "too long"),
+    ("jobs:\n  - images: " + "x" * 5000 + ".png\n", 2, "characters"),
+    ("jobs:\n  - images: in/a.png\n    curves: &a [1, *a]\n", 3, "plain value"),
+    ("jobs:\n  - images: in/a.png\n    curves: [[1, 2]]\n", 3, "one value"),
+    ("? &a [*a]\n: 1\n", 1, "unknown key"),
+    ("jobs:\n  - \x01\n", 2, "not allowed"),
 ]
 
 
@@ -113,6 +130,7 @@ def test_errors_name_line_and_key(
     assert captured.err.startswith(f"warpsplat: {path}:{line}: "), captured.err
     assert word in captured.err
     assert captured.err.count("\n") == 1
+    assert len(captured.err) < 1500
     assert sorted(os.listdir(folder / "in")) == before, "nothing started"
 
 
@@ -181,3 +199,118 @@ def test_missed_goals_have_their_exit_code(folder: Path, capsys: pytest.CaptureF
     assert run("batch", write(folder, text)) == 6
     assert "goal missed: target-psnr 90 dB" in capsys.readouterr().err
     assert (folder / "out/a.svg").exists()
+
+
+def test_a_batch_file_is_bounded(tmp_path: Path) -> None:
+    path = tmp_path / "jobs.yaml"
+    path.write_text("")
+    with pytest.raises(UsageError, match="is empty"):
+        load_jobs(path)
+    path.write_text("#" * (MAX_FILE + 1))
+    with pytest.raises(UsageError, match="larger than 1 MiB"):
+        load_jobs(path)
+
+
+def test_aliases_are_not_multiplied(folder: Path) -> None:
+    """A value of a billion elements takes a line; its message does not take a billion."""
+    lines = ["jobs:", "  - images: in/a.png", "    device:", "      - &a0 [x, x, x, x, x, x, x, x, x]"]
+    lines += [f"      - &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 10)]
+    with pytest.raises(UsageError, match="device: must be one value") as caught:
+        load_jobs(write(folder, "\n".join(lines)))
+    assert len(str(caught.value)) < 1000
+
+
+class PanicException(BaseException):
+    pass
+
+
+FAILURES: list[tuple[BaseException, str]] = [
+    (MemoryError(), "not enough memory"),
+    (RuntimeError("Failed to allocate 99 bytes on device 'cpu'"), "not enough memory: Failed to allocate 99"),
+    (PanicException("index out of bounds"), "renderer gave up: index out of bounds"),
+    (RecursionError("too deep"), "internal error: RecursionError: too deep"),
+    (OSError(28, "No space left on device", "/x"), "/x: No space left"),
+]
+
+
+@pytest.mark.parametrize(("error", "words"), FAILURES)
+def test_whatever_an_image_throws_is_its_own_failure(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    words: str,
+) -> None:
+    def load(data: bytes, name: str) -> np.ndarray:
+        if name.endswith("a.png"):
+            raise error
+        return np.full((24, 32, 3), 0.5, np.float32)
+
+    monkeypatch.setattr("warpsplat.pipeline.load_image", load)
+    text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
+    assert run("batch", write(folder, text), "--json") == 5
+    captured = capsys.readouterr()
+    values = json.loads(captured.out)
+    assert [r["status"] for r in values["results"]] == ["failed", "made"]
+    assert words in values["results"][0]["error"]
+    assert "a.png" in values["results"][0]["error"]
+    assert words in captured.err
+
+
+def test_files_of_others_are_named_before_anything_starts(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn = "<svg xmlns='http://www.w3.org/2000/svg'/>"
+    for name in ("in/a.svg", "in/b.svg"):
+        (folder / name).write_text(drawn)
+    path = write(folder, "jobs: [{images: 'in/**/[abc].png', curves: 3, iterations: 3, device: cpu}]")
+    assert run("batch", path) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "2 results" in said
+    assert "in/a.svg" in said
+    assert "in/b.svg" in said
+    assert "--overwrite" in said
+    assert (folder / "in/a.svg").read_text() == drawn
+    assert not (folder / "in/deep/c.svg").exists()
+    assert run("batch", path, "--overwrite") == 0
+    assert run("batch", path) == 0, "our own may be replaced"
+    assert "3 skipped" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
+def test_a_pipe_among_the_results_is_found_before(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(folder / "in" / "a.svg")
+    assert run("batch", write(folder, "jobs:\n  - images: in/a.png\n")) == 2
+    assert "jobs.yaml:2: output: " in capsys.readouterr().err
+
+
+def test_a_result_folder_that_cannot_be_written_is_found_before(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("warpsplat.files._temporary", refuse)
+    path = write(folder, "defaults:\n  output: out\njobs:\n  - images: in/a.png\n")
+    (folder / "out").mkdir()
+    assert run("batch", path) == 2
+    assert "jobs.yaml:2: output: cannot write to" in capsys.readouterr().err
+    (folder / "out").rmdir()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert run("batch", path) == 2
+    assert "jobs.yaml:2: output: " in capsys.readouterr().err
+    assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize("size", [0, 700, -1])
+def test_a_result_that_was_cut_short_is_not_done(folder: Path, size: int) -> None:
+    job = load_jobs(write(folder, "jobs: [{images: in/a.png, curves: 9, iterations: 3, device: cpu}]"))[0]
+    data = job.image.read_bytes()
+    key = job_key(job.settings, data)
+    whole = write_svg(random_scene("closed", count=9, width=32, height=24), metadata=f"key={key}").encode()
+    job.output.write_bytes(whole)
+    assert job.done(data)
+    assert not job.done(data + b" "), "another image"
+    job.output.write_bytes(whole[:size])
+    assert not job.done(data)

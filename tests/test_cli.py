@@ -7,20 +7,29 @@ import json
 import os
 import pty
 import re
+import shlex
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import warp as wp
 from PIL import Image
 
 from tests.test_image import bad_files
 from warpsplat import __version__
 from warpsplat.cli.main import main
+from warpsplat.cli.run import _quality
+from warpsplat.config import make_settings
+from warpsplat.errors import CapacityError
+from warpsplat.launch import THREADS_PER_CORE, available_cores
 from warpsplat.metrics import psnr
+from warpsplat.pipeline import vectorize
+from warpsplat.train import Progress
 from warpsplat.viewer import on_white, render_svg
 
 QUICK = ["--curves", "8", "--iterations", "12", "--device", "cpu"]
@@ -362,3 +371,163 @@ def test_the_number_of_threads_changes_nothing(image: Path, tmp_path: Path) -> N
 def test_threads_must_be_positive(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("vectorize", image, "--threads", 0) == 2
     assert "--threads" in one_line(capsys.readouterr().err)
+
+
+def test_a_file_of_others_is_replaced_with_overwrite_only(
+    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(image.parent)
+    drawn = Path("photo.svg")
+    drawn.write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+    before = drawn.read_bytes()
+    assert run("vectorize", image, *QUICK) == 2
+    assert "photo.svg: exists and was not written by warpsplat" in one_line(capsys.readouterr().err)
+    assert drawn.read_bytes() == before
+    assert run("vectorize", image, "--overwrite", *QUICK) == 0
+    assert run("vectorize", image, *QUICK) == 0
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.txt", "a", "a.svgz"])
+def test_an_output_is_what_its_name_says(image: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert run("vectorize", image, "-o", image.parent / name, *QUICK) == 2
+    assert ".svg" in one_line(capsys.readouterr().err)
+    assert os.listdir(image.parent) == ["photo.png"]
+
+
+def shell(
+    script: str, *arguments: object, given: bytes = b"", **environment: str
+) -> subprocess.CompletedProcess[bytes]:
+    """Run ``warpsplat`` as a shell does; ``$W`` is the program with the arguments."""
+    command = shlex.join([sys.executable, "-m", "warpsplat", *map(str, arguments)])
+    return subprocess.run(
+        ["sh", "-c", script.replace("$W", command)],
+        input=given,
+        capture_output=True,
+        timeout=120,
+        check=False,
+        env=os.environ | environment,
+    )
+
+
+def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    direct = image.parent / "a.svg"
+    assert run("vectorize", image, "-o", direct, "-q", *QUICK) == 0
+    piped = shell("cd / && $W", "vectorize", "-", "-o", "-", "--json", *QUICK, given=image.read_bytes())
+    assert piped.returncode == 0
+    assert piped.stdout == direct.read_bytes()
+    assert json.loads(piped.stderr)["bytes"] == len(piped.stdout)
+    assert run("vectorize", "-", *QUICK) == 2
+    assert "give -o" in one_line(capsys.readouterr().err)
+    assert not os.path.exists("-")
+
+
+@pytest.mark.parametrize(
+    ("streams", "code"),
+    [
+        ("2>&-", 0),
+        (">&-", 0),
+        ("<&- >&- 2>&-", 0),
+        pytest.param(
+            "2>/dev/full", 0, marks=pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux")
+        ),
+        pytest.param(
+            ">/dev/full", 4, marks=pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux")
+        ),
+    ],
+)
+def test_standard_streams_that_are_full_or_closed(image: Path, streams: str, code: int) -> None:
+    output = image.parent / "a.svg"
+    done = shell(f"$W {streams}", "vectorize", image, "-o", output, "-vv", *QUICK)
+    assert done.returncode == code
+    assert b"Traceback" not in done.stderr
+    render_svg(output.read_text())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of bytes")
+def test_control_characters_of_names_are_escaped(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"a\x1b[31m\n\xff.png")
+    path.write_bytes(b"no image")
+    done = shell("$W", "vectorize", path, *QUICK)
+    assert done.returncode == 3
+    assert done.stderr.count(b"\n") == 1
+    assert b"a\\x1b[31m\\n\\udcff.png" in done.stderr
+    Image.new("RGB", (9, 9)).save(path, "PNG")
+    done = shell("$W", "vectorize", path, "-o", path.with_suffix(".svg"), *QUICK)
+    assert done.returncode == 0
+    assert b"\x1b" not in done.stdout
+    assert b"\\x1b[31m" in done.stdout
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+def test_a_limit_of_file_size_is_a_failure_to_write(image: Path) -> None:
+    run_it = ("vectorize", image, "-o", image.parent / "a.svg", "--curves", 200, "--iterations", 2)
+    done = shell("ulimit -f 1; $W", *run_it, "--device", "cpu")
+    assert done.returncode == 4
+    assert b"File too large" in done.stderr
+    assert done.stderr.count(b"\n") == 1
+
+
+RAISED = [
+    (MemoryError("Unable to allocate 9 GiB"), 7, "not enough memory: Unable to allocate 9 GiB"),
+    (RuntimeError("Failed to allocate 9 bytes on device 'cpu'"), 7, "not enough memory: Failed"),
+    (CapacityError("too many slots"), 7, "too many slots"),
+    (type("PanicException", (BaseException,), {})("unwrapped\nand more"), 3, "renderer gave up: unwrapped"),
+    (OSError(28, "No space left on device", "/x/y"), 4, "/x/y: No space left on device"),
+    (KeyboardInterrupt(), 130, "interrupted"),
+    (ValueError("x = \x1b[31m"), 1, "internal error: ValueError: x = \\x1b[31m (set WARPSPLAT_TRACEBACK=1"),
+]
+
+
+@pytest.mark.parametrize(("error", "code", "words"), RAISED)
+def test_whatever_is_raised_is_one_line_and_a_code(
+    image: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    code: int,
+    words: str,
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("warpsplat.pipeline.Trainer", fail)
+    assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
+    assert words in one_line(capsys.readouterr().err)
+    monkeypatch.setenv("WARPSPLAT_TRACEBACK", "1")
+    assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_many_threads_are_bounded(image: Path) -> None:
+    assert run("vectorize", image, "-o", image.parent / "a.svg", "--threads", 10**6, *QUICK) == 0
+    assert threading.active_count() <= 1 + 2 * THREADS_PER_CORE * available_cores()
+
+
+def test_the_bar_weighs_steps_and_shows_no_decibels_that_fall(image: Path) -> None:
+    """Coarse steps are cheap and their decibels are a reduced image's."""
+    settings = make_settings(curves=6, iterations=100, coarse=0.5, coarse_pixels=600)
+    seen: list[Progress] = []
+    target = np.full((40, 60, 3), 0.5, np.float32)
+    vectorize(target, settings, wp.get_device("cpu"), report=seen.append)
+    assert [p.fine for p in seen] == [False] * 5 + [True] * 5
+    coarse, fine = 600, 2400
+    assert seen[4].work == pytest.approx(coarse / (coarse + fine), abs=0.01)
+    assert seen[-1].work == 1
+    assert "dB" not in _quality(seen[4])
+    assert "dB" in _quality(seen[5])
+
+
+def test_compiling_is_said_on_a_terminal_or_with_v(image: Path, tmp_path: Path) -> None:
+    options = ("vectorize", image, "-o", image.parent / "a.svg", *QUICK, "--iterations", 1)
+    code = "import warp; warp.load_module = lambda *_, **__: exit(9)\n"
+    code += f"from warpsplat.cli.main import main; main({[str(o) for o in options]!r} + ARGS)"
+    for arguments, said in (([], False), (["-v"], True)):
+        done = subprocess.run(
+            [sys.executable, "-c", code.replace("ARGS", repr(arguments))],
+            env=os.environ | {"WARP_CACHE_PATH": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 9
+        assert ("compiling kernels" in done.stderr) is said

@@ -18,7 +18,7 @@ from warpsplat.scene import FloatArray, Kind
 from warpsplat.svg import export
 from warpsplat.tiles import from_tiles
 from warpsplat.train import Progress, Trainer, phases
-from warpsplat.viewer import on_white, render_svg
+from warpsplat.viewer import on_white, render_own
 
 CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
 
@@ -155,6 +155,7 @@ def test_max_bytes_are_used(device: str, kind: Kind, precision: int) -> None:
     """On a photograph; its curves fit a little more than the limit, and the least of them go."""
     settings = make_settings("draft", curves=900, kind=kind, precision=precision, max_bytes="20KB")
     result = vectorize(load_image(CAT), replace(settings, iterations=30), wp.get_device(device))
+    assert result.score
     assert 0.95 * 20_000 < result.score.bytes <= 20_000
     assert result.missed == ()
 
@@ -173,7 +174,8 @@ def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str)
     settings = make_settings(curves=60, iterations=120, precision=0)
     trainer = Trainer(picture(), settings, wp.get_device(device))
     trainer.run()
-    shown = on_white(render_svg(export(trainer.scene(), settings)))
+    assert trainer.renderer
+    shown = on_white(render_own(export(trainer.scene(), settings)))
     file = psnr(shown, 255 * picture())
     assert trainer.render_psnr() == pytest.approx(psnr(255 * trainer.renderer.read_image(), 255 * picture()))
     assert trainer.render_psnr() > file + 0.3

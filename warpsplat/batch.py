@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import errno
 import os
-import reprlib
 import stat
 from collections import Counter
 from collections.abc import Iterator
@@ -51,8 +50,6 @@ class Job:
     output: Path
     settings: Settings
     device: str
-    where: str = ""
-    """File and line that ask for it, for messages."""
 
     def done(self, data: bytes) -> bool:
         """Whether ``output`` is there, whole, and was made from an image of the bytes ``data`` so."""
@@ -100,11 +97,11 @@ class _File:
             raise UsageError(str(error)) from error
         except UnicodeDecodeError as error:
             raise UsageError(f"{path}: cannot be read: not UTF-8, at byte {error.start}") from error
-        reader: Any = None
+        self.loader: Any = None
         try:
-            reader = yaml.SafeLoader(text)
-            self._check(text)
-            self.root = reader.get_single_node()
+            self.loader = yaml.SafeLoader(text)
+            self._check()
+            self.root = yaml.compose(text, yaml.SafeLoader)
             self.loader = yaml.SafeLoader("")
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
@@ -115,12 +112,13 @@ class _File:
         except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
             # An escape beyond Unicode, say: the scanner lets chr() raise.
             cause = str(error).splitlines()[0]
-            raise self.error(reader.line + 1 if reader else 1, f"not valid YAML: {cause}") from None
+            raise self.error(self.loader.line + 1 if self.loader else 1, f"not valid YAML: {cause}") from None
 
-    def _check(self, text: str) -> None:
+    def _check(self) -> None:
         """Refuse what is too deep or too long for a batch file before it is built."""
         depth = 0
-        for event in yaml.parse(text, yaml.SafeLoader):
+        while self.loader.check_event():
+            event = self.loader.get_event()
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             line = event.start_mark.line + 1 if event.start_mark else 1
             if depth > MAX_DEPTH:
@@ -143,7 +141,9 @@ class _File:
             line = key_node.start_mark.line + 1
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
             if key not in allowed:
-                raise self.error(line, f"unknown key {key!r} in {where}; known are: {', '.join(allowed)}")
+                raise self.error(
+                    line, f"unknown key {key[:100]!r} in {where}; known are: {', '.join(allowed)}"
+                )
             if key in result:
                 raise self.error(line, f"key {key!r} is there twice in {where}")
             result[key] = (line, value_node)
@@ -164,7 +164,7 @@ class _File:
             UsageError: it is no text, or holds what no name can.
         """
         if not isinstance(value, str):
-            raise self.error(line, f"{key}: must be text, not {reprlib.repr(value)}")
+            raise self.error(line, f"{key}: must be text, not {value!r}")
         if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
             raise self.error(line, f"{key}: {value!r} holds a character that no name can have")
         return value
@@ -178,7 +178,7 @@ def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str
             continue
         value = file.value(node)
         if not isinstance(node, yaml.ScalarNode):
-            raise file.error(line, f"{key}: must be one value, not {reprlib.repr(value)}")
+            raise file.error(line, f"{key}: must be one value, not a list or mapping")
         if key in (*TEXT_KEYS, "quality"):
             file.text(line, key, value)
         if key in KIND_KEYS and value is not True:
@@ -307,7 +307,7 @@ def _named(file: _File, line: int, planned: list[_Planned]) -> list[Job]:
     for plan in planned:
         image, folder = plan.image, plan.folder
         name = image.stem if stems[folder, image.stem] == 1 else image.name
-        job = Job(image, folder / f"{name}.svg", plan.settings, plan.device, f"{file.path}:{plan.line}")
+        job = Job(image, folder / f"{name}.svg", plan.settings, plan.device)
         if os.path.realpath(job.output) == os.path.realpath(image):
             raise file.error(line, f"jobs: {image} would be overwritten by its own result; give an output")
         jobs.append(job)
