@@ -18,7 +18,7 @@ from warpsplat.scene import FloatArray, Kind
 from warpsplat.svg import export
 from warpsplat.tiles import from_tiles
 from warpsplat.train import Progress, Trainer, phases
-from warpsplat.viewer import on_white, render_own
+from warpsplat.viewer import on_white, render_own, render_svg
 
 CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
 
