@@ -218,7 +218,7 @@ def svg_size(root: dict[str, str]) -> tuple[float, float] | None:
     own_font = "font-size" in root or "font" in root.get("style", "")
     sides: list[float | None] = []
     for i, name in enumerate(("width", "height")):
-        found = LENGTH.fullmatch(root.get(name, ""))
+        found = LENGTH.fullmatch(root.get(name, "").lstrip())
         if found is None or (found[2] in {"em", "ex"} and own_font):
             sides.append(None)
         elif found[2] == "%":

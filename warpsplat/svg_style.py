@@ -164,7 +164,9 @@ def parse_color(text: str) -> tuple[Color, float]:
     name = text.strip().lower()
     if name == "transparent":
         return (0.0, 0.0, 0.0), 0.0
-    name = str(ImageColor.colormap.get(name, name))
+    if name in ImageColor.colormap:
+        red, green, blue = ImageColor.getrgb(name)[:3]
+        return (red / 255, green / 255, blue / 255), 1.0
     color = _hex(name[1:]) if name.startswith("#") else _function(name)
     if color is None:
         raise ImageError(f"{text[:40]!r} is not a colour that is supported")
