@@ -114,6 +114,8 @@ LOST = {
     '<path d="M1 1h9e999v9z"/>': "farther than",
     10 * '<g transform="scale(1e40)">' + '<path d="M1 1h9v9z"/>' + 10 * "</g>": "farther than",
     '<path d="M1 1h9v9z" transform="spin(5)"/>': "transform",
+    '<path d="M1 1h9v9z" visibility=";"/>': "visibility",
+    "<style>.a{fi 9:red;fill:red}</style>": "broken",
 }
 
 

@@ -47,10 +47,16 @@ Style = dict[str, str]
 
 
 def declarations(text: str) -> Iterator[tuple[str, str]]:
-    """Names and values of those declarations of a style that mean something here."""
+    """Names and values of those declarations of a style that mean something here.
+
+    Raises:
+        ImageError: one has no name: viewers differ in what they skip then.
+    """
     for part in text.split(";"):
         name, _, value = part.partition(":")
         name = name.strip().lower()
+        if part.strip() and not name.replace("-", "").replace("_", "").isalnum():
+            raise ImageError(f"style {part.strip()[:40]!r} is broken")
         if name in INHERITED or name in OWN:
             yield name, value.strip()
 
