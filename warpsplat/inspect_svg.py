@@ -30,8 +30,8 @@ MAX_DEPTH = 1000
 MAX_EXPANSION = 16 << 20
 """Most characters that a document's entities may grow to."""
 
-MAX_PIXELS = 400_000_000
-"""Largest picture that is drawn [pixels]; four bytes each, and as many again for each layer."""
+MAX_PIXELS = 200_000_000
+"""Largest picture that is drawn [pixels]: four bytes each, as many again for each layer, and 8 s to pack."""
 
 
 def read_svg_text(path: Path) -> str:
