@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from tests.scenes import random_scene
 from tests.test_cli import one_line, run
 from warpsplat.config import make_settings
 from warpsplat.errors import ImageError
-from warpsplat.metrics import psnr
+from warpsplat.metrics import psnr, score_svg
 from warpsplat.refine import load_scene, refine
 from warpsplat.render import render
 from warpsplat.svg import write_svg
@@ -32,6 +33,18 @@ FOREIGN = {
     "arc": 'width="40" height="30"><path d="M10 15A8 8 0 0 1 26 15zM3 3h5v5h-5" fill="#123456"/></svg>',
     "strokes": 'width="40" height="30"><path d="M3 5C10 30 20-10 37 20" fill="none" stroke="#808" '
     'stroke-width="4" stroke-linecap="round" stroke-linejoin="round"/></svg>',
+    "css": 'width="40" height="30"><style>/* . */.a{fill:red;opacity:.5}#b,path{fill:#0a0}</style>'
+    '<g opacity=".6"><path class="a" d="M2 2h30v20z"/></g>'
+    '<path id="b" style="fill:hsl(200,50%,50%)" d="M9 9h9v9z"/></svg>',
+    "place": 'width="80" height="60" viewBox="10 0 20 30" preserveAspectRatio="xMinYMax">'
+    '<circle cx="50%" cy="1e1" r="9"/></svg>',
+    "even-odd": 'width="40" height="30">'
+    '<path fill-rule="evenodd" d="M2 2h30v20h-30zM5 5v9h9v-9z" fill="#d40"/></svg>',
+    "unseen": 'width="40" height="30"><defs><g id="x"><use href="#x"/></g></defs>'
+    '<symbol><path d="M0 0h40v30z"/></symbol>'
+    '<g display="none"><text/></g><path visibility="hidden" d="M0 0h40v9z"/><path d="M9 3h9v9z"/></svg>',
+    "closed stroke": 'width="40" height="30"><path d="M6 6h20v15zm15 15v-5" fill="none" stroke="#a3c" '
+    'stroke-width="3" stroke-linejoin="round" stroke-linecap="round"/></svg>',
     "none": 'width="40" height="30"><path d="M0 0H9V9Z" fill="none"/><path d="M9 9H30V20Z"/></svg>',
 }
 
@@ -44,7 +57,7 @@ def test_foreign_files_look_the_same(name: str) -> None:
     shown = on_white(render_svg(text, width=40, height=30))
     # Strokes: resvg's own anti-aliasing has 16 levels, and much of so small an image is edge.
     assert psnr(render(scene, device="cpu").astype(np.float64) * 255, shown) > (
-        34 if name == "strokes" else 38
+        34 if "stroke" in name else 38
     )
     assert psnr(on_white(render_svg(write_svg(scene, precision=3))), shown) > 38
 
@@ -64,6 +77,140 @@ def test_refused(text: str) -> None:
     with pytest.raises(ImageError, match=REFUSED[text]) as caught:
         load_scene(text, 40, 30, "a.svg")
     assert str(caught.value).startswith("a.svg: ")
+
+
+ROUND = 'fill="none" stroke="red" stroke-linecap="round" stroke-linejoin="round"'
+LOST = {
+    f'<path d="M1 1h9v9" {ROUND} stroke-dasharray="2"/>': "dashes",
+    '<path d="M1 1h9" fill="none" stroke="red"/>': "butt caps",
+    '<path d="M1 1h9v9" fill="none" stroke="red" style="stroke-linecap:square"/>': "square caps",
+    '<path d="M1 1h9v9z" fill="none" stroke="red"/>': "miter joins",
+    '<g fill-rule="evenodd"><path d="M2 2h30v20h-30zM5 5h9v9h-9z"/></g>': "even-odd",
+    '<polygon fill-rule="evenodd" points="20,1 30,28 3,10 37,10 8,28"/>': "even-odd",
+    '<path d="M1 1h9v9z" style="mix-blend-mode:multiply"/>': "mix-blend-mode",
+    '<g opacity=".5"><path d="M1 1h9v9z"/><path d="M1 1h9v9z"/></g>': "opacity of a group",
+    '<symbol id="s"><path d="M1 1h9v9z"/></symbol><use href="#s"/>': "<use>",
+    '<switch><path d="M1 1h9v9z"/><path d="M1 1h9v9z"/></switch>': "<switch>",
+    '<svg><path d="M1 1h9v9z"/></svg>': "<svg> inside",
+    "<text>a</text>": "<text>",
+    '<image href="a.png"/>': "<image>",
+    '<g style="clip-path:url(#a)"/>': "clip-path",
+    '<g mask="url(#a)"/>': "mask",
+    '<path filter="url(#a)"/>': "filter",
+    '<path d="M1 1h9v9z" fill="url(#a)"/>': "gradient",
+    f'<path d="M1 1h9v9" {ROUND} marker-end="url(#a)"/>': "markers",
+    f'<path d="M1 1h9v9" {ROUND} vector-effect="non-scaling-stroke"/>': "vector-effect",
+    f'<path d="M1 1h9v9" {ROUND} transform="scale(1,2)"/>': "stretches",
+    f'<path d="M1 1h9M2 0v9" {ROUND} opacity=".5"/>': "several subpaths",
+    '<path d="M1 1h9v9z"><animate attributeName="d"/></path>': "animation",
+    "<style>g path{fill:red}</style>": "selector",
+    "<style>@media print{path{fill:red}}</style>": "@-rules",
+    '<path d="M1 1h9v9z" fill="bogus"/>': "'bogus' is not a colour",
+    '<circle cx="1em" cy="5" r="1em"/>': "'1em'",
+    '<path d="z"/>': "draws no",
+    '<path d="M1 1h9v9zL"/>': "broken",
+    '<path d="M1 1h1e30v9z"/>': "farther than",
+    f'<path d="M1 1h9v9" {ROUND} stroke-width="1e30"/>': "farther than",
+    '<path d="M1 1h9e999v9z"/>': "farther than",
+    10 * '<g transform="scale(1e40)">' + '<path d="M1 1h9v9z"/>' + 10 * "</g>": "farther than",
+    '<path d="M1 1h9v9z" transform="spin(5)"/>': "transform",
+    '<path d="M1 1h9v9z" visibility=";"/>': "visibility",
+    "<style>.a{fi 9:red;fill:red}</style>": "broken",
+}
+
+
+@pytest.mark.parametrize("body", LOST)
+def test_what_would_be_lost_is_named(body: str) -> None:
+    with pytest.raises(ImageError) as caught:
+        load_scene(f'{HEAD}width="40" height="30">{body}</svg>', 40, 30, "a.svg")
+    assert str(caught.value).startswith("a.svg: ")
+    assert LOST[body] in one_line(str(caught.value))
+
+
+@pytest.mark.parametrize(
+    "size", ['width="nan" height="nan"', 'width="a" height="b" viewBox="nan nan nan nan"', ""]
+)
+def test_sizes_that_are_no_numbers(size: str) -> None:
+    with pytest.raises(ImageError, match="neither its size"):
+        load_scene(f'{HEAD}{size}><path d="M1 1h9v9z"/></svg>', 40, 30, "a.svg")
+
+
+def test_path_data_as_the_viewer_reads_it() -> None:
+    """Every command, absolute and relative, smooth ones after others, arcs of all flags."""
+    rng = np.random.default_rng(5)
+    sizes = {"l": 2, "h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "t": 2, "z": 0, "m": 2, "a": 7}
+    for _ in range(12):
+        data = "M20 15"
+        for command in rng.choice([*sizes], 8):
+            relative = rng.random() < 0.5
+            v = [f"{x:.1f}" for x in rng.uniform(*((-15, 15) if relative else (3, 27)), sizes[command])]
+            if command == "a":
+                v[:5] = [
+                    *(f"{x:.1f}" for x in rng.uniform(2, 20, 3)),
+                    *(str(x) for x in rng.integers(0, 2, 2)),
+                ]
+            data += (command if relative else command.upper()) + " ".join(v)
+        text = f'{HEAD}width="40" height="30"><path {ROUND} stroke-width="2" d="{data}"/></svg>'
+        scene, _ = load_scene(text, 40, 30, data)
+        assert psnr(on_white(render_svg(write_svg(scene, precision=4))), on_white(render_svg(text))) > 36, (
+            data
+        )
+
+
+def test_hostile_path_data_is_read_in_linear_time() -> None:
+    for data in (
+        "M0 0" + "z" * 200_000,
+        "M0 0h9" + "S1 1 2 2" * 50_000,
+        "M" + " " * 500_000,
+        "M" + "1" * 500_000,
+    ):
+        with pytest.raises(ImageError):
+            load_scene(f'{HEAD}width="40" height="30"><path d="{data}"/><text/></svg>', 40, 30, "a.svg")
+
+
+def test_padding_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpsplat.refine.MAX_PADDED", 3000)
+    small = '<path d="M1 1h9v9z"/>' * 9
+    text = f'{HEAD}width="40" height="30"><path d="M0 0{"h1v1" * 50}z"/>{small}</svg>'
+    with pytest.raises(ImageError, match=r"10 paths .* 303 points"):
+        load_scene(text, 40, 30, "a.svg")
+
+
+def test_nothing_is_added(device: str) -> None:
+    """A file without a background gets none; one with a background keeps it."""
+    target = np.full((30, 40, 3), 0.4, np.float32)
+    for behind in ("", '<rect width="40" height="30" fill="#ccc"/>'):
+        text = f'{HEAD}width="40" height="30">{behind}<path d="M5 5H35V25Z" fill="red"/></svg>'
+        result, before = refine(
+            text, target, make_settings(iterations=10), wp.get_device(device), name="a.svg"
+        )
+        assert result.score.psnr > before
+        assert result.svg.count("<rect") == (1 if behind else 0)
+        assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
+
+
+def test_outputs_and_standard_streams(
+    tmp_path: Path, capsysbinary: pytest.CaptureFixture[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (HEAD + FOREIGN["lines"]).encode()
+    svg, image = tmp_path / "a.svg", tmp_path / "a.png"
+    svg.write_bytes(text)
+    Image.new("RGB", (40, 30), "red").save(image)
+    quick = ("--iterations", 5, "--device", "cpu")
+    assert run("refine", svg, image, "-o", svg, *quick) == 2
+    assert svg.read_bytes() == text
+    assert run("refine", svg, image, "-o", tmp_path / "b.txt", *quick) == 2
+    assert run("refine", "-", "-", "-o", tmp_path / "b.svg", *quick) == 2
+    assert run("refine", svg, image, "-o", "-", "--json", *quick) == 2
+    capsysbinary.readouterr()
+
+    class Stdin:
+        buffer = io.BytesIO(text)
+
+    monkeypatch.setattr("sys.stdin", Stdin)
+    assert run("refine", "-", image, "-o", "-", *quick) == 0
+    assert capsysbinary.readouterr().out.startswith(b"<svg")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "a.svg"]
 
 
 def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:

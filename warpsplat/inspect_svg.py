@@ -30,8 +30,8 @@ MAX_DEPTH = 1000
 MAX_EXPANSION = 16 << 20
 """Most characters that a document's entities may grow to."""
 
-MAX_PIXELS = 400_000_000
-"""Largest picture that is drawn [pixels]; four bytes each, and as many again for each layer."""
+MAX_PIXELS = 200_000_000
+"""Largest picture that is drawn [pixels]: four bytes each, as many again for each layer, and 8 s to pack."""
 
 
 def read_svg_text(path: Path) -> str:
@@ -218,7 +218,7 @@ def svg_size(root: dict[str, str]) -> tuple[float, float] | None:
     own_font = "font-size" in root or "font" in root.get("style", "")
     sides: list[float | None] = []
     for i, name in enumerate(("width", "height")):
-        found = LENGTH.fullmatch(root.get(name, ""))
+        found = LENGTH.fullmatch(root.get(name, "").lstrip())
         if found is None or (found[2] in {"em", "ex"} and own_font):
             sides.append(None)
         elif found[2] == "%":

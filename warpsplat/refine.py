@@ -15,12 +15,13 @@ import warp as wp
 
 from warpsplat.config import Density, Settings
 from warpsplat.errors import ImageError
-from warpsplat.metrics import score_svg
+from warpsplat.metrics import psnr, score_svg
 from warpsplat.pipeline import Result, vectorize
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg import write_svg
 from warpsplat.svg_path import Points, line
 from warpsplat.svg_shapes import Shape, read_shapes
+from warpsplat.viewer import on_white, render_own, render_svg
 
 MAX_PADDED = 8_000_000
 """Most control points of all paths, each counted as long as the longest: 150 bytes each, 1.4 GB in a run."""
@@ -133,6 +134,7 @@ def refine(
     height, width = target.shape[:2]
     scene, has_background = load_scene(text, width, height, name)
     try:
+        _check_read(text, scene, has_background)
         before = score_svg(text, target)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
@@ -154,6 +156,24 @@ def refine(
         result = replace(result, svg=text, scene=scene, score=before)
     return result, before.psnr
 
+
+def _check_read(text: str, scene: Scene, has_background: bool) -> None:
+    """Compare pictures of the SVG and of what was read of it: nothing may be lost that no rule thought of.
+
+    Raises:
+        ImageError: they differ.
+    """
+    given = render_svg(text, width=scene.width, height=scene.height)
+    read = render_own(write_svg(scene, precision=3, background=has_background))
+    if given.size != read.size:
+        raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")
+    alike = psnr(on_white(given), on_white(read))
+    if alike < MIN_ALIKE:
+        raise ImageError(f"shows something that is not supported ({alike:.1f} dB from what could be read)")
+
+
+MIN_ALIKE = 25.0
+"""Least PSNR [dB] of the scene read against the SVG; what is read in full has over 40."""
 
 REFINE_RATE = 0.5
 """Learning rate of points [px]: the shapes are nearly where they should be."""

@@ -190,8 +190,10 @@ def _shape(element: ElementTree.Element, tag: str, style: Style, context: _Conte
         raise ImageError("uses animation, not supported")
     diagonal = float(np.hypot(*context.size)) / 2**0.5
     width = length(style["stroke-width"], diagonal, "stroke-width") if style["stroke"] != "none" else 0.0
-    if style["visibility"] not in {"visible", "inherit"}:
+    if style["visibility"] in {"hidden", "collapse"}:
         return []
+    if style["visibility"] != "visible":
+        raise ImageError(f"visibility {style['visibility'][:40]!r} is not known")
     filled = style["fill"] != "none" and tag != "line"
     if not (filled or width > 0):
         return []

@@ -47,10 +47,16 @@ Style = dict[str, str]
 
 
 def declarations(text: str) -> Iterator[tuple[str, str]]:
-    """Names and values of those declarations of a style that mean something here."""
+    """Names and values of those declarations of a style that mean something here.
+
+    Raises:
+        ImageError: one has no name: viewers differ in what they skip then.
+    """
     for part in text.split(";"):
         name, _, value = part.partition(":")
         name = name.strip().lower()
+        if part.strip() and not name.replace("-", "").replace("_", "").isalnum():
+            raise ImageError(f"style {part.strip()[:40]!r} is broken")
         if name in INHERITED or name in OWN:
             yield name, value.strip()
 
@@ -164,7 +170,9 @@ def parse_color(text: str) -> tuple[Color, float]:
     name = text.strip().lower()
     if name == "transparent":
         return (0.0, 0.0, 0.0), 0.0
-    name = str(ImageColor.colormap.get(name, name))
+    if name in ImageColor.colormap:
+        red, green, blue = ImageColor.getrgb(name)[:3]
+        return (red / 255, green / 255, blue / 255), 1.0
     color = _hex(name[1:]) if name.startswith("#") else _function(name)
     if color is None:
         raise ImageError(f"{text[:40]!r} is not a colour that is supported")
