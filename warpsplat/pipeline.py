@@ -37,7 +37,7 @@ class Result:
     render_psnr: float
     """Of the last training render against the image, at its size [dB]."""
     estimated_psnr: float
-    """Of the file, as the training saw it: that of the render, less what a viewer's rounding costs [dB]."""
+    """Of the file at that size, as the training saw it: the last look at it may be 25 steps old [dB]."""
     iterations: int
     """Steps done; fewer than asked for when stopped."""
     seconds: float
