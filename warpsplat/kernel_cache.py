@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import errno
+import functools
 import hashlib
 import json
 import logging
@@ -77,7 +78,7 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
                 with native_messages_hidden():
                     wp.load_module(module, device, block_dim=block_dim)
             else:
-                log.info("compiling kernels, once: some seconds")
+                _announce()
                 _wait_for(lambda: wp.load_module(module, device, block_dim=block_dim))
         except Exception as error:  # Warp and its compiler raise all kinds
             if explain(error)[0].startswith("not enough memory"):
@@ -91,6 +92,12 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
         f"kernel cache {wp.config.kernel_cache_dir}: kernels cannot be compiled or loaded: "
         f"{_cause(failure)}; set WARP_CACHE_PATH to another folder"
     ) from failure
+
+
+@functools.cache
+def _announce() -> None:
+    """Say why nothing seems to happen; a process says it once for all its modules."""
+    log.info("compiling kernels, once: some seconds")
 
 
 COMPILER = "warpsplat compiler"
