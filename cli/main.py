@@ -48,6 +48,8 @@ class LazyGroup(click.Group):
         """Run the command. Of a reader of stdout that has gone, click would say nothing and exit with 1."""
         try:
             return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise click.exceptions.Abort from error  # or click would print an empty line
         except BrokenPipeError as error:
             silence(sys.stdout)
             raise OutputError("standard output: nobody reads it any more") from error
@@ -88,7 +90,10 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     except BaseException as error:
         code = report(error)
     number = signals.received()
-    sys.exit(128 + number if number else int(code or 0))
+    if number:
+        code = 128 + number
+        signals.leave_compiler(code)
+    sys.exit(int(code or 0))
 
 
 def report(error: BaseException) -> int:

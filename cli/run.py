@@ -28,6 +28,12 @@ def _quality(progress: Progress) -> str:
     return f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
 
 
+def time_left(first: Progress, now: Progress) -> int | None:
+    """Seconds that the rest takes if work goes on as it did since ``first``; None at the very start."""
+    done = now.work - first.work
+    return round((now.seconds - first.seconds) / done * (1 - now.work)) if done > 0 else None
+
+
 @contextlib.contextmanager
 def progress_bar(
     source: Path, settings: Settings, *, quiet: bool, verbose: int
@@ -43,14 +49,26 @@ def progress_bar(
         yield tell
         return
     bar: Any
+    first: Progress | None = None
+
+    def state(progress: Progress | None) -> str | None:
+        if progress is None or first is None:
+            return None
+        seconds = time_left(first, progress)
+        left = "" if seconds is None else f"{seconds // 60}:{seconds % 60:02} left, "
+        return left + _quality(progress)
+
     with click.progressbar(
         length=BAR_LENGTH,
         label=printable(source.name),
         file=sys.stderr,
-        item_show_func=lambda p: _quality(p) if p else None,
+        item_show_func=state,
+        show_eta=False,  # it would count the time that kernels took to compile
     ) as bar:
 
         def show(progress: Progress) -> None:
+            nonlocal first
+            first = first or progress
             bar.update(round(BAR_LENGTH * progress.work) - bar.pos, progress)
 
         yield show

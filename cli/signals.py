@@ -45,12 +45,23 @@ def _handle(number: int, frame: Any) -> None:
 
 def _end(number: int) -> None:
     """End now; no clean-up but that of files that are being written, no wait for threads."""
+    with contextlib.suppress(OSError):
+        os.write(2, b"\nwarpsplat: interrupted\n")
+    _exit(128 + number)
+
+
+def _exit(code: int) -> None:
     files = sys.modules.get("warpsplat.files")
     if files:
         files.remove_unfinished()
-    with contextlib.suppress(OSError):
-        os.write(2, b"\nwarpsplat: interrupted\n")
-    os._exit(128 + number)
+    os._exit(code)
+
+
+def leave_compiler(code: int) -> None:
+    """End the process at once where kernels are being compiled: the compiler cannot be stopped."""
+    cache = sys.modules.get("warpsplat.kernel_cache")
+    if cache and cache.compiling():
+        _exit(code)
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from PIL import Image
 from tests.test_image import bad_files
 from warpsplat import __version__
 from warpsplat.cli.main import main
-from warpsplat.cli.run import _quality
+from warpsplat.cli.run import _quality, time_left
 from warpsplat.config import make_settings
 from warpsplat.errors import CapacityError
 from warpsplat.launch import THREADS_PER_CORE, available_cores
@@ -513,6 +514,12 @@ def test_the_bar_weighs_steps_and_shows_no_decibels_that_fall(image: Path) -> No
     coarse, fine = 600, 2400
     assert seen[4].work == pytest.approx(coarse / (coarse + fine), abs=0.01)
     assert seen[-1].work == 1
+    first = replace(seen[0], seconds=30.0)  # kernels were compiled before
+    said = time_left(first, replace(seen[4], seconds=30.0 + 4))
+    assert said == 20, (
+        "four blocks of coarse steps took 4 s, each of the five fine ones costs four times as much"
+    )
+    assert time_left(first, first) is None
     assert "dB" not in _quality(seen[4])
     assert "dB" in _quality(seen[5])
 

@@ -184,7 +184,7 @@ def test_nothing_is_added(device: str) -> None:
         result, before = refine(
             text, target, make_settings(iterations=10), wp.get_device(device), name="a.svg"
         )
-        assert result.score.psnr > before
+        assert result.score and result.score.psnr > before
         assert result.svg.count("<rect") == (1 if behind else 0)
         assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
 

@@ -10,13 +10,15 @@ from __future__ import annotations
 import atexit
 import contextlib
 import errno
+import functools
 import hashlib
 import json
 import logging
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import warp as wp
@@ -71,11 +73,13 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
         if attempt == 2 or isinstance(failure, OSError):
             use_temporary_folder(failure)
             folder = _place() / folder.name
-        if not folder.exists():
-            log.info("compiling kernels, once: some seconds")
         try:
-            with native_messages_hidden():
-                wp.load_module(module, device, block_dim=block_dim)
+            if folder.exists():
+                with native_messages_hidden():
+                    wp.load_module(module, device, block_dim=block_dim)
+            else:
+                _announce()
+                _wait_for(lambda: wp.load_module(module, device, block_dim=block_dim))
         except Exception as error:  # Warp and its compiler raise all kinds
             if explain(error)[0].startswith("not enough memory"):
                 raise
@@ -88,6 +92,39 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
         f"kernel cache {wp.config.kernel_cache_dir}: kernels cannot be compiled or loaded: "
         f"{_cause(failure)}; set WARP_CACHE_PATH to another folder"
     ) from failure
+
+
+@functools.cache
+def _announce() -> None:
+    """Say why nothing seems to happen; a process says it once for all its modules."""
+    log.info("compiling kernels, once: some seconds")
+
+
+COMPILER = "warpsplat compiler"
+"""Name of the thread that compiles."""
+
+
+def _wait_for(work: Callable[[], None]) -> None:
+    """Do ``work`` in a thread, so that Ctrl-C need not wait until the compiler is done."""
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            work()
+        except BaseException as error:  # raised again where it is waited for
+            errors.append(error)
+
+    thread = threading.Thread(target=run, name=COMPILER, daemon=True)
+    with native_messages_hidden():
+        thread.start()
+        thread.join()
+    if errors:
+        raise errors[0]
+
+
+def compiling() -> bool:
+    """Whether the compiler is at work: a process that ends then must not clean up under its feet."""
+    return any(thread.name == COMPILER for thread in threading.enumerate())
 
 
 def _place() -> Path:
