@@ -209,3 +209,15 @@ def test_pixels_that_are_no_numbers(tmp_path: Path, bad: float, count: int) -> N
     path = save(tmp_path, Image.fromarray(samples.reshape(7, 9)), "a.tif")
     with pytest.raises(ImageError, match=rf"^{path}: {count} of 63 pixels are no numbers"):
         load_image(path)
+
+
+def test_libraries_print_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """libtiff names a damaged strip on stderr, behind Python's back."""
+    path = save(tmp_path, Image.fromarray(RGB), "a.tif", compression="tiff_deflate")
+    data = bytearray(path.read_bytes())
+    place = data.index(b"\x78")  # of the compressed strip
+    data[place + 2 : place + 40] = bytes(38)
+    path.write_bytes(data)
+    with pytest.raises(ImageError, match="damaged"):
+        load_image(path)
+    assert capfd.readouterr() == ("", "")

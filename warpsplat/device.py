@@ -5,7 +5,8 @@ from __future__ import annotations
 import warp as wp
 
 from warpsplat.errors import UsageError
-from warpsplat.kernel_cache import native_messages_hidden, use_temporary_folder
+from warpsplat.kernel_cache import use_temporary_folder
+from warpsplat.native import messages_hidden
 
 
 def start_warp() -> None:
@@ -15,14 +16,14 @@ def start_warp() -> None:
         ResourceError: there is no folder for compiled kernels.
     """
     wp.config.log_level = wp.LOG_WARNING
-    with native_messages_hidden():
+    with messages_hidden():
         try:
             wp.init()
             return
         except OSError as error:
             failure = error
     use_temporary_folder(failure)  # outside the block, as it has something to say
-    with native_messages_hidden():
+    with messages_hidden():
         wp.init()
 
 
@@ -35,7 +36,7 @@ def choose_device(name: str = "auto") -> wp.Device:
     if name == "auto":
         return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
     try:
-        with native_messages_hidden():
+        with messages_hidden():
             return wp.get_device(name)
     except Exception as error:
         found = ", ".join(str(d) for d in wp.get_devices())

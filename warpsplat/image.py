@@ -19,6 +19,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError
 from warpsplat.inputs import input_name, read_input
+from warpsplat.native import messages_hidden
 from warpsplat.scene import FloatArray
 
 MIN_SIDE = 2
@@ -53,8 +54,9 @@ def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
         source = read_input(source)
     name = name or "the image"
     try:
-        # Pillow warns of what it can read all the same (odd metadata), and of bombs, which are refused.
-        with warnings.catch_warnings(), _pixel_limit():
+        # Pillow warns of what it can read all the same (odd metadata), and of bombs, which are refused;
+        # libtiff prints what is wrong with a file, whether or not it can be read.
+        with warnings.catch_warnings(), _pixel_limit(), messages_hidden():
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(source)) as opened:

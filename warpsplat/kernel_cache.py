@@ -18,12 +18,13 @@ import os
 import shutil
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import warp as wp
 
 from warpsplat.errors import ResourceError, explain
+from warpsplat.native import messages_hidden
 
 log = logging.getLogger(__name__)
 
@@ -35,24 +36,6 @@ LOADED = (".o", ".meta", ".cubin", ".ptx")
 
 _temporary: list[str] = []
 """The folder that stands in for a cache that cannot be used, while this process lives."""
-
-
-@contextlib.contextmanager
-def native_messages_hidden() -> Iterator[None]:
-    """Send the process's standard error to nowhere: native code writes there behind Python's back."""
-    try:
-        saved = os.dup(2)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-    except OSError:
-        yield
-        return
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(nowhere)
 
 
 def load(kernel: wp.Kernel, device: wp.Device) -> None:
@@ -75,7 +58,7 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
             folder = _place() / folder.name
         try:
             if folder.exists():
-                with native_messages_hidden():
+                with messages_hidden():
                     wp.load_module(module, device, block_dim=block_dim)
             else:
                 _announce()
@@ -115,7 +98,7 @@ def _wait_for(work: Callable[[], None]) -> None:
             errors.append(error)
 
     thread = threading.Thread(target=run, name=COMPILER, daemon=True)
-    with native_messages_hidden():
+    with messages_hidden():
         thread.start()
         thread.join()
     if errors:

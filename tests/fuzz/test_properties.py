@@ -28,7 +28,7 @@ from warpsplat.image import load_image
 from warpsplat.metrics import psnr
 from warpsplat.refine import load_scene
 from warpsplat.svg import write_svg
-from warpsplat.viewer import on_white, render_svg
+from warpsplat.viewer import on_white, render_own
 
 
 def examples(count: int) -> Callable[[Any], Any]:
@@ -273,14 +273,14 @@ def test_a_name_can_be_written_or_is_refused(name: str) -> None:
 def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
     """What ``refine`` starts from shows what the SVG shows, whatever features it has."""
     try:
-        scene = load_scene(text, WIDTH, HEIGHT, "made up")
+        scene, background = load_scene(text, WIDTH, HEIGHT, "made up")
     except ImageError as error:
         assert_named(error)
         return
-    held, shown = (
-        on_white(render_svg(t, width=8 * WIDTH, height=8 * HEIGHT))
-        for t in (write_svg(scene, precision=3), text)
-    )
+    svg = write_svg(scene, precision=3, background=background)
+    own, large = f'width="{WIDTH}" height="{HEIGHT}"', f'width="{8 * WIDTH}" height="{8 * HEIGHT}"'
+    held, shown = (on_white(render_own(t.replace(own, large, 1))) for t in (svg, text))
+    assert held.shape == (8 * HEIGHT, 8 * WIDTH, 3)
     assert psnr(held, shown) > FAITHFUL, text
 
 
