@@ -13,7 +13,7 @@ import click
 
 from warpsplat._version import __version__
 from warpsplat.cli import signals
-from warpsplat.cli.say import open_standard_streams, say, show_notices, silence
+from warpsplat.cli.say import notices, open_standard_streams, say, silence
 from warpsplat.errors import ExitCode, OutputError, explain, printable
 
 COMMANDS = {
@@ -82,8 +82,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     try:
         with signals.handled():
             open_standard_streams()
-            show_notices()
-            code = cli.main(args=arguments, prog_name="warpsplat", standalone_mode=False) or 0
+            with notices():
+                code = cli.main(args=arguments, prog_name="warpsplat", standalone_mode=False) or 0
             sys.stdout.flush()
     except SystemExit as error:
         code = error.code

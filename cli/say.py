@@ -6,6 +6,7 @@ import contextlib
 import logging
 import os
 import sys
+from collections.abc import Iterator
 
 import click
 
@@ -65,12 +66,20 @@ class _Notices(logging.Handler):
             click.echo(f"{start}warpsplat: {printable(record.getMessage())}", err=True)
 
 
-def show_notices() -> None:
+@contextlib.contextmanager
+def notices() -> Iterator[None]:
     """Show the library's warnings, and on a terminal what it is busy with; ``set_voice`` changes that."""
     log = logging.getLogger("warpsplat")
-    log.handlers = [_Notices()]
+    before, handler = (log.propagate, log.level), _Notices()
+    log.addHandler(handler)
     log.propagate = False
     log.setLevel(logging.INFO if sys.stderr.isatty() else logging.WARNING)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.propagate = before[0]
+        log.setLevel(before[1])
 
 
 def set_voice(*, quiet: bool) -> None:

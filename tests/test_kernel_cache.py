@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -100,7 +99,6 @@ def test_a_cache_that_cannot_be_written_is_replaced(
 ) -> None:
     (cache / "file").touch()
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(cache / "file"))
-    monkeypatch.setattr(logging.getLogger("warpsplat"), "propagate", True)
     assert doubles()
     assert [r.levelname for r in caplog.records if "for this run only" in r.message] == ["WARNING"]
     assert str(cache / "file") in caplog.text
