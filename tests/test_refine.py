@@ -201,15 +201,16 @@ def test_outputs_and_standard_streams(
     assert svg.read_bytes() == text
     assert run("refine", svg, image, "-o", tmp_path / "b.txt", *quick) == 2
     assert run("refine", "-", "-", "-o", tmp_path / "b.svg", *quick) == 2
-    assert run("refine", svg, image, "-o", "-", "--json", *quick) == 2
     capsysbinary.readouterr()
 
     class Stdin:
         buffer = io.BytesIO(text)
 
     monkeypatch.setattr("sys.stdin", Stdin)
-    assert run("refine", "-", image, "-o", "-", *quick) == 0
-    assert capsysbinary.readouterr().out.startswith(b"<svg")
+    assert run("refine", "-", image, "-o", "-", "--json", *quick) == 0
+    captured = capsysbinary.readouterr()
+    assert captured.out.startswith(b"<svg")
+    assert json.loads(captured.err)["bytes"] == len(captured.out), "the figures give way to the SVG"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "a.svg"]
 
 
