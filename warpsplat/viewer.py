@@ -101,7 +101,7 @@ def draw_png(
     raise ImageError("cannot be rendered: resvg fails on what it draws")
 
 
-CPU_SECONDS = 6.0
+CPU_SECONDS = 4.0
 CPU_PER_BYTE = 5e-6
 CPU_PER_PIXEL = 1.2e-7
 """Bounds of the processor time for a drawing [s]: three times what large plain ones take."""

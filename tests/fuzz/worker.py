@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import resource
 import select
 import subprocess
 import sys
@@ -172,7 +171,7 @@ def _run(main: Any, task: dict[str, Any]) -> Outcome:
             file.seek(0)
             texts.append(file.read(1 << 20).decode("utf-8", "replace"))
     os.umask(umask)
-    peak = _status("self", "VmHWM") or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    peak = _status("self", "VmHWM")
     return Outcome(code, texts[0], texts[1], seconds, peak)
 
 
