@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from warpsplat.cli.options import FILE, overwrite_option, threads_option, voice_options
 from warpsplat.cli.say import say
-from warpsplat.errors import ExitCode, OutputError, UsageError, explain
+from warpsplat.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from warpsplat.batch import Job
+    from warpsplat.jobs.execute import Outcome
+    from warpsplat.jobs.plan import Job
+    from warpsplat.jobs.vectorize import Result
 
 NAMED = 20
 """Most files that one message names."""
@@ -26,7 +28,7 @@ def check_ours(jobs: list[Job], path: Path) -> None:
     Raises:
         UsageError: there are some; the message names them.
     """
-    from warpsplat.batch import not_ours
+    from warpsplat.jobs.plan import not_ours
 
     found = not_ours(jobs)
     if found:
@@ -37,38 +39,20 @@ def check_ours(jobs: list[Job], path: Path) -> None:
         )
 
 
-def run_job(job: Job, count: str, *, quiet: bool, talk: bool, **options: Any) -> dict[str, Any]:
-    """Do one job, say what became of it, and return that for JSON. Whatever it raises is its failure only."""
-    from warpsplat.cli.run import run_file
+def tell(outcome: Outcome, count: str, *, talk: bool) -> None:
+    """Say what became of a job; ``count`` is its number among all."""
     from warpsplat.cli.vectorize import summary
-    from warpsplat.inputs import read_input
 
-    values: dict[str, Any] = {"image": str(job.image), "output": str(job.output)}
-    try:
-        data = read_input(job.image)
-        if job.done(data):
-            if talk:
-                say(f"{count} {job.output}: already made with these settings")
-            return values | {"status": "skipped"}
-        try:
-            job.output.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{job.output.parent}: cannot be made: {error.strerror}") from error
-        result = run_file(job.image, job.output, job.settings, data=data, quiet=quiet, **options)
-    except (KeyboardInterrupt, SystemExit, GeneratorExit):
-        raise
-    except BaseException as error:  # a panic of Rust code derives from no Exception
-        message, _ = explain(error)
-        name = str(job.image)
-        message = message if name in message or str(job.output) in message else f"{name}: {message}"
-        say(f"{count} failed: {message}", err=True)
-        return values | {"status": "failed", "error": message}
-    values |= {"status": "stopped" if result.stopped else "made", **result.as_dict()}
-    if talk:
-        say(f"{count} {summary(job.output, values)}")
-    for goal in result.missed:
-        say(f"{count} goal missed: {goal}", err=True)
-    return values
+    output, result = outcome.job.output, outcome.result
+    if outcome.status == "failed":
+        say(f"{count} failed: {outcome.error}", err=True)
+    elif talk and outcome.status == "skipped":
+        say(f"{count} {output}: already made with these settings")
+    elif result:
+        if talk:
+            say(f"{count} {summary(output, outcome.as_dict())}")
+        for goal in result.missed:
+            say(f"{count} goal missed: {goal}", err=True)
 
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
@@ -102,41 +86,52 @@ def command(
     rest are done (exit 5). A result that is there already, made by the same
     settings from the same image, is not made again.
     """  # noqa: D301
-    from warpsplat.batch import load_jobs
     from warpsplat.cli import signals
-    from warpsplat.device import choose_device, start_warp
+    from warpsplat.cli.run import run_file
+    from warpsplat.jobs.execute import Outcome, execute
+    from warpsplat.jobs.plan import load_jobs
+    from warpsplat.render.backend import Backend
+    from warpsplat.render.device import choose_device, start_warp
 
     todo = load_jobs(jobs)
     if not overwrite:
         check_ours(todo, jobs)
     start_warp()
-    devices = {name: choose_device(name) for name in {device or job.device for job in todo}}
-    results: list[dict[str, Any]] = []
+    names = {device or job.device for job in todo}
+    backends = {name: Backend.on(choose_device(name), threads) for name in names}
+    outcomes: list[Outcome] = []
     talk = not quiet and not as_json
+
+    def run(job: Job, data: bytes) -> Result:
+        backend = backends[device or job.device]
+        return run_file(job.image, job.output, job.settings, backend, data=data, quiet=quiet, verbose=verbose)
+
     for i, job in enumerate(todo):
-        options = {"device": devices[device or job.device], "threads": threads, "verbose": verbose}
         try:
-            results.append(run_job(job, f"[{i + 1}/{len(todo)}]", quiet=quiet, talk=talk, **options))
-        except KeyboardInterrupt:  # with nothing of this image to save
-            results.append({"image": str(job.image), "output": str(job.output), "status": "stopped"})
+            outcomes.append(execute(job, run))
+        except KeyboardInterrupt:
+            outcomes.append(Outcome(job, "stopped"))
+        tell(outcomes[-1], f"[{i + 1}/{len(todo)}]", talk=talk)
         if signals.received():
             break
-    finish(results, len(todo), quiet=quiet, talk=talk, as_json=as_json)
+    finish(outcomes, len(todo), quiet=quiet, talk=talk, as_json=as_json)
 
 
-def finish(results: list[dict[str, Any]], total: int, *, quiet: bool, talk: bool, as_json: bool) -> None:
+def finish(outcomes: list[Outcome], total: int, *, quiet: bool, talk: bool, as_json: bool) -> None:
     """Sum up, and end the program with the code for it, if there is one to give."""
-    counts = {s: sum(r["status"] == s for r in results) for s in ("made", "skipped", "failed")}
+    from warpsplat.jobs.execute import counts
+
+    numbers = counts(outcomes)
     if as_json:
-        say(json.dumps({**counts, "results": results}))
+        say(json.dumps({**numbers, "results": [outcome.as_dict() for outcome in outcomes]}))
     if talk:
-        say(f"{total} images: " + ", ".join(f"{n} {name}" for name, n in counts.items()))
-    failed = [r for r in results if r["status"] == "failed"]
+        say(f"{total} images: " + ", ".join(f"{n} {name}" for name, n in numbers.items()))
+    failed = [outcome.error for outcome in outcomes if outcome.status == "failed"]
     if failed and not quiet:
         say("failed:", err=True)
-        for r in failed:
-            say(f"  {r['error']}", err=True)
+        for error in failed:
+            say(f"  {error}", err=True)
     if failed:
         sys.exit(ExitCode.SOME_FAILED)
-    if any(r.get("missed") for r in results):
+    if any(outcome.result and outcome.result.missed for outcome in outcomes):
         sys.exit(ExitCode.GOAL_MISSED)

@@ -61,7 +61,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, metavar="N")
 @click.option("-v", "--verbose", count=True, help="List the kernels as well.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(size: str, device: str, verbose: int, as_json: bool, **options: Any) -> None:
+def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
     """Time a training step and its stages on a random scene.
 
     Shapes have uniform centres and radii of 5 to 10 % of the width (half of
@@ -70,9 +70,10 @@ def command(size: str, device: str, verbose: int, as_json: bool, **options: Any)
     while it is timed.
     """
     width, height = parse_size(size)
-    from warpsplat.bench import bench
-    from warpsplat.device import choose_device, start_warp
+    from warpsplat.jobs.bench import bench
+    from warpsplat.render.backend import Backend
+    from warpsplat.render.device import choose_device, start_warp
 
     start_warp()
-    values = bench(width=width, height=height, device=choose_device(device), **options)
+    values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)
     say(json.dumps(values) if as_json else table(values, verbose))

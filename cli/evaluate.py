@@ -21,10 +21,10 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     The SVG is rendered at the image's size; transparency is on white.
     One of the two may be - for the standard input.
     """
-    from warpsplat.image import load_image
-    from warpsplat.inputs import STANDARD, input_name
-    from warpsplat.inspect_svg import read_svg_text
+    from warpsplat.files.image import load_image
+    from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.metrics import score_svg
+    from warpsplat.svg.inspect import read_svg_text
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")

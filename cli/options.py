@@ -1,4 +1,7 @@
-"""Options that commands share. Defaults are those of ``warpsplat.config``: an option not given is None."""
+"""Options that commands share.
+
+Defaults are those of ``warpsplat.fit.settings``: an option not given is None.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ from typing import Any, TypeVar
 import click
 
 from warpsplat.cli.say import set_voice
-from warpsplat.config import DEFAULT_QUALITY, QUALITIES, Settings, make_settings
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Settings, make_settings
+from warpsplat.scene import Kind
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _defaults = Settings()
@@ -56,8 +60,10 @@ def quality_options(function: Function) -> Function:
             metavar="N",
             help=f"Number of shapes.  [default: {_defaults.curves}; fewer for a simple image]",
         ),
-        click.option("--closed", "kind", flag_value="closed", help="Filled shapes.  [default]"),
-        click.option("--open", "kind", flag_value="open", help="Strokes."),
+        click.option(
+            "--closed", "kind", flag_value=Kind.FILL, type=click.UNPROCESSED, help="Filled shapes.  [default]"
+        ),
+        click.option("--open", "kind", flag_value=Kind.STROKE, type=click.UNPROCESSED, help="Strokes."),
         click.option(
             "--quality", type=click.Choice(QUALITIES), help=f"Effort.  [default: {DEFAULT_QUALITY}]"
         ),

@@ -10,10 +10,10 @@ import click
 
 from warpsplat.cli.options import FILE, overwrite_option, run_options
 from warpsplat.cli.say import say
-from warpsplat.config import Settings, make_settings
 from warpsplat.errors import UsageError
-from warpsplat.files import check_output, write_result
-from warpsplat.inputs import STANDARD, input_name
+from warpsplat.files.inputs import STANDARD, input_name
+from warpsplat.files.output import check_output, write_result
+from warpsplat.fit.settings import Settings, make_settings
 
 
 @click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
@@ -54,27 +54,27 @@ def command(
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.vectorize import summary
-    from warpsplat.device import choose_device, start_warp
-    from warpsplat.image import load_image
-    from warpsplat.inspect_svg import read_svg_text
-    from warpsplat.refine import refine
+    from warpsplat.files.image import load_image
+    from warpsplat.jobs.refine import refine
+    from warpsplat.render.backend import Backend
+    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.svg.inspect import read_svg_text
 
     text, target = read_svg_text(svg), load_image(image)
     start_warp()
-    chosen = choose_device(device)
+    backend = Backend.on(choose_device(device), threads)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as report:
         result, before = refine(
             text,
             target,
             settings,
-            chosen,
+            backend,
             name=input_name(svg),
-            threads=threads,
             report=report,
             stop=interrupt,
         )
-    write_result(output, result.svg.encode())
+        write_result(output, result.svg.encode())
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if as_json:
         say(json.dumps(values), err=output == STANDARD)

@@ -19,10 +19,10 @@ def command(svg: Path, output: Path, overwrite: bool, scale: float) -> None:
     """Render SVG (any, not only ours; - for the standard input) to a PNG, as a viewer shows it."""
     import math
 
-    from warpsplat.files import check_output, mark_png, write_result
-    from warpsplat.inputs import input_name
-    from warpsplat.inspect_svg import MAX_PIXELS, inspect_svg, read_svg_text, svg_size
-    from warpsplat.viewer import draw_png
+    from warpsplat.files.inputs import input_name
+    from warpsplat.files.output import check_output, mark_png, write_result
+    from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, read_svg_text, svg_size
+    from warpsplat.svg.viewer import draw_png
 
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")

@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import click
-import warp as wp
 
 from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
-from warpsplat.config import Settings
 from warpsplat.errors import ExitCode, printable
-from warpsplat.inputs import input_name
-from warpsplat.pipeline import Result, vectorize_file
-from warpsplat.train import Progress
+from warpsplat.files.inputs import input_name
+from warpsplat.fit.loop import Progress
+from warpsplat.fit.settings import Settings
+from warpsplat.jobs.vectorize import Result, vectorize_file
+from warpsplat.render.backend import Backend
+from warpsplat.scene import Kind
+
+PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
 
 BAR_LENGTH = 1000
 """Of a progress bar: thousandths of the work."""
@@ -78,26 +81,24 @@ def run_file(
     source: Path,
     output: Path,
     settings: Settings,
-    device: wp.Device,
+    backend: Backend,
     *,
     data: bytes,
-    threads: int | None = None,
     verbose: int = 0,
     quiet: bool = False,
 ) -> Result:
     """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
     if verbose:
         most = "at most " if settings.simplify or settings.max_bytes else ""
-        say(f"{source}: {most}{settings.curves} {settings.kind} curves on {device}", err=True)
+        say(f"{source}: {most}{settings.curves} {PLURALS[settings.kind]} on {backend.device}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         result = vectorize_file(
             data,
             output,
             settings,
-            device,
+            backend,
             name=input_name(source),
-            threads=threads,
             report=report,
             stop=interrupt,
         )

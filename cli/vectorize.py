@@ -60,8 +60,8 @@ def command(
     goes to stdout.
     """
     settings = settings_from(given)
-    from warpsplat.files import check_output
-    from warpsplat.inputs import STANDARD, read_input
+    from warpsplat.files.inputs import STANDARD, read_input
+    from warpsplat.files.output import check_output
 
     if output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
@@ -69,16 +69,16 @@ def command(
     output = output or Path(image.name).with_suffix(".svg")
     check_output(output, image, ending=".svg", overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
-    from warpsplat.device import choose_device, start_warp
+    from warpsplat.render.backend import Backend
+    from warpsplat.render.device import choose_device, start_warp
 
     start_warp()
     result = run_file(
         image,
         output,
         settings,
-        choose_device(device),
+        Backend.on(choose_device(device), threads),
         data=data,
-        threads=threads,
         verbose=verbose,
         quiet=quiet,
     )

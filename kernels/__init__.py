@@ -1,33 +1,39 @@
-"""Device side of warpsplat: Warp kernels, one file a stage, in pipeline order.
+"""Device side of warpsplat: Warp kernels, one file a stage.
 
-Conventions, here once:
+Conventions and glossary, here once:
 
 * Lengths are pixels of the image being rendered ([px]); x right, y down; the centre of pixel
   (column j, row i) lies at (j + 0.5, i + 0.5), as in SVG. The scene itself is in canvas units (pixels of
-  the input image); ``scale`` in ``sample`` takes it to render pixels.
+  the input image); ``scale`` takes it to render pixels.
 * Colours are sRGB values in [0, 1], not linearised (SVG composites so), straight, not premultiplied.
-* A *curve* is one shape of the scene; row 0 is painted first (furthest back), as in SVG.
-* A *part* is what is composited once with one opacity: a whole curve, or one segment of a stroke that
-  has an opacity per segment. Part ``p`` belongs to curve ``p // opacity_count``.
-* A part is sampled on a grid of ``rows x columns`` Gaussians; Gaussian ``part_first + row * columns +
-  column``. Columns run along the curve, rows across it.
-* A *slot* is one (part, tile) pair. The slots of a part are the tiles of its bounding rectangle, row by
-  row, parts from the front to the back, so that the slot of a pixel is found by arithmetic.
-* Pixels lie by tiles, and in a tile by columns: an image is [tile, channel, column], a coverage [slot,
+* A **shape** is what is composited once, a path of the file. Row 0 is painted first (furthest back).
+  Its **kind** is FILL (a ring of cubics) or STROKE (a chain). Shapes are ragged: the control
+  **points** of shape ``i`` are those from ``point_first[i]`` to ``point_first[i + 1]``, its **cubics**
+  those from ``cubic_first[i]`` on; ``point_shape`` and ``cubic_shape`` say whose a point or cubic is.
+* A **sample** is a point by which a shape's tiles are found: a **vertex** of its polyline (exact coverage),
+  or a **Gaussian** (splats). A shape's samples are the range [``*_first``, ``*_last``), empty where they did
+  not fit into the capacity.
+* Gaussians lie on a grid of **rows** across a shape and **stations** along it, number
+  ``gaussian_first + row * stations + station``. Stations fall into **runs**: neighbours only inside a run.
+* A **slot** is one (shape, tile) pair. The slots of a shape are the tiles of its bounding rectangle, row by
+  row, shapes from the front to the back, so that the slot of a pixel is found by arithmetic. Its **state**
+  says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there is a coverage to
+  read; HIDDEN ones are on no list.
+* Pixels lie by tiles, and in a tile by **columns**: an image is [tile, channel, column], a coverage [slot,
   column], each element a vector of the 16 pixels from top to bottom (``tile.column``). Kernels that go pixel
   by pixel have the same memory as [slot, 16 x column + row].
-* The state of a slot says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there
-  is a coverage to read; HIDDEN ones are on no list.
-* A CPU gives a thread a whole tile (one lane); a GPU has 16 lanes a tile, each a row or a column.
+* A **lane** is a thread's share of a tile: a CPU gives a thread a whole tile (one lane), a GPU has 16 lanes a
+  tile, each a row or a column.
+* A **law** says how a coverage follows from the sum s that a model makes: AREA, |s| clamped at 1, or PRODUCT,
+  1 - exp(-s).
 * Gradients are named after their value with ``_grad``. No kernel adds floats atomically: each output
   element has one writer, so results are the same bits on every run of one device, and a launch may be cut
-  into pieces (``first`` is the index of a piece's first thread) that run on different CPU threads.
+  into pieces (``offset`` is the index of a piece's first thread) that run on different CPU threads.
+* A parameter has the name of the array that it is bound to (``render.program.bind``).
 
 Data flow of a step (forward, then its adjoint in reverse order)::
 
-    points, widths  --sample-->  grid positions  --gaussian-->  mean, conic, extent
-                    --bin-->     slots sorted by tile, front to back
-                    --splat-->   coverage per slot and pixel (1 - product of 1 - g)
-    points          --flatten--> vertices, --bin-->, --fill--> or --stroke--> coverage
-                    --composite--> image    --loss-->  image_grad    --adam--> new parameters
+    points         --outline-->  vertices    --bins-->  slots by tile  --coverage/fill, stroke-->  coverage
+    points, widths --grid-->     Gaussians   --bins-->  slots by tile  --coverage/splat-->         coverage
+    coverage, paint --composite--> image --loss--> image_grad      gradients --adam--> new parameters
 """

@@ -22,13 +22,22 @@ def cubic_tangent_weights(t: wp.float32) -> wp.vec4:
 
 
 @wp.func
-def closed_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
-    """Row of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from point 0,
+def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
+    """Place of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from point 0,
     chain 1 backwards; both end in the middle of the ring.
     """
     if chain == 0:
         return i
     return (point_count - i) % point_count
+
+
+@wp.func
+def cubic_end(start: wp.int32, point_first: wp.array[wp.int32], shape: wp.int32) -> wp.int32:
+    """Last control point of the cubic from ``start``: the last one of a ring ends where its shape begins."""
+    end = start + 3
+    if end == point_first[shape + 1]:
+        return point_first[shape]
+    return end
 
 
 @wp.func
@@ -50,17 +59,3 @@ def local_weight(weights: wp.vec4, segment: wp.int32, i: wp.int32) -> wp.float32
     if j < 0 or j > 3:
         return 0.0
     return weights[j]
-
-
-@wp.func
-def find_range(ends: wp.array[wp.int32], count: wp.int32, i: wp.int32) -> wp.int32:
-    """Smallest index with ``ends[index] > i``; ``ends`` is an inclusive prefix sum of ``count`` entries."""
-    low = int(0)
-    high = int(count)
-    while low < high:
-        middle = (low + high) / 2
-        if ends[middle] > i:
-            high = middle
-        else:
-            low = middle + 1
-    return low

@@ -1,7 +1,7 @@
-"""Coverage -> image by front-to-back alpha blending (paper eq. 8, once a part), and the adjoint.
+"""Coverage -> image by front-to-back alpha blending (paper eq. 8, once a shape), and the adjoint.
 
 alpha = opacity x coverage; C = sum_i c_i alpha_i prod_{j<i} (1 - alpha_j) + background x what is left.
-Both directions run front to back. The adjoint starts from total = dot(C, dL/dC), subtracts each part's own
+Both directions run front to back. The adjoint starts from total = dot(C, dL/dC), subtracts each shape's own
 share and so knows the share of all that lies behind, without stored lists:
 dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
 A coverage may come from splats or from any other model: this stage knows only the tiles' lists of visible
@@ -12,12 +12,12 @@ slot. Images are arrays of tiles, planes and columns (see ``warpsplat.tiles``).
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.paint.flat import paint_against, paint_times
 from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-COVERED = wp.constant(constants.COVERED)
-HIDDEN = wp.constant(constants.HIDDEN)
+AREA = wp.constant(constants.AREA)
 TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
@@ -26,7 +26,7 @@ TINY = wp.constant(1.0e-9)
 @wp.kernel
 def composite_forward(
     # In:
-    first: wp.int32,
+    offset: wp.int32,
     lane_columns: wp.int32,  # columns of a tile that a thread handles
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_stop: wp.array[wp.int32],  # [tile_count]
@@ -39,7 +39,7 @@ def composite_forward(
 ):
     """One thread a tile and lane."""
     i, lane = wp.tid()
-    tile = first + i
+    tile = offset + i
     start = tile_first[tile]
     stop = tile_stop[tile]
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
@@ -53,26 +53,66 @@ def composite_forward(
             share = paint[3] * t
             if slot >= 0:
                 share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
-            red = red + paint[0] * share
-            green = green + paint[1] * share
-            blue = blue + paint[2] * share
+            red = red + paint_times(paint, 0, share)
+            green = green + paint_times(paint, 1, share)
+            blue = blue + paint_times(paint, 2, share)
             t = t - share
         image[tile, 0, x] = red + background[0] * t
         image[tile, 1, x] = green + background[1] * t
         image[tile, 2, x] = blue + background[2] * t
 
 
+@wp.func
+def law_slope(law: wp.int32, signed: column, covered: column) -> column:
+    """d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves."""
+    one = column(1.0)
+    slope = one - covered
+    if law == AREA:
+        slope = wp.min(STEEP * slope, one)
+        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
+    return slope
+
+
+@wp.func
+def lit(t: column) -> column:
+    """1 where light is left, else 0: there only rounding is, and Adam would make steps of it."""
+    one = column(1.0)
+    return wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), column(0.0)), one)
+
+
+@wp.func
+def add_columns(
+    slot_columns: wp.array2d[column],
+    slot: wp.int32,
+    x: wp.int32,
+    red: column,
+    green: column,
+    blue: column,
+    opacity: column,
+):
+    """Add the gradients of column ``x`` of a slot to those of the columns before it."""
+    if x > 0:
+        red = red + slot_columns[slot, 0]
+        green = green + slot_columns[slot, 1]
+        blue = blue + slot_columns[slot, 2]
+        opacity = opacity + slot_columns[slot, 3]
+    slot_columns[slot, 0] = red
+    slot_columns[slot, 1] = green
+    slot_columns[slot, 2] = blue
+    slot_columns[slot, 3] = opacity
+
+
 @wp.kernel
 def composite_backward(
     # In:
-    first: wp.int32,
+    offset: wp.int32,
     lane_columns: wp.int32,
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_stop: wp.array[wp.int32],  # [tile_count]
     list_slot: wp.array[wp.int32],  # [slot_capacity]
     list_paint: wp.array[wp.vec4],  # [slot_capacity]
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    product: wp.int32,  # 1: a coverage is 1 - exp(-s); 0: it is |s|, clamped at 1
+    law: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
     image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     # Out:
@@ -84,11 +124,10 @@ def composite_backward(
     stage waits for memory.
     """
     i, lane = wp.tid()
-    tile = first + i
+    tile = offset + i
     start = tile_first[tile]
     stop = tile_stop[tile]
     one = column(1.0)
-    zero = column(0.0)
     least = column(TINY)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
         red = image_grad[tile, 0, x]
@@ -110,20 +149,13 @@ def composite_backward(
                 signed = coverage[slot, x]
                 covered = wp.abs(signed)
             alpha = paint[3] * covered
-            share = wp.cw_mul(t, paint[0] * red + paint[1] * green + paint[2] * blue)
+            share = wp.cw_mul(t, paint_against(paint, red, green, blue))
             seen = wp.cw_mul(t, alpha)
             behind = behind - wp.cw_mul(alpha, share)
-            # Where no light is left, only rounding is; Adam would make steps of it.
-            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
-            alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
+            alpha_grad = wp.cw_mul(lit(t), share - wp.cw_div(behind, wp.max(one - alpha, least)))
             t = t - seen
             if not full:
-                # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.
-                slope = one - covered
-                if product == 0:
-                    slope = wp.min(STEEP * slope, one)
-                    slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
-                sum_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
+                sum_grad[slot, x] = paint[3] * wp.cw_mul(law_slope(law, signed, covered), alpha_grad)
             red_grad = wp.cw_mul(seen, red)
             green_grad = wp.cw_mul(seen, green)
             blue_grad = wp.cw_mul(seen, blue)
@@ -133,64 +165,13 @@ def composite_backward(
                     total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
                 )
             else:
-                if x > 0:
-                    red_grad = red_grad + slot_columns[slot, 0]
-                    green_grad = green_grad + slot_columns[slot, 1]
-                    blue_grad = blue_grad + slot_columns[slot, 2]
-                    opacity_grad = opacity_grad + slot_columns[slot, 3]
-                slot_columns[slot, 0] = red_grad
-                slot_columns[slot, 1] = green_grad
-                slot_columns[slot, 2] = blue_grad
-                slot_columns[slot, 3] = opacity_grad
-
-
-@wp.kernel
-def reduce_slots(
-    # In:
-    first: wp.int32,
-    opacity_count: wp.int32,
-    lanes: wp.int32,
-    slot_first: wp.array[wp.int32],  # [part_count]
-    slot_last: wp.array[wp.int32],  # [part_count]
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
-    slot_columns: wp.array2d[column],  # [slot_capacity, 4]
-    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
-    # Out:
-    colors_grad: wp.array[wp.vec3],  # [curve_count] written
-    opacities_grad: wp.array2d[wp.float32],  # [curve_count, opacity_count] written
-):
-    """One thread a curve sums its visible slots in a fixed order: the same bits on every run."""
-    curve = first + wp.tid()
-    color_total = wp.vec3(0.0, 0.0, 0.0)
-    for j in range(opacity_count):
-        part = curve * opacity_count + j
-        red = column(0.0)
-        green = column(0.0)
-        blue = column(0.0)
-        opacity = column(0.0)
-        sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        for slot in range(slot_first[part], slot_last[part]):
-            state = slot_state[slot]
-            if state & COVERED != 0 and state & HIDDEN == 0:
-                if lanes == 1:
-                    red = red + slot_columns[slot, 0]
-                    green = green + slot_columns[slot, 1]
-                    blue = blue + slot_columns[slot, 2]
-                    opacity = opacity + slot_columns[slot, 3]
-                else:
-                    for lane in range(lanes):
-                        sums = sums + slot_grad[slot, lane]
-        color_total = color_total + wp.vec3(
-            sums[0] + total(red), sums[1] + total(green), sums[2] + total(blue)
-        )
-        opacities_grad[curve, j] = sums[3] + total(opacity)
-    colors_grad[curve] = color_total
+                add_columns(slot_columns, slot, x, red_grad, green_grad, blue_grad, opacity_grad)
 
 
 @wp.kernel
 def removal_cost(
     # In:
-    first: wp.int32,
+    offset: wp.int32,
     lane_columns: wp.int32,
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_stop: wp.array[wp.int32],  # [tile_count]
@@ -203,15 +184,14 @@ def removal_cost(
     # Out:
     slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
 ):
-    """What the squared error would grow by if a part alone were taken away.
+    """What the squared error would grow by if a shape alone were taken away.
 
-    Behind a part lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
+    Behind a shape lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
     squared error by 2 d . (image - target) + d . d.
     """
     i, lane = wp.tid()
-    tile = first + i
+    tile = offset + i
     one = column(1.0)
-    zero = column(0.0)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
         t = one
         red = image[tile, 0, x]
@@ -228,17 +208,17 @@ def removal_cost(
                 seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
             else:
                 slot = -1 - slot
-            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
+            light = lit(t)
             t = t - seen
-            red = red - paint[0] * seen
-            green = green - paint[1] * seen
-            blue = blue - paint[2] * seen
+            red = red - paint_times(paint, 0, seen)
+            green = green - paint_times(paint, 1, seen)
+            blue = blue - paint_times(paint, 2, seen)
             share = wp.cw_div(seen, wp.max(t, TINY * one))
-            d = wp.cw_mul(share, red) - paint[0] * seen
+            d = wp.cw_mul(share, red) - paint_times(paint, 0, seen)
             cost = wp.cw_mul(d, d + red_error)
-            d = wp.cw_mul(share, green) - paint[1] * seen
+            d = wp.cw_mul(share, green) - paint_times(paint, 1, seen)
             cost = cost + wp.cw_mul(d, d + green_error)
-            d = wp.cw_mul(share, blue) - paint[2] * seen
+            d = wp.cw_mul(share, blue) - paint_times(paint, 2, seen)
             cost = cost + wp.cw_mul(d, d + blue_error)
-            cost = wp.cw_mul(cost, wp.cw_mul(lit, inside[tile, x]))
+            cost = wp.cw_mul(cost, wp.cw_mul(light, inside[tile, x]))
             slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)

@@ -2,6 +2,10 @@
 
 import math
 
+FILL = 0
+STROKE = 1
+"""Kinds of shapes: a closed ring of cubics that is painted inside, a chain of cubics painted along."""
+
 TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
 
@@ -41,16 +45,19 @@ ROW_GROWTH = 0.65
 """Distance between rows as a fraction of the distance to the boundary: small enough that the Gaussians of
 an inner row end at the path."""
 
-COLUMN_SPACING = 5.0
-"""Largest distance [px] between samples along a curve."""
+STATION_SPACING = 5.0
+"""Largest distance [px] between stations along a curve."""
 
-COLUMN_DENSITY = 3.5
-"""Samples along a curve of length L [px]: at least this times sqrt(L). A Gaussian is straight, so on a bend
+STATION_DENSITY = 3.5
+"""Stations along a curve of length L [px]: at least this times sqrt(L). A Gaussian is straight, so on a bend
 of radius R its ends leave the curve by SPREAD^2 h^2 / R for a spacing h; with R about L / 3 this keeps it
 under a quarter of a pixel."""
 
-COLUMNS_MIN = 8
-"""Fewest samples along a curve, however small it is."""
+STATIONS_MIN = 8
+"""Fewest stations along a curve, however small it is."""
+
+PLAN_SAMPLES = 6
+"""Samples of a cubic that measure its length and a strip's width."""
 
 EPSILON = 1.0e-6
 """Length [px] below which a difference vector has no direction."""
@@ -86,6 +93,10 @@ PARTIAL = COVERED + UNCOVERED
 
 HIDDEN = 4
 """Added to the state of a slot that nothing of is seen, as slots in front are opaque."""
+
+AREA = 0
+PRODUCT = 1
+"""How a coverage follows from the sum s that a model of coverage makes: |s|, clamped at 1, or 1 - exp(-s)."""
 
 MODULE_OPTIONS = {
     "enable_backward": False,

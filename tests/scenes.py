@@ -2,66 +2,105 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from warpsplat.scene import Kind, Scene
+from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+
+FILL_CUBICS, STROKE_CUBICS = 4, 3
+"""As many as the shapes of a run have."""
+
+
+def canvas(width: int, height: int) -> Canvas:
+    return Canvas(width, height, np.array([0.2, 0.5, 0.7], np.float32))
 
 
 def random_scene(
-    kind: Kind,
-    count: int = 4,
-    width: int = 40,
-    height: int = 36,
-    *,
-    seed: int = 0,
-    chain_cubics: int = 2,
-    opacity_count: int = 1,
-    stroke_cubics: int = 3,
+    kind: Kind, count: int = 4, width: int = 40, height: int = 36, *, seed: int = 0, cubics: int | None = None
 ) -> Scene:
     """Wobbly blobs or strokes, some of them partly off the canvas."""
     rng = np.random.default_rng(seed)
-    size = np.array([width, height])
-    centre = rng.uniform(0, 1, (count, 1, 2)) * size
-    if kind == "closed":
-        points = 6 * chain_cubics
-        angle = 2 * np.pi * np.arange(points) / points
-        ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        radius = rng.uniform(4, 12, (count, points, 1)) * 1.15
-        outline = centre + radius * ring
-    else:
-        points = 3 * stroke_cubics + 1
-        direction = rng.uniform(0, 2 * np.pi, (count, 1, 1))
-        along = np.linspace(-14, 14, points)[None, :, None]
-        outline = centre + along * np.concatenate([np.cos(direction), np.sin(direction)], axis=2)
-        outline = outline + rng.normal(0, 2.0, outline.shape)
-    return Scene(
-        kind=kind,
-        width=width,
-        height=height,
-        points=outline.astype(np.float32),
-        colors=rng.uniform(0.05, 0.95, (count, 3)).astype(np.float32),
-        opacities=rng.uniform(0.4, 0.95, (count, opacity_count)).astype(np.float32),
-        widths=(rng.uniform(1.5, 7, count) if kind == "open" else np.zeros(count)).astype(np.float32),
-        background=np.array([0.2, 0.5, 0.7], np.float32),
+    centre = rng.uniform(0, 1, (count, 1, 2)) * np.array([width, height])
+    outlines = _blobs if kind == Kind.FILL else _strokes
+    points = outlines(rng, centre, cubics or (FILL_CUBICS if kind == Kind.FILL else STROKE_CUBICS))
+    colors = rng.uniform(0.05, 0.95, (count, 3))
+    opacities = rng.uniform(0.4, 0.95, count)
+    widths = rng.uniform(1.5, 7, count) if kind == Kind.STROKE else np.zeros(count)
+    return Scene.uniform(
+        kind,
+        canvas(width, height),
+        points.astype(np.float32),
+        colors=colors.astype(np.float32),
+        opacities=opacities.astype(np.float32),
+        widths=widths.astype(np.float32),
     )
 
 
-def disc(radius: float, size: int, centre: float, chain_cubics: int = 2) -> Scene:
-    """One white, opaque disc on black; four-point circle approximations of cubics."""
-    n = 2 * chain_cubics
-    k = 4 / 3 * np.tan(np.pi / (2 * n))
+def _blobs(rng: np.random.Generator, centre: np.ndarray, cubics: int) -> np.ndarray:
+    count = 3 * cubics
+    angle = 2 * np.pi * np.arange(count) / count
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return centre + rng.uniform(4, 12, (len(centre), count, 1)) * 1.15 * ring
+
+
+def _strokes(rng: np.random.Generator, centre: np.ndarray, cubics: int) -> np.ndarray:
+    direction = rng.uniform(0, 2 * np.pi, (len(centre), 1, 1))
+    along = np.linspace(-14, 14, 3 * cubics + 1)[None, :, None]
+    line = centre + along * np.concatenate([np.cos(direction), np.sin(direction)], axis=2)
+    return line + rng.normal(0, 2.0, line.shape)
+
+
+def ragged_scene(
+    shapes: Sequence[tuple[Kind, int]], width: int = 40, height: int = 36, *, seed: int = 0
+) -> Scene:
+    """One random shape for each kind and number of cubics, the first furthest back."""
+    scene = random_scene(Kind.FILL, 0, width, height)
+    for i, (kind, cubics) in enumerate(shapes):
+        scene = scene.append(random_scene(kind, 1, width, height, seed=100 * seed + i, cubics=cubics))
+    return scene
+
+
+MIXED = (
+    (Kind.FILL, 4),
+    (Kind.STROKE, 3),
+    (Kind.STROKE, 1),
+    (Kind.FILL, 2),
+    (Kind.STROKE, 5),
+    (Kind.FILL, 6),
+    (Kind.STROKE, 2),
+    (Kind.FILL, 4),
+)
+"""Fills and strokes by turns, of different numbers of cubics; the fills' are even, as splats need."""
+
+
+def mixed_scene(width: int = 40, height: int = 36, *, seed: int = 0) -> Scene:
+    return ragged_scene(MIXED, width, height, seed=seed)
+
+
+def with_points(scene: Scene, points: FloatArray) -> FloatArray:
+    """Points of alike shapes (shape, point, 2), as the scene has them."""
+    return np.ascontiguousarray(points, np.float32).reshape(scene.points.shape)
+
+
+def points_by_shape(scene: Scene) -> FloatArray:
+    """Of a scene of alike shapes: (shape, point, 2), a copy."""
+    ((_, _, points),) = scene.alike()
+    return points.copy()
+
+
+def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> Scene:
+    """One white, opaque disc on black, a ring of cubics."""
+    k = 4 / 3 * np.tan(np.pi / (2 * cubics))
     points = []
-    for i in range(n):
-        a, b = 2 * np.pi * i / n, 2 * np.pi * (i + 1) / n
+    for i in range(cubics):
+        a, b = 2 * np.pi * i / cubics, 2 * np.pi * (i + 1) / cubics
         p0, p3 = np.array([np.cos(a), np.sin(a)]), np.array([np.cos(b), np.sin(b)])
         points += [p0, p0 + k * np.array([-p0[1], p0[0]]), p3 - k * np.array([-p3[1], p3[0]])]
-    return Scene(
-        kind="closed",
-        width=size,
-        height=size,
-        points=(np.array(points)[None] * radius + centre).astype(np.float32),
+    return Scene.uniform(
+        Kind.FILL,
+        Canvas(size, size, np.zeros(3, np.float32)),
+        (np.array(points)[None] * radius + centre).astype(np.float32),
         colors=np.ones((1, 3), np.float32),
-        opacities=np.ones((1, 1), np.float32),
-        widths=np.zeros(1, np.float32),
-        background=np.zeros(3, np.float32),
+        opacities=np.ones(1, np.float32),
     )

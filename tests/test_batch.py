@@ -13,11 +13,12 @@ from PIL import Image
 import warpsplat.configs
 from tests.scenes import random_scene
 from tests.test_cli import run
-from warpsplat.batch import MAX_FILE, load_jobs
-from warpsplat.config import make_settings
 from warpsplat.errors import UsageError
-from warpsplat.pipeline import job_key
-from warpsplat.svg import write_svg
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.plan import MAX_FILE, load_jobs
+from warpsplat.jobs.vectorize import job_key
+from warpsplat.scene import Kind
+from warpsplat.svg.write import write_svg
 
 
 @pytest.fixture
@@ -59,7 +60,7 @@ jobs:
         ("in/deep/c.png", "other/c.svg"),
         ("in/broken.png", "other/broken.svg"),
     ]
-    assert [j.settings.kind for j in jobs] == ["closed"] * 3 + ["open"] * 2
+    assert [j.settings.kind for j in jobs] == [Kind.FILL] * 3 + [Kind.STROKE] * 2
     assert [j.settings.curves for j in jobs] == [9, 9, 9, 5, 5]
     assert jobs[3].settings.iterations == make_settings("draft").iterations
     assert {j.device for j in jobs} == {"cpu"}
@@ -246,7 +247,7 @@ def test_whatever_an_image_throws_is_its_own_failure(
             raise error
         return np.full((24, 32, 3), 0.5, np.float32)
 
-    monkeypatch.setattr("warpsplat.pipeline.load_image", load)
+    monkeypatch.setattr("warpsplat.jobs.vectorize.load_image", load)
     text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
     assert run("batch", write(folder, text), "--json") == 5
     captured = capsys.readouterr()
@@ -291,7 +292,7 @@ def test_a_result_folder_that_cannot_be_written_is_found_before(
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("warpsplat.files._temporary", refuse)
+    monkeypatch.setattr("warpsplat.files.output._temporary", refuse)
     path = write(folder, "defaults:\n  output: out\njobs:\n  - images: in/a.png\n")
     (folder / "out").mkdir()
     assert run("batch", path) == 2
@@ -308,7 +309,7 @@ def test_a_result_that_was_cut_short_is_not_done(folder: Path, size: int) -> Non
     job = load_jobs(write(folder, "jobs: [{images: in/a.png, curves: 9, iterations: 3, device: cpu}]"))[0]
     data = job.image.read_bytes()
     key = job_key(job.settings, data)
-    whole = write_svg(random_scene("closed", count=9, width=32, height=24), metadata=f"key={key}").encode()
+    whole = write_svg(random_scene(Kind.FILL, count=9, width=32, height=24), metadata=f"key={key}").encode()
     job.output.write_bytes(whole)
     assert job.done(data)
     assert not job.done(data + b" "), "another image"

@@ -18,20 +18,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import warp as wp
 from PIL import Image
 
 from tests.test_image import bad_files
 from warpsplat import __version__
 from warpsplat.cli.main import main
 from warpsplat.cli.run import _quality, time_left
-from warpsplat.config import make_settings
 from warpsplat.errors import CapacityError
-from warpsplat.launch import THREADS_PER_CORE, available_cores
+from warpsplat.fit.loop import Progress
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import psnr
-from warpsplat.pipeline import vectorize
-from warpsplat.train import Progress
-from warpsplat.viewer import on_white, render_svg
+from warpsplat.render.backend import THREADS_PER_CORE, Backend, available_cores
+from warpsplat.svg.viewer import on_white, render_svg
 
 QUICK = ["--curves", "8", "--iterations", "12", "--device", "cpu"]
 
@@ -339,7 +338,7 @@ def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
     values = json.loads(capsys.readouterr().out)
     assert values["threads"] == 2
     assert values["pairs"] > 6
-    assert set(values["stages"]) == {"sample", "bin", "forward", "loss", "backward", "update"}
+    assert set(values["stages"]) == {"outline", "bins", "forward", "loss", "backward", "update"}
     step = values["step"]
     assert 0 < step["low"] <= step["median"] <= step["high"]
 
@@ -491,7 +490,7 @@ def test_whatever_is_raised_is_one_line_and_a_code(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("warpsplat.pipeline.Trainer", fail)
+    monkeypatch.setattr("warpsplat.jobs.vectorize.fit", fail)
     assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
     assert words in one_line(capsys.readouterr().err)
     monkeypatch.setenv("WARPSPLAT_TRACEBACK", "1")
@@ -509,7 +508,7 @@ def test_the_bar_weighs_steps_and_shows_no_decibels_that_fall(image: Path) -> No
     settings = make_settings(curves=6, iterations=100, coarse=0.5, coarse_pixels=600)
     seen: list[Progress] = []
     target = np.full((40, 60, 3), 0.5, np.float32)
-    vectorize(target, settings, wp.get_device("cpu"), report=seen.append)
+    vectorize(target, settings, Backend.on("cpu"), report=seen.append)
     assert [p.fine for p in seen] == [False] * 5 + [True] * 5
     coarse, fine = 600, 2400
     assert seen[4].work == pytest.approx(coarse / (coarse + fine), abs=0.01)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from warpsplat.config import PRESETS, Settings, make_settings, parse_bytes, parse_duration
 from warpsplat.errors import UsageError
+from warpsplat.fit.settings import PRESETS, Settings, make_settings, parse_bytes, parse_duration
+from warpsplat.scene import Kind
 
 
 def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
@@ -55,8 +56,8 @@ def test_fingerprint_sees_every_setting() -> None:
     assert base.fingerprint() == Settings().fingerprint()
     others = [
         replace(base, seed=1),
-        replace(base, rates=replace(base.rates, points=7.0)),
-        replace(base, kind="open"),
+        replace(base, rates={**base.rates, "points": 7.0}),
+        replace(base, kind=Kind.STROKE),
     ]
     assert len({s.fingerprint() for s in (base, *others)}) == 4
 

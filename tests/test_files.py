@@ -13,10 +13,11 @@ import pytest
 from PIL import Image
 
 from tests.scenes import random_scene
-from warpsplat import files
 from warpsplat.errors import OutputError, UsageError
-from warpsplat.files import check_output, mark_png, write_atomically
-from warpsplat.svg import write_svg
+from warpsplat.files import output as files
+from warpsplat.files.output import check_output, mark_png, write_atomically
+from warpsplat.scene import Kind
+from warpsplat.svg.write import write_svg
 
 
 def test_writes_and_replaces(tmp_path: Path) -> None:
@@ -143,7 +144,7 @@ def test_names_that_cannot_be_files(tmp_path: Path) -> None:
 
 def test_what_may_be_replaced(tmp_path: Path) -> None:
     path = tmp_path / "a.svg"
-    ours = write_svg(random_scene("closed", count=3, width=40, height=30)).encode()
+    ours = write_svg(random_scene(Kind.FILL, count=3, width=40, height=30)).encode()
     drawn = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
     cases = {"missing": None, "empty": b"", "ours": ours, "drawn": drawn}
     for name, data in cases.items():

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from warpsplat.errors import ImageError
-from warpsplat.image import load_image
+from warpsplat.files.image import load_image
 
 RNG = np.random.default_rng(0)
 RGB = RNG.integers(0, 256, (20, 33, 3), dtype=np.uint8)
@@ -118,7 +118,7 @@ def test_decompression_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     path = save(tmp_path, Image.fromarray(RGB), "a.png")
     before = Image.MAX_IMAGE_PIXELS
     for limit in (400, 100):  # a warning of Pillow's at the first, an error at the second
-        monkeypatch.setattr("warpsplat.image.MAX_PIXELS", limit)
+        monkeypatch.setattr("warpsplat.files.image.MAX_PIXELS", limit)
         with pytest.raises(ImageError, match="too large: more than"):
             load_image(path)
     assert before == Image.MAX_IMAGE_PIXELS
@@ -143,7 +143,7 @@ def test_strips_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     images = [Image.fromarray(RGB), Image.fromarray(rgba), Image.fromarray(RGB).quantize(16), deep]
     paths = [save(tmp_path, image, f"{i}.png") for i, image in enumerate(images)]
     whole = [load_image(path) for path in paths]
-    monkeypatch.setattr("warpsplat.image.STRIP_PIXELS", 7 * 33)
+    monkeypatch.setattr("warpsplat.files.image.STRIP_PIXELS", 7 * 33)
     for path, pixels in zip(paths, whole, strict=True):
         np.testing.assert_array_equal(load_image(path), pixels)
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpsplat import kernel_cache
 from warpsplat.errors import ResourceError
-from warpsplat.kernel_cache import CHECKSUMS, load
+from warpsplat.render import kernel_cache
+from warpsplat.render.kernel_cache import CHECKSUMS, load
 
 
 @wp.kernel

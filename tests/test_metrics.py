@@ -9,12 +9,13 @@ import pytest
 from PIL import Image
 
 from tests.scenes import random_scene
-from warpsplat import strips
 from warpsplat.errors import ImageError, Stopped
-from warpsplat.inspect_svg import inspect_svg
 from warpsplat.metrics import ms_ssim, psnr, score_svg, ssim
-from warpsplat.svg import write_svg
-from warpsplat.viewer import on_white, render_svg
+from warpsplat.scene import Kind
+from warpsplat.svg import strips
+from warpsplat.svg.inspect import inspect_svg
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
 
 
 def test_psnr() -> None:
@@ -84,7 +85,7 @@ def test_white_behind_transparency() -> None:
 
 
 def test_score() -> None:
-    scene = random_scene("closed", count=5)
+    scene = random_scene(Kind.FILL, count=5)
     text = write_svg(scene)
     target = (on_white(render_svg(text)) / 255).astype(np.float32)
     score = score_svg(text, target)
@@ -115,7 +116,7 @@ def by_the_book(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
 
 
 def scored_scene() -> tuple[str, np.ndarray]:
-    scene = random_scene("closed", count=40, width=371, height=357)
+    scene = random_scene(Kind.FILL, count=40, width=371, height=357)
     big = replace(scene, points=(2 * scene.points).astype(np.float32))
     noise = np.random.default_rng(2).normal(0, 0.05, (357, 371, 3))
     text = write_svg(big)
@@ -175,7 +176,7 @@ def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_memory_of_a_score_is_bounded() -> None:
     """Beside the image less than 30 bytes a pixel; drawing is not seen by ``tracemalloc``."""
-    text = write_svg(random_scene("closed", width=2000, height=1500))
+    text = write_svg(random_scene(Kind.FILL, width=2000, height=1500))
     target = np.zeros((1500, 2000, 3), np.float32)
     tracemalloc.start()
     try:

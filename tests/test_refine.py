@@ -9,18 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import warp as wp
 from PIL import Image
 
 from tests.scenes import random_scene
 from tests.test_cli import one_line, run
-from warpsplat.config import make_settings
 from warpsplat.errors import ImageError
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.refine import refine
 from warpsplat.metrics import psnr, score_svg
-from warpsplat.refine import load_scene, refine
-from warpsplat.render import render
-from warpsplat.svg import write_svg
-from warpsplat.viewer import on_white, render_svg
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+from warpsplat.scene import Kind
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" '
 FOREIGN = {
@@ -56,7 +58,7 @@ def test_foreign_files_look_the_same(name: str) -> None:
     scene, _ = load_scene(text, 40, 30, name)
     shown = on_white(render_svg(text, width=40, height=30))
     # Strokes: resvg's own anti-aliasing has 16 levels, and much of so small an image is edge.
-    assert psnr(render(scene, device="cpu").astype(np.float64) * 255, shown) > (
+    assert psnr(render(scene, backend=Backend.on("cpu")).astype(np.float64) * 255, shown) > (
         34 if "stroke" in name else 38
     )
     assert psnr(on_white(render_svg(write_svg(scene, precision=3))), shown) > 38
@@ -168,22 +170,12 @@ def test_hostile_path_data_is_read_in_linear_time() -> None:
             load_scene(f'{HEAD}width="40" height="30"><path d="{data}"/><text/></svg>', 40, 30, "a.svg")
 
 
-def test_padding_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.refine.MAX_PADDED", 3000)
-    small = '<path d="M1 1h9v9z"/>' * 9
-    text = f'{HEAD}width="40" height="30"><path d="M0 0{"h1v1" * 50}z"/>{small}</svg>'
-    with pytest.raises(ImageError, match=r"10 paths .* 303 points"):
-        load_scene(text, 40, 30, "a.svg")
-
-
 def test_nothing_is_added(device: str) -> None:
     """A file without a background gets none; one with a background keeps it."""
     target = np.full((30, 40, 3), 0.4, np.float32)
     for behind in ("", '<rect width="40" height="30" fill="#ccc"/>'):
         text = f'{HEAD}width="40" height="30">{behind}<path d="M5 5H35V25Z" fill="red"/></svg>'
-        result, before = refine(
-            text, target, make_settings(iterations=10), wp.get_device(device), name="a.svg"
-        )
+        result, before = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
         assert result.score and result.score.psnr > before
         assert result.svg.count("<rect") == (1 if behind else 0)
         assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
@@ -215,26 +207,26 @@ def test_outputs_and_standard_streams(
 
 
 def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
-    scene = random_scene("closed", count=6, width=48, height=40, seed=2)
-    target = render(scene, device=device)
+    scene = random_scene(Kind.FILL, count=6, width=48, height=40, seed=2)
+    target = render(scene, backend=Backend.on(device))
     rng = np.random.default_rng(0)
     moved = replace(scene, points=scene.points + rng.normal(0, 1, scene.points.shape).astype(np.float32))
     text = write_svg(moved)
-    result, before = refine(text, target, make_settings(iterations=120), wp.get_device(device), name="a.svg")
+    result, before = refine(text, target, make_settings(iterations=120), Backend.on(device), name="a.svg")
     assert result.score
     assert result.score.psnr > before + 4
     assert result.score.paths == 6
     assert result.score.nodes <= 6 * 6
 
 
-def test_padding_is_not_exported(device: str) -> None:
+def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
     text = (
         HEAD
         + 'width="40" height="30"><path d="M5 5H35V25Z"/>'
         + ('<path d="M9 9h2v2h2v2h2v2h2v2h-10z" fill="red"/></svg>')
     )
     target = np.full((30, 40, 3), 0.4, np.float32)
-    result, _ = refine(text, target, make_settings(iterations=10), wp.get_device(device), name="a.svg")
+    result, _ = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
     assert result.score
     assert result.score.nodes <= 20
 
@@ -242,7 +234,7 @@ def test_padding_is_not_exported(device: str) -> None:
 def test_no_improvement_changes_nothing(device: str) -> None:
     text = HEAD + FOREIGN["lines"]
     target = (on_white(render_svg(text)) / 255).astype(np.float32)
-    result, _ = refine(text, target, make_settings(iterations=5), wp.get_device(device), name="a.svg")
+    result, _ = refine(text, target, make_settings(iterations=5), Backend.on(device), name="a.svg")
     assert result.svg == text
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from warpsplat.viewer import render_svg
+from warpsplat.svg.viewer import render_svg
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
@@ -28,35 +28,35 @@ class Finder:
 sys.meta_path.insert(0, Finder())
 """,
     "reading": """
-import warpsplat.inputs
-strike_in(warpsplat.inputs, "read_input")
+import warpsplat.files.inputs
+strike_in(warpsplat.files.inputs, "read_input")
 """,
     "reading the second input": """
-import warpsplat.inputs
-strike_in(warpsplat.inputs, "read_input", 2)
+import warpsplat.files.inputs
+strike_in(warpsplat.files.inputs, "read_input", 2)
 """,
     "compiling": """
 import warp
 strike_in(warp, "load_module")
 """,
     "training": """
-from warpsplat.train import Trainer
-strike_in(Trainer, "advance", 5)
+from warpsplat.fit.step import Step
+strike_in(Step, "advance", 5)
 """,
     "writing": """
 strike_in(os, "fsync")
 """,
     "scoring": """
-import warpsplat.pipeline
-strike_in(warpsplat.pipeline, "score_svg")
+import warpsplat.jobs.vectorize
+strike_in(warpsplat.jobs.vectorize, "score_svg")
 """,
     "writing, twice": """
 strike_in(os, "fsync", times=2)
 """,
     "training, ignored": """
 import signal
-from warpsplat.train import Trainer
-strike_in(Trainer, "advance", 5)
+from warpsplat.fit.step import Step
+strike_in(Step, "advance", 5)
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 """,
 }

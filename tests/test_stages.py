@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from tests.forks import MOMENTS, QUICK, ROOT, Forks, Task, make_image
-from warpsplat.viewer import render_svg
+from warpsplat.svg.viewer import render_svg
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 GENTLE = [signal.SIGINT, signal.SIGTERM]

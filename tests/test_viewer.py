@@ -13,12 +13,12 @@ from PIL import Image
 
 from tests.scenes import disc
 from tests.test_cli import one_line, run
-from warpsplat import inspect_svg as inspect_module
-from warpsplat import viewer
 from warpsplat.errors import ImageError
-from warpsplat.inspect_svg import MAX_DEPTH, inspect_svg, path_nodes, read_svg_text, svg_size
-from warpsplat.svg import write_svg
-from warpsplat.viewer import draw_png, on_white, render_own, render_svg
+from warpsplat.svg import inspect as inspect_module
+from warpsplat.svg import viewer
+from warpsplat.svg.inspect import MAX_DEPTH, inspect_svg, path_nodes, read_svg_text, svg_size
+from warpsplat.svg.viewer import draw_png, on_white, render_own, render_svg
+from warpsplat.svg.write import write_svg
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" '
 SMALL = HEAD + 'width="40" height="30">'
@@ -137,7 +137,7 @@ def test_size_is_what_the_viewer_makes(attributes: str) -> None:
     ],
 )
 def test_absurd_sizes_are_refused_before_drawing(attributes: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.viewer.subprocess.run", None)
+    monkeypatch.setattr("warpsplat.svg.viewer.subprocess.run", None)
     with pytest.raises(ImageError, match=r"million|not positive"):
         draw_png(f"{HEAD}{attributes}>{PATH}</svg>")
 

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.inspect_svg import inspect_svg
-from warpsplat.strips import Bytes, Stop, check, draw, rows_of
+from warpsplat.svg.inspect import inspect_svg
+from warpsplat.svg.strips import Bytes, Stop, check, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
 Planes = Iterable[tuple[Floats, Floats]]

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from tests.forks import ROOT, make_image
 from warpsplat.errors import WarpsplatError
-from warpsplat.viewer import render_svg
+from warpsplat.svg.viewer import render_svg
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 SETTINGS = {"curves": "24", "iterations": "400", "device": "cpu"}

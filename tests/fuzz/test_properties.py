@@ -20,15 +20,15 @@ from PIL import Image
 
 from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
-from warpsplat.batch import KEYS, load_jobs
-from warpsplat.config import Settings, make_settings, parse_bytes, parse_duration
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
-from warpsplat.files import check_output, write_atomically
-from warpsplat.image import load_image
+from warpsplat.files.image import load_image
+from warpsplat.files.output import check_output, write_atomically
+from warpsplat.fit.settings import Settings, make_settings, parse_bytes, parse_duration
+from warpsplat.jobs.plan import KEYS, load_jobs
 from warpsplat.metrics import psnr
-from warpsplat.refine import load_scene
-from warpsplat.svg import write_svg
-from warpsplat.viewer import on_white, render_own
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import on_white, render_own
+from warpsplat.svg.write import write_svg
 
 
 def examples(count: int) -> Callable[[Any], Any]:

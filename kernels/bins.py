@@ -1,0 +1,171 @@
+"""Tile binning: which shapes cover which tiles, front to back.
+
+Slots are emitted shape by shape from the front, then sorted by tile. The sort is stable, so each tile's list
+comes out in depth order without depth in the key.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.paint.flat import shape_paint
+from warpsplat.kernels.ranges import find_range
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+TILE = wp.constant(constants.TILE)
+INT_MAX = wp.constant(constants.INT_MAX)
+TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
+COVERED = wp.constant(constants.COVERED)
+FULL = wp.constant(constants.FULL)
+HIDDEN = wp.constant(constants.HIDDEN)
+
+
+@wp.kernel
+def rectangles(
+    # In:
+    offset: wp.int32,
+    sample_first: wp.array[wp.int32],  # [shape_count] vertices or Gaussians
+    sample_last: wp.array[wp.int32],  # [shape_count]
+    position: wp.array[wp.vec2],  # [sample_capacity] px
+    extent: wp.array[wp.vec2],  # [sample_capacity] px
+    tiles_x: wp.int32,
+    tiles_y: wp.int32,
+    # Out:
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4] tile rectangle x0, y0, x1, y1, ends excluded
+    front_slots: wp.array[wp.int32],  # [shape_count] tiles in it, indexed from the front
+):
+    """Tiles that the boxes of a shape's samples reach, clamped to the canvas."""
+    shape = offset + wp.tid()
+    low = wp.vec2(1.0e9, 1.0e9)
+    high = wp.vec2(-1.0e9, -1.0e9)
+    for i in range(sample_first[shape], sample_last[shape]):
+        low = wp.min(low, position[i] - extent[i])
+        high = wp.max(high, position[i] + extent[i])
+    x0 = int(0)
+    y0 = int(0)
+    x1 = int(0)
+    y1 = int(0)
+    # Written so that NaN positions give an empty rectangle.
+    if high[0] > 0.0 and high[1] > 0.0 and low[0] < float(TILE * tiles_x) and low[1] < float(TILE * tiles_y):
+        x0 = int(wp.max(low[0], 0.0)) / TILE
+        y0 = int(wp.max(low[1], 0.0)) / TILE
+        x1 = wp.min(int(wp.min(high[0], 1.0e8)) / TILE + 1, tiles_x)
+        y1 = wp.min(int(wp.min(high[1], 1.0e8)) / TILE + 1, tiles_y)
+    shape_tiles[shape, 0] = x0
+    shape_tiles[shape, 1] = y0
+    shape_tiles[shape, 2] = x1
+    shape_tiles[shape, 3] = y1
+    front_slots[shape_tiles.shape[0] - 1 - shape] = wp.max(x1 - x0, 0) * wp.max(y1 - y0, 0)
+
+
+@wp.kernel
+def fill_slots(
+    # In:
+    offset: wp.int32,
+    front_ends: wp.array[wp.int32],  # [shape_count] inclusive prefix sum of front_slots
+    slot_first: wp.array[wp.int32],  # [shape_count] by shape
+    slot_last: wp.array[wp.int32],  # [shape_count] by shape
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    tiles_x: wp.int32,
+    # Out:
+    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_tile: wp.array[wp.int32],  # [slot_capacity]
+    slot_state: wp.array[wp.int32],  # [slot_capacity] 0
+    sort_keys: wp.array[wp.int32],  # [2 x slot_capacity] the tile; the second half is the sort's scratch
+    sort_slots: wp.array[wp.int32],  # [2 x slot_capacity]
+):
+    """One thread a slot: its shape and tile, as sort key and value."""
+    slot = offset + wp.tid()
+    shape_count = front_ends.shape[0]
+    front = find_range(front_ends, shape_count, slot)
+    shape = int(-1)
+    tile = int(INT_MAX)
+    if front < shape_count:
+        candidate = shape_count - 1 - front
+        if slot < slot_last[candidate]:
+            shape = candidate
+            width = shape_tiles[shape, 2] - shape_tiles[shape, 0]
+            local = slot - slot_first[shape]
+            tile = (shape_tiles[shape, 1] + local / width) * tiles_x + shape_tiles[shape, 0] + local % width
+    slot_shape[slot] = shape
+    slot_tile[slot] = tile
+    slot_state[slot] = 0
+    sort_keys[slot] = tile
+    sort_slots[slot] = slot
+
+
+@wp.kernel
+def clear_ranges(
+    # In:
+    offset: wp.int32,
+    # Out:
+    tile_first: wp.array[wp.int32],  # [tile_count]
+    tile_last: wp.array[wp.int32],  # [tile_count]
+):
+    """Tiles that nothing reaches keep an empty range."""
+    tile = offset + wp.tid()
+    tile_first[tile] = 0
+    tile_last[tile] = 0
+
+
+@wp.kernel
+def tile_ranges(
+    # In:
+    offset: wp.int32,
+    sort_keys: wp.array[wp.int32],  # [2 x slot_capacity] sorted
+    slot_capacity: wp.int32,
+    # Out:
+    tile_first: wp.array[wp.int32],  # [tile_count] range of each tile in the sorted list
+    tile_last: wp.array[wp.int32],  # [tile_count]
+):
+    """A thread at each border between two keys writes the one's end and the other's start."""
+    i = offset + wp.tid()
+    tile = sort_keys[i]
+    if tile == INT_MAX:
+        return
+    before = int(-1)
+    if i > 0:
+        before = sort_keys[i - 1]
+    after = int(INT_MAX)
+    if i + 1 < slot_capacity:
+        after = sort_keys[i + 1]
+    if before != tile:
+        tile_first[tile] = i
+    if after != tile:
+        tile_last[tile] = i + 1
+
+
+@wp.kernel
+def list_visible(
+    # In:
+    offset: wp.int32,
+    sort_slots: wp.array[wp.int32],  # [2 x slot_capacity] slots by tile, front to back
+    slot_shape: wp.array[wp.int32],  # [slot_capacity]
+    colors: wp.array[wp.vec3],  # [shape_count]
+    opacities: wp.array[wp.float32],  # [shape_count]
+    tile_first: wp.array[wp.int32],  # [tile_count]
+    tile_last: wp.array[wp.int32],  # [tile_count]
+    # Out:
+    slot_state: wp.array[wp.int32],  # [slot_capacity] HIDDEN added
+    tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
+    list_slot: wp.array[wp.int32],  # [slot_capacity] slot, or -1 - slot of a FULL one
+    list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
+):
+    """Each tile's slots that can be seen: covered, and not behind so many FULL ones that no light is left."""
+    tile = offset + wp.tid()
+    light = float(1.0)
+    n = tile_first[tile]
+    for k in range(tile_first[tile], tile_last[tile]):
+        slot = sort_slots[k]
+        state = slot_state[slot]
+        if light <= TRANSMITTANCE_MIN:
+            slot_state[slot] = state | HIDDEN
+        elif state & COVERED != 0:
+            shape = slot_shape[slot]
+            list_paint[n] = shape_paint(colors, opacities, shape)
+            list_slot[n] = slot
+            if state == FULL:
+                list_slot[n] = -1 - slot
+                light *= 1.0 - opacities[shape]
+            n += 1
+    tile_stop[tile] = n

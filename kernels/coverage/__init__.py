@@ -1,0 +1,1 @@
+"""Models of coverage: how much of each pixel a shape covers."""

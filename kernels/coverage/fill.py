@@ -1,0 +1,428 @@
+"""Polygons -> exact coverage, and the adjoint.
+
+The winding-weighted area of a polygon in each pixel is summed up edge by edge as font rasterisers do: a piece
+of an edge inside one pixel adds its height to all pixels on its right, and to its own pixel the share of it
+right of the piece. What is stored is that sum, clamped to [-1, 1]; its magnitude is the coverage of a
+non-zero fill. No samples: a straight edge's coverage is the exact area.
+
+Adjoint: a piece with extent (dx, dy), moved by v, changes its pixel's area by dx v_y - dy v_x and no other
+pixel's. An edge's ends take (1 - s) and s of it, s the edge's parameter at the middle of the piece.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.coverage.rows import tile_row
+from warpsplat.kernels.tile import column
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+FILL = wp.constant(constants.FILL)
+TILE = wp.constant(constants.TILE)
+FULL = wp.constant(constants.FULL)
+PARTIAL = wp.constant(constants.PARTIAL)
+UNCOVERED = wp.constant(constants.UNCOVERED)
+FLAT = wp.constant(1.0e-30)  # [px] an edge that rises less is horizontal: its slope would not be finite
+MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
+MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as touching it
+
+
+@wp.func
+def next_vertex(i: wp.int32, vertex_first: wp.int32, vertex_last: wp.int32) -> wp.int32:
+    """The vertex after ``i`` in its ring."""
+    if i + 1 == vertex_last:
+        return vertex_first
+    return i + 1
+
+
+@wp.func
+def tile_of(x: wp.float32, wide: wp.int32) -> wp.int32:
+    """Tile of ``x`` px right of the shape's tiles' left border: -1 left of them, ``wide`` right of them."""
+    return int(wp.floor(wp.clamp(x, -1.0, float(TILE * wide)) / float(TILE)))
+
+
+@wp.func
+def cut_to_row(a: wp.vec2, b: wp.vec2, low: wp.float32, high: wp.float32) -> wp.vec2:
+    """The x at which an edge from ``a`` to ``b`` starts and ends between two heights that it reaches."""
+    if wp.abs(a[1] - b[1]) <= FLAT:
+        return wp.vec2(a[0], b[0])
+    slope = (b[0] - a[0]) / (b[1] - a[1])
+    return wp.vec2(
+        a[0] + slope * (wp.clamp(a[1], low, high) - a[1]), a[0] + slope * (wp.clamp(b[1], low, high) - a[1])
+    )
+
+
+@wp.func
+def crossing(a: wp.vec2, b: wp.vec2, y: wp.float32) -> wp.int32:
+    """1 where an edge crosses height ``y`` downwards, -1 upwards, 0 where it does not."""
+    if wp.abs(a[1] - b[1]) <= FLAT:
+        return 0
+    if a[1] <= y and b[1] > y:
+        return 1
+    if b[1] <= y and a[1] > y:
+        return -1
+    return 0
+
+
+@wp.kernel
+def fill_states(
+    # In:
+    offset: wp.int32,
+    kind: wp.array[wp.int32],  # [shape_count]
+    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    # Out:
+    slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
+    slot_winding: wp.array[wp.int32],  # [slot_capacity] of slots that no edge touches
+):
+    """One thread a row of tiles of a shape (that of its leftmost slot).
+
+    Slots that an edge touches are PARTIAL; in the others the winding number is the same everywhere: that on
+    a line through the middle of the row.
+    """
+    slot = offset + wp.tid()
+    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+    shape = row[0]
+    if shape < 0:
+        return
+    if kind[shape] != FILL:
+        return
+    wide = row[2]
+    low = float(TILE * row[3])
+    high = low + float(TILE)
+    left = float(TILE * row[1])
+    end = slot + wide
+    for s in range(slot, end):
+        slot_state[s] = 0
+        slot_winding[s] = 0
+    winding = int(0)
+    b = vertex[vertex_last[shape] - 1]
+    for j in range(vertex_first[shape], vertex_last[shape]):
+        a = b
+        b = vertex[j]
+        if wp.min(a[1], b[1]) <= high and wp.max(a[1], b[1]) >= low:
+            turn = crossing(a, b, low + MIDDLE)
+            if turn != 0:
+                slope = (b[0] - a[0]) / (b[1] - a[1])
+                s = slot + tile_of(a[0] + slope * (low + MIDDLE - a[1]) - left, wide)
+                if s < slot:
+                    winding += turn
+                elif s < end:
+                    slot_winding[s] = slot_winding[s] + turn
+            ends = cut_to_row(a, b, low, high)
+            s0 = wp.max(slot + tile_of(wp.min(ends[0], ends[1]) - MARGIN - left, wide), slot)
+            s1 = wp.min(slot + tile_of(wp.max(ends[0], ends[1]) + MARGIN - left, wide), end - 1)
+            for s in range(s0, s1 + 1):
+                slot_state[s] = PARTIAL
+    for s in range(slot, end):
+        winding += slot_winding[s]
+        slot_winding[s] = winding
+        if slot_state[s] != PARTIAL:
+            slot_state[s] = UNCOVERED
+            if winding != 0:
+                slot_state[s] = FULL
+
+
+@wp.func
+def add_area(pixels: wp.array2d[wp.float32], slot: wp.int32, x: wp.int32, row: wp.int32, value: wp.float32):
+    """Add to the pixel ``x`` right of the left border of ``slot``, in row ``row`` of its tile."""
+    s = slot + x / TILE
+    p = TILE * (x % TILE) + row
+    pixels[s, p] = pixels[s, p] + value
+
+
+@wp.func
+def add_piece(
+    pixels: wp.array2d[wp.float32],
+    slot: wp.int32,
+    row: wp.int32,
+    x0: wp.float32,
+    x1: wp.float32,
+    height: wp.float32,
+    width: wp.int32,
+):
+    """Add the area right of a piece of an edge that lies inside one row of pixels, in its own pixels and,
+    whole, in the first on its right; the prefix sum carries it on.
+
+    ``x0``, ``x1``: its ends, right of the left border of ``slot``; ``width``: of the row of tiles [px].
+    """
+    low = wp.clamp(wp.min(x0, x1), 0.0, float(width))
+    high = wp.min(wp.max(x0, x1), float(width))
+    index = int(low)
+    if low >= high:
+        # Vertical, or wholly left or right of the shape's tiles.
+        if index < width:
+            fraction = low - float(index)
+            add_area(pixels, slot, index, row, height * (1.0 - fraction))
+            if index + 1 < width:
+                add_area(pixels, slot, index + 1, row, height * fraction)
+        return
+    per_x = height / wp.abs(x1 - x0)
+    # What lies left of the shape's tiles acts at their left border.
+    outside = wp.max(-wp.min(x0, x1), 0.0) * per_x
+    if outside != 0.0:
+        add_area(pixels, slot, 0, row, outside)
+    at = low
+    while at < high:
+        edge = wp.min(float(index + 1), high)
+        piece = (edge - at) * per_x
+        fraction = 0.5 * (at + edge) - float(index)
+        add_area(pixels, slot, index, row, piece * (1.0 - fraction))
+        index += 1
+        if index < width:
+            add_area(pixels, slot, index, row, piece * fraction)
+        at = edge
+
+
+@wp.func
+def add_edge(
+    pixels: wp.array2d[wp.float32],
+    slot: wp.int32,
+    start: wp.vec2,
+    end: wp.vec2,
+    left: wp.float32,
+    width: wp.int32,
+    top: wp.int32,
+    row_first: wp.int32,
+    row_last: wp.int32,
+):
+    """Add an edge's areas in the pixel rows [row_first, row_last) of a row of tiles that starts at ``left``,
+    ``top``.
+    """
+    a = start
+    b = end
+    sign = float(1.0)
+    if start[1] > end[1]:
+        a = end
+        b = start
+        sign = -1.0
+    if b[1] > float(row_first) and a[1] < float(row_last) and b[1] - a[1] > FLAT:
+        slope = (b[0] - a[0]) / (b[1] - a[1])
+        y_top = wp.max(a[1], float(row_first))
+        y_bottom = wp.min(b[1], float(row_last))
+        y_last = wp.min(int(y_bottom), row_last - 1)
+        x_top = a[0] + (y_top - a[1]) * slope - left
+        for y in range(int(y_top), y_last + 1):
+            y_next = wp.min(float(y + 1), y_bottom)
+            dy = y_next - y_top
+            x_next = x_top + dy * slope
+            add_piece(pixels, slot, y - top, x_top, x_next, sign * dy, width)
+            x_top = x_next
+            y_top = y_next
+
+
+@wp.func
+def any_visible(slot_state: wp.array[wp.int32], first: wp.int32, last: wp.int32) -> wp.bool:
+    """Whether one of the slots [first, last) is PARTIAL and not HIDDEN."""
+    for s in range(first, last):
+        if slot_state[s] == PARTIAL:
+            return True
+    return False
+
+
+@wp.func
+def sum_columns(
+    coverage: wp.array2d[column],
+    slot_state: wp.array[wp.int32],
+    slot_winding: wp.array[wp.int32],
+    first: wp.int32,
+    last: wp.int32,
+):
+    """Prefix sums along the rows of the slots [first, last), clamped: 16 rows at a time."""
+    total = column(0.0)
+    one = column(1.0)
+    for s in range(first, last):
+        if slot_state[s] & PARTIAL == PARTIAL:
+            for x in range(TILE):
+                total = total + coverage[s, x]
+                coverage[s, x] = wp.min(wp.max(total, -one), one)
+        else:
+            total = float(slot_winding[s]) * one
+
+
+@wp.func
+def sum_row(
+    pixels: wp.array2d[wp.float32],
+    slot_state: wp.array[wp.int32],
+    slot_winding: wp.array[wp.int32],
+    first: wp.int32,
+    last: wp.int32,
+    row: wp.int32,
+):
+    """Prefix sums along one row of the slots [first, last), clamped."""
+    total = float(0.0)
+    for s in range(first, last):
+        if slot_state[s] & PARTIAL == PARTIAL:
+            for x in range(TILE):
+                total += pixels[s, TILE * x + row]
+                pixels[s, TILE * x + row] = wp.clamp(total, -1.0, 1.0)
+        else:
+            total = float(slot_winding[s])
+
+
+@wp.kernel
+def fill_forward(
+    # In:
+    offset: wp.int32,
+    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles: one, or all
+    kind: wp.array[wp.int32],  # [shape_count]
+    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    slot_winding: wp.array[wp.int32],  # [slot_capacity]
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    # Out:
+    coverage: wp.array2d[column],  # [slot_capacity, TILE] signed, in [-1, 1]
+    coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
+):
+    """One thread a row of tiles of a shape (that of its leftmost slot) and lane. Only slots that are PARTIAL
+    are written, and rows without a visible one are left out.
+    """
+    i, lane = wp.tid()
+    slot = offset + i
+    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+    shape = row[0]
+    if shape < 0:
+        return
+    if kind[shape] != FILL:
+        return
+    end = slot + row[2]
+    if not any_visible(slot_state, slot, end):
+        return
+    for s in range(slot, end):
+        if slot_state[s] & PARTIAL == PARTIAL:
+            for x in range(TILE):
+                if lane_rows == TILE:
+                    coverage[s, x] = column(0.0)
+                else:
+                    coverage_pixels[s, TILE * x + lane] = 0.0
+    top = TILE * row[3]
+    row_first = top + lane * lane_rows
+    left = float(TILE * row[1])
+    b = vertex[vertex_last[shape] - 1]
+    for j in range(vertex_first[shape], vertex_last[shape]):
+        a = b
+        b = vertex[j]
+        add_edge(coverage_pixels, slot, a, b, left, TILE * row[2], top, row_first, row_first + lane_rows)
+    if lane_rows == TILE:
+        sum_columns(coverage, slot_state, slot_winding, slot, end)
+    else:
+        sum_row(coverage_pixels, slot_state, slot_winding, slot, end, lane)
+
+
+@wp.func
+def inside_canvas(a: wp.vec2, d: wp.vec2, width: wp.int32, height: wp.int32) -> wp.vec2:
+    """Parameters between which the edge from ``a`` along ``d`` is inside the canvas; first > second: none."""
+    s = float(0.0)
+    s_end = float(1.0)
+    for axis in range(2):
+        size = float(width)
+        if axis == 1:
+            size = float(height)
+        if d[axis] != 0.0:
+            s0 = (0.0 - a[axis]) / d[axis]
+            s1 = (size - a[axis]) / d[axis]
+            s = wp.max(s, wp.min(s0, s1))
+            s_end = wp.min(s_end, wp.max(s0, s1))
+        elif a[axis] < 0.0 or a[axis] >= size:
+            s_end = -1.0
+    return wp.vec2(s, s_end)
+
+
+@wp.func
+def direction_of(d: wp.float32) -> wp.int32:
+    """1, -1 or 0: how the pixel's index changes along ``d``."""
+    if d == 0.0:
+        return 0
+    if d < 0.0:
+        return -1
+    return 1
+
+
+@wp.func
+def leaves_at(
+    pixel: wp.int32, step: wp.int32, a: wp.float32, inverse: wp.float32, s_end: wp.float32
+) -> wp.float32:
+    """Parameter at which an edge from ``a`` leaves ``pixel`` along an axis; ``s_end`` where it does not."""
+    if step == 0:
+        return s_end
+    return (float(pixel + (step + 1) / 2) - a) * inverse
+
+
+@wp.kernel
+def fill_backward(
+    # In:
+    offset: wp.int32,
+    width: wp.int32,  # px
+    height: wp.int32,  # px
+    kind: wp.array[wp.int32],  # [shape_count]
+    vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
+    vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the area, not clamped; by column
+    # Out:
+    start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts here
+    end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
+):
+    """One thread an edge, walking the pixels that it crosses."""
+    i = offset + wp.tid()
+    if i >= vertex_ends[vertex_ends.shape[0] - 1]:
+        return
+    shape = vertex_shape[i]
+    if kind[shape] != FILL or i < vertex_first[shape] or i >= vertex_last[shape]:
+        return
+    at_start = wp.vec2(0.0, 0.0)
+    at_end = wp.vec2(0.0, 0.0)
+    a = vertex[i]
+    d = vertex[next_vertex(i, vertex_first[shape], vertex_last[shape])] - a
+    if slot_last[shape] > slot_first[shape] and wp.abs(d[0]) + wp.abs(d[1]) > 0.0:
+        x0 = shape_tiles[shape, 0]
+        y0 = shape_tiles[shape, 1]
+        x1 = shape_tiles[shape, 2]
+        y1 = shape_tiles[shape, 3]
+        span = inside_canvas(a, d, width, height)
+        s = span[0]
+        s_end = span[1]
+        step_x = direction_of(d[0])
+        step_y = direction_of(d[1])
+        inverse_x = 1.0 / d[0]
+        inverse_y = 1.0 / d[1]
+        x = wp.clamp(int(wp.floor(a[0] + s * d[0])), 0, width - 1)
+        y = wp.clamp(int(wp.floor(a[1] + s * d[1])), 0, height - 1)
+        while s < s_end:
+            s_x = leaves_at(x, step_x, a[0], inverse_x, s_end)
+            s_y = leaves_at(y, step_y, a[1], inverse_y, s_end)
+            s_next = wp.max(wp.min(wp.min(s_x, s_y), s_end), s)
+            # Rounding may take the walk a pixel beyond the shape's tiles.
+            out = x < TILE * x0 or x >= TILE * x1 or y < TILE * y0 or y >= TILE * y1
+            slot = slot_first[shape] + (y / TILE - y0) * (x1 - x0) + x / TILE - x0
+            if not out and slot_state[slot] == PARTIAL:
+                g = sum_grad[slot, TILE * (x % TILE) + y % TILE] * (s_next - s)
+                move = wp.vec2(-d[1] * g, d[0] * g)
+                middle = 0.5 * (s + s_next)
+                at_start += (1.0 - middle) * move
+                at_end += middle * move
+            s = s_next
+            if s_y < s_x and s_y < s_end:
+                y += step_y
+            elif s_x < s_end:
+                x += step_x
+            else:
+                s = s_end
+            if x < 0 or x >= width or y < 0 or y >= height:
+                s = s_end
+    start_grad[i] = at_start
+    end_grad[i] = at_end

@@ -1,0 +1,201 @@
+"""Gaussians -> coverage of each slot, and the adjoint.
+
+Inside a shape all Gaussians share colour and opacity, so their order does not matter:
+coverage = 1 - prod_i (1 - g_i), g_i = min(exp(-q_i / 2), GAUSSIAN_MAX), cut at q > cut_i (paper eq. 9 with
+the opacity taken out of the product: it multiplies the coverage once, as fill-opacity does in the file).
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.coverage.rows import tile_row
+from warpsplat.kernels.tile import column, total
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+TILE = wp.constant(constants.TILE)
+PARTIAL = wp.constant(constants.PARTIAL)
+GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
+STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
+EXPONENT = wp.constant(-0.5 / 256.0)
+
+
+@wp.func
+def rows_of_tile() -> column:
+    """Distance of each row's centre from the top of a tile [px]."""
+    rows = column(0.0)
+    for r in range(TILE):
+        rows[r] = float(r) + 0.5
+    return rows
+
+
+@wp.func
+def gaussian_column(con: wp.vec3, dx: wp.float32, dy: column, c_dy: column, least: column) -> column:
+    """exp(-q / 2) at offsets (dx, dy) [px] from the mean, 0 beyond the cut.
+
+    exp(256 v) = exp(v)^256 with three terms of the series, which is right to 0.04 % where it is least, and
+    nothing but vector instructions. ``con`` comes multiplied by EXPONENT, so that q becomes v; ``c_dy`` is
+    its third entry times dy, ``least`` the v of the cut.
+    """
+    one = column(1.0)
+    v = wp.cw_mul(dy, c_dy + column(2.0 * con[1] * dx)) + column(con[0] * dx * dx)
+    within = wp.min(wp.max(STEEP * (v - least), column(0.0)), one)
+    e = one + wp.max(v, least)
+    e = 0.5 * (wp.cw_mul(e, e) + one)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    e = wp.cw_mul(e, e)
+    return wp.cw_mul(within, e)
+
+
+@wp.func
+def columns_within(mean: wp.float32, extent: wp.float32, first: wp.int32, last: wp.int32) -> wp.vec2i:
+    """Range of the pixel columns of [first, last) that a Gaussian reaches."""
+    start = wp.max(first, int(wp.ceil(wp.max(mean - extent, -1.0) - 0.5)))
+    return wp.vec2i(start, wp.min(last, int(wp.floor(wp.min(mean + extent, 1.0e8) + 0.5))))
+
+
+@wp.kernel
+def splat_forward(
+    # In:
+    offset: wp.int32,
+    lanes: wp.int32,  # each takes every lanes-th column
+    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+    conic: wp.array[wp.vec3],  # [gaussian_capacity]
+    extent: wp.array[wp.vec2],  # [gaussian_capacity] px
+    cut: wp.array[wp.float32],  # [gaussian_capacity] of q
+    # Out:
+    coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
+    slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
+):
+    """One thread a row of tiles of a shape (that of its leftmost slot) and lane."""
+    i, lane = wp.tid()
+    slot = offset + i
+    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+    shape = row[0]
+    if shape < 0:
+        return
+    left = TILE * row[1]
+    right = left + TILE * row[2]
+    top = float(TILE * row[3])
+    one = column(1.0)
+    most = column(GAUSSIAN_MAX)
+    rows = rows_of_tile()
+    for x in range(left + lane, right, lanes):
+        coverage[slot + (x - left) / TILE, (x - left) % TILE] = one
+    for j in range(gaussian_first[shape], gaussian_last[shape]):
+        m = mean[j]
+        e = extent[j]
+        if m[1] + e[1] >= top and m[1] - e[1] <= top + float(TILE):
+            xs = columns_within(m[0], e[0], left, right)
+            x = xs[0] + (lane + lanes - xs[0] % lanes) % lanes
+            if x < xs[1]:
+                con = EXPONENT * conic[j]
+                dy = rows + column(top - m[1])
+                c_dy = con[2] * dy
+                least = column(EXPONENT * cut[j])
+                while x < xs[1]:
+                    s = slot + (x - left) / TILE
+                    slot_state[s] = PARTIAL
+                    g = wp.min(gaussian_column(con, float(x) + 0.5 - m[0], dy, c_dy, least), most)
+                    k = (x - left) % TILE
+                    coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
+                    x += lanes
+    for x in range(left + lane, right, lanes):
+        s = slot + (x - left) / TILE
+        coverage[s, (x - left) % TILE] = one - coverage[s, (x - left) % TILE]
+
+
+@wp.func
+def gradient_of_q(g: column, sum_grad: column) -> column:
+    """-2 dL/dq of a column: the gradient of s times g / (1 - g), 0 where g is clamped."""
+    one = column(1.0)
+    most = column(GAUSSIAN_MAX)
+    below = wp.min(wp.max(STEEP * (most - g), column(0.0)), one)
+    return wp.cw_div(wp.cw_mul(sum_grad, wp.cw_mul(below, g)), one - wp.min(g, most))
+
+
+@wp.kernel
+def splat_backward(
+    # In:
+    offset: wp.int32,
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    mean: wp.array[wp.vec2],  # [gaussian_capacity]
+    conic: wp.array[wp.vec3],  # [gaussian_capacity]
+    extent: wp.array[wp.vec2],  # [gaussian_capacity]
+    cut: wp.array[wp.float32],  # [gaussian_capacity] of q
+    sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
+    # Out:
+    mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
+    conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] written
+):
+    """A gather, one thread a Gaussian, over the pixels it reaches.
+
+    s = -sum_i log(1 - g_i), ds / dg = 1 / (1 - g) and dg / dq = -g / 2 below the clamp; with h = dL/dq:
+    dL/d(a, b, c) = sum h (dx^2, 2 dx dy, dy^2), dL/d mean = -sum 2 h (a dx + b dy, b dx + c dy).
+    """
+    i = offset + wp.tid()
+    shape = gaussian_shape[i]
+    if shape < 0:
+        return
+    x_grad = wp.vec2(0.0, 0.0)
+    con_grad = wp.vec3(0.0, 0.0, 0.0)
+    if slot_last[shape] > slot_first[shape]:
+        m = mean[i]
+        e = extent[i]
+        con = conic[i]
+        y0 = shape_tiles[shape, 1]
+        wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
+        left = TILE * shape_tiles[shape, 0]
+        xs = columns_within(m[0], e[0], left, left + TILE * wide)
+        y_first = wp.max(y0, int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / TILE)
+        y_last = wp.min(shape_tiles[shape, 3], int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / TILE + 1)
+        least = column(EXPONENT * cut[i])
+        rows = rows_of_tile()
+        sum_x = column(0.0)
+        sum_y = column(0.0)
+        sum_xx = column(0.0)
+        sum_xy = column(0.0)
+        sum_yy = column(0.0)
+        for tile_y in range(y_first, y_last):
+            dy = rows + column(float(TILE * tile_y) - m[1])
+            c_dy = (EXPONENT * con[2]) * dy
+            # Moments by row of pixels: few enough to stay in registers.
+            moment0 = column(0.0)
+            moment1 = column(0.0)
+            moment2 = column(0.0)
+            for x in range(xs[0], xs[1]):
+                s = slot_first[shape] + (tile_y - y0) * wide + (x - left) / TILE
+                if slot_state[s] == PARTIAL:
+                    dx = float(x) + 0.5 - m[0]
+                    g = gaussian_column(EXPONENT * con, dx, dy, c_dy, least)
+                    h = gradient_of_q(g, sum_grad[s, (x - left) % TILE])
+                    moment0 = moment0 + h
+                    moment1 = moment1 + dx * h
+                    moment2 = moment2 + (dx * dx) * h
+            moment0_dy = wp.cw_mul(moment0, dy)
+            sum_x = sum_x + moment1
+            sum_y = sum_y + moment0_dy
+            sum_xx = sum_xx + moment2
+            sum_xy = sum_xy + wp.cw_mul(moment1, dy)
+            sum_yy = sum_yy + wp.cw_mul(moment0_dy, dy)
+        con_grad = -0.5 * wp.vec3(total(sum_xx), 2.0 * total(sum_xy), total(sum_yy))
+        sx = total(sum_x)
+        sy = total(sum_y)
+        x_grad = wp.vec2(con[0] * sx + con[1] * sy, con[1] * sx + con[2] * sy)
+    mean_grad[i] = x_grad
+    conic_grad[i] = con_grad

@@ -1,0 +1,442 @@
+"""Polylines with a width -> coverage of round strokes, and the adjoint.
+
+A round-capped, round-joined stroke is all that lies within half its width of the centre line, so a pixel
+needs the distance d to the nearest segment and no outline: overlaps, loops and cusps are unions of
+themselves.
+Coverage is the exact area of the pixel's square between two straight lines at h - d and -h - d along the
+direction n of the nearest point (h half the width): exact for straight strokes of any angle and width.
+
+Adjoint: moving the nearest segment's ends by v_a, v_b changes d by -n . ((1 - t) v_a + t v_b), t the nearest
+point's parameter (which is at a minimum, or at an end). The turning of n is of second order and left out.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.coverage.rows import tile_row
+from warpsplat.kernels.tile import column
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+STROKE = wp.constant(constants.STROKE)
+TILE = wp.constant(constants.TILE)
+COVERED = wp.constant(constants.COVERED)
+UNCOVERED = wp.constant(constants.UNCOVERED)
+PARTIAL = wp.constant(constants.PARTIAL)
+REACH_MAX = wp.constant(constants.REACH_MAX)
+FAR = wp.constant(1.0e15)
+TINY = wp.constant(1.0e-12)
+FLAT = wp.constant(1.0e-4)
+HALF_DIAGONAL = wp.constant(0.70711)  # of a pixel: an edge further away does not cross it
+MARGIN = wp.constant(0.02)  # [px] against rounding
+
+
+@wp.func
+def half_plane(x: wp.float32, n: wp.vec2) -> wp.float32:
+    """Area of the unit square centred at 0 where n . p < x, n a unit vector."""
+    a = wp.max(wp.abs(n[0]), wp.abs(n[1]))
+    b = wp.min(wp.abs(n[0]), wp.abs(n[1]))
+    distance = wp.abs(x)
+    area = float(0.5)
+    if distance >= 0.5 * (a + b):
+        area = 0.0
+    elif distance <= 0.5 * (a - b) or b < FLAT:
+        area = wp.max(0.5 - distance / a, 0.0)
+    else:
+        rest = 0.5 * (a + b) - distance
+        area = rest * rest / (2.0 * a * b)
+    if x > 0.0:
+        return 1.0 - area
+    return area
+
+
+@wp.func
+def half_plane_slope(x: wp.float32, n: wp.vec2) -> wp.float32:
+    """Derivative of ``half_plane`` by ``x``: the length of the line inside the square."""
+    a = wp.max(wp.abs(n[0]), wp.abs(n[1]))
+    b = wp.min(wp.abs(n[0]), wp.abs(n[1]))
+    distance = wp.abs(x)
+    if distance >= 0.5 * (a + b):
+        return 0.0
+    if distance <= 0.5 * (a - b) or b < FLAT:
+        return 1.0 / a
+    return (0.5 * (a + b) - distance) / (a * b)
+
+
+@wp.func
+def nearest(p: wp.vec2, a: wp.vec2, b: wp.vec2) -> wp.float32:
+    """Parameter in [0, 1] of the point of segment (a, b) nearest to ``p``."""
+    e = b - a
+    return wp.clamp(wp.dot(p - a, e) / wp.max(wp.dot(e, e), TINY), 0.0, 1.0)
+
+
+@wp.func
+def direction(r: wp.vec2, length: wp.float32) -> wp.vec2:
+    """Unit vector of ``r``; on the centre line itself any will do."""
+    if length < 1.0e-6:
+        return wp.vec2(1.0, 0.0)
+    return r / length
+
+
+@wp.func
+def turn(before: wp.vec2, after: wp.vec2) -> wp.float32:
+    """Sine of the angle between two segments, 1 for a right angle and more, or where one has no length."""
+    lengths = wp.length(before) * wp.length(after)
+    if lengths < TINY or wp.dot(before, after) <= 0.0:
+        return 1.0
+    return wp.min(wp.abs(before[0] * after[1] - before[1] * after[0]) / lengths + 0.01, 1.0)
+
+
+@wp.func
+def overhang(
+    vertex: wp.array[wp.vec2], i: wp.int32, first: wp.int32, last: wp.int32, reach: wp.float32
+) -> wp.vec2:
+    """How far beyond its ends segment ``i`` of the vertices [first, last) is looked at [px].
+
+    A pixel whose nearest point is the joint of two segments lies in the wedge between their normals, hence at
+    most the sine of their angle times its distance beyond each of them; at the ends of the stroke are caps.
+    """
+    e = vertex[i + 1] - vertex[i]
+    start = float(1.0)
+    end = float(1.0)
+    if i > first:
+        start = turn(vertex[i] - vertex[i - 1], e)
+    if i + 2 < last:
+        end = turn(e, vertex[i + 2] - vertex[i + 1])
+    return wp.vec2(start * reach + MARGIN, end * reach + MARGIN)
+
+
+@wp.func
+def segment_rows(a: wp.vec2, e: wp.vec2, length: wp.float32, reach: wp.float32, over: wp.vec2) -> wp.vec2:
+    """Lowest and highest y of the rectangle around the segment from ``a`` along the unit vector ``e``."""
+    start = a[1] - over[0] * e[1]
+    end = a[1] + (length + over[1]) * e[1]
+    side = reach * wp.abs(e[0])
+    return wp.vec2(wp.min(start, end) - side, wp.max(start, end) + side)
+
+
+@wp.func
+def segment_ends(e: wp.vec2, length: wp.float32, over: wp.vec2) -> wp.vec3:
+    """Where the rectangle's short sides meet the line at a's height, lower x first, and their slope dx / dy;
+    relative to a.
+    """
+    if wp.abs(e[0]) <= FLAT:
+        return wp.vec3(-1.0e8, 1.0e8, 0.0)
+    x0 = -over[0] / e[0]
+    x1 = (length + over[1]) / e[0]
+    return wp.vec3(wp.min(x0, x1), wp.max(x0, x1), -e[1] / e[0])
+
+
+@wp.func
+def segment_sides(e: wp.vec2, reach: wp.float32) -> wp.vec2:
+    """Half of the chord between the rectangle's long sides, and their slope dx / dy."""
+    if wp.abs(e[1]) <= FLAT:
+        return wp.vec2(1.0e8, 0.0)
+    return wp.vec2(reach / wp.abs(e[1]), e[0] / e[1])
+
+
+@wp.func
+def segment_span(x: wp.float32, dy: wp.float32, ends: wp.vec3, sides: wp.vec2) -> wp.vec2:
+    """Lowest and highest x of the rectangle at ``dy`` below a, a at ``x``; empty (low > high) without any."""
+    low = wp.max(ends[0] + ends[2] * dy, sides[1] * dy - sides[0])
+    high = wp.min(ends[1] + ends[2] * dy, sides[1] * dy + sides[0])
+    return wp.vec2(x + low - MARGIN, x + high + MARGIN)
+
+
+@wp.func
+def pixels_within(low: wp.float32, high: wp.float32, first: wp.int32, last: wp.int32) -> wp.vec2i:
+    """Range of the pixels of [first, last) whose centres lie between two coordinates, give or take one."""
+    start = wp.max(first, int(wp.ceil(wp.clamp(low, -1.0, 1.0e8) - 0.5)))
+    return wp.vec2i(start, wp.min(last, int(wp.floor(wp.min(high, 1.0e8) + 0.5))))
+
+
+@wp.func
+def half_width(width: wp.float32, scale: wp.float32) -> wp.float32:
+    """Half a stroke's width [px], within what kernels can hold."""
+    return wp.min(0.5 * scale * width, REACH_MAX)
+
+
+@wp.func
+def keep_nearest(
+    pixels: wp.array2d[wp.float32],
+    segment: wp.array2d[wp.int32],
+    slot_near: wp.array2d[wp.int32],
+    vertex: wp.array[wp.vec2],
+    j: wp.int32,
+    over: wp.vec2,
+    reach: wp.float32,
+    inside: wp.float32,
+    slot: wp.int32,
+    lane: wp.int32,
+    columns: wp.vec2i,
+    rows: wp.vec2i,
+    top: wp.int32,
+):
+    """Where segment ``j`` is nearer than all before it, store it and reach^2 - distance^2.
+
+    ``columns``, ``rows``: a lane's pixels [first, last) of the row of tiles at ``top`` that starts with
+    ``slot``; those that have ``inside`` are done with.
+    """
+    a = vertex[j]
+    d = vertex[j + 1] - a
+    length = wp.length(d)
+    e = direction(d, length)
+    inverse = 1.0 / wp.max(length * length, TINY)
+    ends = segment_ends(e, length, over)
+    sides = segment_sides(e, reach)
+    heights = segment_rows(a, e, length, reach, over)
+    ys = pixels_within(heights[0], heights[1], rows[0], rows[1])
+    for y in range(ys[0], ys[1]):
+        py = float(y) + 0.5 - a[1]
+        span = segment_span(a[0], py, ends, sides)
+        xs = pixels_within(span[0], span[1], columns[0], columns[1])
+        if xs[0] < xs[1]:
+            for s in range(slot + (xs[0] - columns[0]) / TILE, slot + (xs[1] - 1 - columns[0]) / TILE + 1):
+                slot_near[s, lane] = 1
+        for x in range(xs[0], xs[1]):
+            s = slot + (x - columns[0]) / TILE
+            p = TILE * ((x - columns[0]) % TILE) + y - top
+            so_far = pixels[s, p]
+            # Well inside the stroke it does not matter which segment is nearest.
+            if so_far < inside:
+                px = float(x) + 0.5 - a[0]
+                t = wp.clamp((px * d[0] + py * d[1]) * inverse, 0.0, 1.0)
+                rx = px - t * d[0]
+                ry = py - t * d[1]
+                near = reach * reach - rx * rx - ry * ry
+                if near > so_far:
+                    pixels[s, p] = near
+                    segment[s, p] = j
+
+
+@wp.func
+def strip_coverage(centre: wp.vec2, a: wp.vec2, b: wp.vec2, half: wp.float32) -> wp.float32:
+    """Area of the pixel at ``centre`` within ``half`` of the segment from ``a`` to ``b``."""
+    t = nearest(centre, a, b)
+    r = centre - (1.0 - t) * a - t * b
+    distance = wp.length(r)
+    n = direction(r, distance)
+    value = half_plane(half - distance, n)
+    if half + distance < HALF_DIAGONAL:
+        value += half_plane(half + distance, n) - 1.0
+    return value
+
+
+@wp.func
+def cover_slot(
+    pixels: wp.array2d[wp.float32],
+    segment: wp.array2d[wp.int32],
+    vertex: wp.array[wp.vec2],
+    s: wp.int32,
+    left: wp.int32,
+    top: wp.int32,
+    rows: wp.vec2i,
+    half: wp.float32,
+    inside: wp.float32,
+) -> wp.int32:
+    """Distances of a slot's pixels in ``rows`` -> coverages; the slot's state as far as they tell."""
+    most = float(0.0)
+    least = float(1.0)
+    for x in range(TILE):
+        for y in range(rows[0], rows[1]):
+            p = TILE * x + y - top
+            value = pixels[s, p]
+            if value >= inside:
+                value = 1.0
+                pixels[s, p] = 1.0
+            elif value > 0.0:
+                j = segment[s, p]
+                centre = wp.vec2(float(left + x) + 0.5, float(y) + 0.5)
+                value = strip_coverage(centre, vertex[j], vertex[j + 1], half)
+                pixels[s, p] = value
+            most = wp.max(most, value)
+            least = wp.min(least, value)
+    if most <= 0.0:
+        return UNCOVERED
+    if least < 1.0:
+        return PARTIAL
+    return COVERED
+
+
+@wp.kernel
+def stroke_forward(
+    # In:
+    offset: wp.int32,
+    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
+    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    kind: wp.array[wp.int32],  # [shape_count]
+    widths: wp.array[wp.float32],  # [shape_count] canvas units
+    scale: wp.float32,
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    # Out:
+    coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
+    coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
+    segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS] nearest segment (its first vertex)
+    slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
+    slot_near: wp.array2d[wp.int32],  # [slot_capacity, lanes] whether a segment is near
+):
+    """One thread a row of tiles of a shape (that of its leftmost slot) and lane: the nearest segment of each
+    pixel first, then coverage.
+    """
+    i, lane = wp.tid()
+    slot = offset + i
+    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+    shape = row[0]
+    if shape < 0:
+        return
+    if kind[shape] != STROKE:
+        return
+    half = half_width(widths[shape], scale)
+    reach = half + HALF_DIAGONAL
+    # What is stored first is reach^2 - distance^2, 0 where nothing is near. From here on a pixel is covered.
+    inside = float(FAR)
+    if half > HALF_DIAGONAL:
+        inside = reach * reach - (half - HALF_DIAGONAL) * (half - HALF_DIAGONAL)
+    left = TILE * row[1]
+    top = TILE * row[3]
+    columns = wp.vec2i(left, left + TILE * row[2])
+    rows = wp.vec2i(top + lane * lane_rows, top + (lane + 1) * lane_rows)
+    for s in range(slot, slot + row[2]):
+        slot_near[s, lane] = 0
+        for x in range(TILE):
+            if lane_rows == TILE:
+                coverage[s, x] = column(0.0)
+            else:
+                coverage_pixels[s, TILE * x + lane] = 0.0
+    start = vertex_first[shape]
+    stop = vertex_last[shape]
+    b = vertex[start]
+    for j in range(start, stop - 1):
+        a = b
+        b = vertex[j + 1]
+        if wp.min(a[1], b[1]) - reach < float(rows[1]) and wp.max(a[1], b[1]) + reach > float(rows[0]):
+            over = overhang(vertex, j, start, stop, reach)
+            keep_nearest(
+                coverage_pixels,
+                segment,
+                slot_near,
+                vertex,
+                j,
+                over,
+                reach,
+                inside,
+                slot,
+                lane,
+                columns,
+                rows,
+                top,
+            )
+    for s in range(slot, slot + row[2]):
+        state = int(UNCOVERED)
+        if slot_near[s, lane] == 1:
+            at = left + TILE * (s - slot)
+            state = cover_slot(coverage_pixels, segment, vertex, s, at, top, rows, half, inside)
+        wp.atomic_or(slot_state, s, state)
+
+
+@wp.kernel
+def stroke_backward(
+    # In:
+    offset: wp.int32,
+    width: wp.int32,  # px
+    height: wp.int32,  # px
+    kind: wp.array[wp.int32],  # [shape_count]
+    widths: wp.array[wp.float32],  # [shape_count] canvas units
+    scale: wp.float32,
+    vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
+    vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS]
+    sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] 0 where the coverage is 0 or 1
+    # Out:
+    start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the segment that starts here
+    end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
+    half_grad: wp.array[wp.float32],  # [vertex_capacity] of half the width [px]
+):
+    """One thread a segment, over the border pixels whose nearest segment it is."""
+    i = offset + wp.tid()
+    if i >= vertex_ends[vertex_ends.shape[0] - 1]:
+        return
+    shape = vertex_shape[i]
+    if kind[shape] != STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
+        return
+    at_start = wp.vec2(0.0, 0.0)
+    at_end = wp.vec2(0.0, 0.0)
+    of_half = float(0.0)
+    if slot_last[shape] > slot_first[shape] and i + 1 < vertex_last[shape]:
+        half = half_width(widths[shape], scale)
+        reach = half + HALF_DIAGONAL
+        x0 = shape_tiles[shape, 0]
+        y0 = shape_tiles[shape, 1]
+        wide = shape_tiles[shape, 2] - x0
+        a = vertex[i]
+        b = vertex[i + 1]
+        length = wp.length(b - a)
+        e = direction(b - a, length)
+        over = overhang(vertex, i, vertex_first[shape], vertex_last[shape], reach)
+        ends = segment_ends(e, length, over)
+        sides = segment_sides(e, reach)
+        heights = segment_rows(a, e, length, reach, over)
+        # The rectangle's corners may lie outside the shape's tiles, where it has no pixel.
+        right = wp.min(width, TILE * shape_tiles[shape, 2])
+        bottom = wp.min(height, TILE * shape_tiles[shape, 3])
+        ys = pixels_within(heights[0], heights[1], TILE * y0, bottom)
+        for y in range(ys[0], ys[1]):
+            slot_row = slot_first[shape] + (y / TILE - y0) * wide - x0
+            span = segment_span(a[0], float(y) + 0.5 - a[1], ends, sides)
+            xs = pixels_within(span[0], span[1], TILE * x0, right)
+            for x in range(xs[0], xs[1]):
+                slot = slot_row + x / TILE
+                p = TILE * (x % TILE) + y % TILE
+                g = float(0.0)
+                if slot_state[slot] == PARTIAL:
+                    g = sum_grad[slot, p]
+                # No gradient, no segment: the array is kept only where the coverage is neither 0 nor 1.
+                if g != 0.0 and segment[slot, p] == i:
+                    centre = wp.vec2(float(x) + 0.5, float(y) + 0.5)
+                    t = nearest(centre, a, b)
+                    r = centre - (1.0 - t) * a - t * b
+                    distance = wp.length(r)
+                    n = direction(r, distance)
+                    inner = half_plane_slope(half - distance, n)
+                    outer = half_plane_slope(half + distance, n)
+                    of_half += g * (inner + outer)
+                    if distance >= 1.0e-6:
+                        move = (g * (inner - outer)) * n
+                        at_start += (1.0 - t) * move
+                        at_end += t * move
+    start_grad[i] = at_start
+    end_grad[i] = at_end
+    half_grad[i] = of_half
+
+
+@wp.kernel
+def widths_backward(
+    # In:
+    offset: wp.int32,
+    kind: wp.array[wp.int32],  # [shape_count]
+    scale: wp.float32,
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    half_grad: wp.array[wp.float32],  # [vertex_capacity]
+    # Out:
+    widths_grad: wp.array[wp.float32],  # [shape_count] written
+):
+    """One thread a shape sums its segments in order."""
+    shape = offset + wp.tid()
+    if kind[shape] != STROKE:
+        return
+    total = float(0.0)
+    for i in range(vertex_first[shape], vertex_last[shape]):
+        total += half_grad[i]
+    widths_grad[shape] = 0.5 * scale * total

@@ -1,0 +1,1 @@
+"""Shapes -> grids of Gaussians (the paper's model)."""

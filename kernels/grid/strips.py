@@ -1,0 +1,47 @@
+"""Strips of Gaussians: how many rows across and stations along, and where the rows lie.
+
+A strip is covered by a grid of rows x stations, the rows running along it. Row ``r`` lies at the fraction
+``u_r = Phi(z_r)`` of the way across, for equally spaced ``z_r`` in [-reach, reach], Phi the normal cumulative
+distribution (paper section 3.2): rows crowd towards the boundary. ``reach`` puts the outermost row ROW_INSET
+inside the path.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+ROW_INSET = wp.constant(constants.ROW_INSET)
+ROW_GROWTH = wp.constant(constants.ROW_GROWTH)
+STATION_SPACING = wp.constant(constants.STATION_SPACING)
+STATION_DENSITY = wp.constant(constants.STATION_DENSITY)
+STATIONS_MIN = wp.constant(constants.STATIONS_MIN)
+EPSILON = wp.constant(constants.EPSILON)
+SQRT_HALF = wp.constant(0.7071067811865476)
+
+
+@wp.func
+def row_plan(width: wp.float32) -> wp.vec2:
+    """(row count, reach) for a strip ``width`` [px] wide."""
+    # The outermost row at a quarter of the strip at the most: two rows are the least.
+    edge = wp.min(ROW_INSET / wp.max(width, EPSILON), 0.25)
+    reach = wp.erfinv(1.0 - 2.0 * edge) / SQRT_HALF
+    # Near the boundary du = phi(z) dz and u = Phi(z), so the relative step is the hazard rate of the
+    # normal distribution times dz; z + 1 / (z + 1) is close to it over the range in use.
+    step = ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
+    return wp.vec2(wp.max(2.0, wp.ceil(2.0 * reach / step) + 1.0), reach)
+
+
+@wp.func
+def row_position(row: wp.int32, rows: wp.int32, reach: wp.float32) -> wp.float32:
+    """Fraction ``u`` in (0, 1) of the way across the strip."""
+    z = reach * (2.0 * float(row) / float(rows - 1) - 1.0)
+    return 0.5 + 0.5 * wp.erf(z * SQRT_HALF)
+
+
+@wp.func
+def station_plan(length: wp.float32) -> wp.int32:
+    """Stations along a curve ``length`` [px] long."""
+    count = wp.max(length / STATION_SPACING, STATION_DENSITY * wp.sqrt(length))
+    return wp.max(STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))

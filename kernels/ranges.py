@@ -1,0 +1,50 @@
+"""Prefix sums as ranges: which entries of a long array belong to which owner."""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+
+@wp.func
+def find_range(ends: wp.array[wp.int32], count: wp.int32, i: wp.int32) -> wp.int32:
+    """Smallest index with ``ends[index] > i``; ``ends`` is an inclusive prefix sum of ``count`` entries."""
+    low = int(0)
+    high = int(count)
+    while low < high:
+        middle = (low + high) / 2
+        if ends[middle] > i:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@wp.kernel
+def clip_ranges(
+    # In:
+    offset: wp.int32,
+    count: wp.array[wp.int32],  # [n] entries wanted
+    ends: wp.array[wp.int32],  # [n] their inclusive prefix sum
+    capacity: wp.int32,
+    reverse: wp.int32,  # 1: entry i of the prefix sum belongs to range n - 1 - i
+    # Out:
+    range_first: wp.array[wp.int32],  # [n]
+    range_last: wp.array[wp.int32],  # [n] one past the end; an empty range where the capacity is exceeded
+    needed: wp.array[wp.int32],  # [1] the largest total ever asked for
+):
+    """Prefix sum -> ranges. What does not fit is left out whole and counted, never cut."""
+    i = offset + wp.tid()
+    n = ends.shape[0]
+    end = ends[i]
+    start = end - count[i]
+    if end > capacity:
+        end = start
+    index = i
+    if reverse == 1:
+        index = n - 1 - i
+    range_first[index] = start
+    range_last[index] = end
+    if i == n - 1:
+        needed[0] = wp.max(needed[0], ends[i])

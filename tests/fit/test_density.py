@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import mixed_scene, random_scene, with_points
+from warpsplat.fit.density import densify, duplicates, least_seen, prune_mask
+from warpsplat.fit.place import canvas_for, circle_outlines
+from warpsplat.fit.settings import Density, Settings, make_settings
+from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene.geometry import areas, bounds
+
+DENSITY = Density()
+
+
+def empty_scene(settings: Settings, target: FloatArray) -> Scene:
+    points = np.zeros((0, 6 * settings.chain_cubics, 2), np.float32)
+    return Scene.uniform(Kind.FILL, canvas_for(target), points)
+
+
+def circles(centres: list[tuple[float, float]], radii: list[float]) -> Scene:
+    scene = random_scene(Kind.FILL, count=len(centres), width=200, height=200)
+    return replace(
+        scene,
+        points=with_points(scene, circle_outlines(np.array(centres), np.array(radii), 2)),
+        opacities=np.full(len(centres), 0.9, np.float32),
+    )
+
+
+def test_faint_curves_go_sooner_early_on() -> None:
+    scene = circles([(40, 40), (140, 140)], [20, 20])
+    scene.opacities[:] = [0.1, 0.9]
+    assert prune_mask(scene, DENSITY, 0.0).tolist() == [True, False]
+    assert prune_mask(scene, DENSITY, 0.75).tolist() == [False, False]
+
+
+def test_tiny_curves_go() -> None:
+    scene = circles([(40, 40), (140, 140)], [0.5, 20])
+    assert prune_mask(scene, DENSITY, 0.5).tolist() == [True, False]
+
+
+def test_broken_curves_go() -> None:
+    scene = circles([(40, 40), (140, 140)], [20, 20])
+    scene.points[3] = np.nan
+    assert prune_mask(scene, DENSITY, 0.5).tolist() == [True, False]
+
+
+def test_broken_shapes_of_any_length_go() -> None:
+    scene = mixed_scene(200, 200, seed=3)
+    for shape in (0, 2, len(scene) - 1):
+        broken = replace(scene, points=scene.points.copy())
+        broken.points[broken.first[shape + 1] - 1, 1] = np.nan
+        doomed = prune_mask(broken, replace(DENSITY, area=0.0), 0.5)
+        assert np.flatnonzero(doomed).tolist() == [shape]
+
+
+def test_duplicates_of_similar_colour_go_one_of_two() -> None:
+    scene = circles([(60, 60), (60.5, 60), (60, 60), (140, 140)], [20, 20, 20, 20])
+    scene.colors[:] = [[0.5, 0.5, 0.5], [0.51, 0.5, 0.5], [0.9, 0.5, 0.5], [0.5, 0.5, 0.5]]
+    assert duplicates(scene, DENSITY).tolist() == [True, False, False, False]
+
+
+def test_duplicates_match_brute_force() -> None:
+    rng = np.random.default_rng(1)
+    scene = circles([tuple(x) for x in rng.uniform(50, 60, (60, 2))], list(rng.uniform(18, 22, 60)))
+    scene.colors[:] = 0.5 + 0.01 * rng.normal(size=scene.colors.shape)
+    boxes = bounds(scene)
+    wanted = np.zeros(60, bool)
+    for i in range(60):
+        for j in range(i):
+            low, high = np.maximum(boxes[i, :2], boxes[j, :2]), np.minimum(boxes[i, 2:], boxes[j, 2:])
+            common = np.prod(np.clip(high - low, 0, None))
+            union = np.prod(boxes[i, 2:] - boxes[i, :2]) + np.prod(boxes[j, 2:] - boxes[j, :2]) - common
+            if common / union > 0.9 and np.linalg.norm(scene.colors[i] - scene.colors[j]) < 0.03:
+                wanted[min(i, j)] = True
+    assert wanted.any()
+    np.testing.assert_array_equal(duplicates(scene, DENSITY), wanted)
+
+
+def test_least_seen_takes_the_doomed_first() -> None:
+    seen = np.array([5, 1, 3, 2, 4], np.float32)
+    doomed = np.array([True, False, False, False, True])
+    assert set(least_seen(doomed, 3, seen)) == {0, 4, 1}
+    assert set(least_seen(doomed, 0, seen)) == {0, 4}
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_new_curves_come_where_the_error_is(kind: Kind) -> None:
+    target = np.full((60, 80, 3), 0.5, np.float32)
+    image = target.copy()
+    target[10:22, 50:62] = [1.0, 0.0, 0.0]
+    settings = make_settings(kind=kind)
+    scene = empty_scene(settings, target)
+    scene = replace(scene, canvas=replace(scene.canvas, width=160, height=120))
+    added = densify(settings, scene, target, image, 1, np.random.default_rng(0))
+    assert len(added) == 1
+    np.testing.assert_allclose(added.points.mean(axis=0), [112, 32], atol=5)
+    assert 200 < areas(added)[0] < 1000, "the square has 24 x 24 canvas units"
+    np.testing.assert_allclose(added.colors[0], [1, 0, 0], atol=0.05)
+
+
+def test_densify_always_gives_the_count_asked_for() -> None:
+    settings = make_settings()
+    flat = np.full((40, 40, 3), 0.3, np.float32)
+    scene = empty_scene(settings, flat)
+    for image in (flat, flat + np.float32(0.1)):
+        assert len(densify(settings, scene, flat, image, 7, np.random.default_rng(0))) == 7

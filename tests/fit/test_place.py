@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from warpsplat.fit import place
+from warpsplat.fit.place import background_color, contour_angles, grid_scene, simple_curves, survey
+from warpsplat.fit.settings import make_settings
+from warpsplat.scene import Kind
+from warpsplat.scene.geometry import areas
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("count", [1, 7, 50])
+def test_first_curves_cover_the_canvas(kind: Kind, count: int) -> None:
+    target = np.random.default_rng(0).uniform(size=(40, 70, 3)).astype(np.float32)
+    scene = grid_scene(make_settings(kind=kind), target, count, np.random.default_rng(0))
+    assert len(scene) == count
+    assert 0.8 < areas(scene).sum() / (40 * 70) < 1.8
+    assert np.isfinite(scene.points).all()
+
+
+def picture(height: int, width: int) -> np.ndarray:
+    """Smooth blobs: a reduced copy has the same colours."""
+    rng = np.random.default_rng(0)
+    small = rng.uniform(0, 1, (6, 8, 3)).astype(np.float32)
+    return np.clip(cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC), 0, 1)
+
+
+def test_small_images_are_surveyed_as_they_are() -> None:
+    target = picture(60, 80)
+    same, span = survey(target, 30.0)
+    assert same is target
+    assert span == 1.0
+    assert survey(np.zeros((512, 768, 3), np.float32), 120.0)[1] == 1.0, "photographs of the Kodak set"
+
+
+@pytest.mark.parametrize(("shape", "sigma"), [((3000, 4000), 5.0), ((60, 80), 1000.0), ((2, 9000), 500.0)])
+def test_what_is_surveyed_is_bounded(shape: tuple[int, int], sigma: float) -> None:
+    small, span = survey(np.zeros((*shape, 1), np.float32), sigma)
+    assert small.shape[0] * small.shape[1] <= 1.01 * place.SURVEY_PIXELS
+    assert sigma / span <= place.SURVEY_SIGMA * 1.001
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_reduced_colours_and_directions_are_those_of_the_image(
+    kind: Kind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = picture(192, 256)
+    settings = make_settings(kind=kind)
+    whole = grid_scene(settings, target, 12, np.random.default_rng(1))
+    monkeypatch.setattr(place, "SURVEY_PIXELS", 128 * 96)
+    reduced = grid_scene(settings, target, 12, np.random.default_rng(1))
+    np.testing.assert_allclose(reduced.colors, whole.colors, atol=0.03)
+    np.testing.assert_allclose(reduced.points, whole.points, atol=5 if kind == Kind.STROKE else 0)
+
+
+def test_the_mean_of_many_pixels_is_their_mean() -> None:
+    """A sum of 32 bits over all pixels stops growing long before their end."""
+    target = np.full((3000, 4000, 3), 0.5, np.float32)
+    target[:, ::2] = [0.2, 0.3, 0.4]
+    np.testing.assert_allclose(background_color(target), [0.35, 0.4, 0.45], atol=0.004)
+
+
+def test_strokes_lie_along_contours() -> None:
+    stripes = np.repeat(np.sin(np.arange(96) / 3)[:, None, None], 96, axis=1).repeat(3, axis=2)
+    angle = contour_angles(stripes.astype(np.float32), np.array([[48.0, 48.0]]), 6.0)
+    assert abs(np.cos(angle[0])) > 0.99
+
+
+def flag(bands: int) -> np.ndarray:
+    """Stripes in two colours."""
+    stripes = np.repeat(np.arange(bands) % 2, 400 // bands)
+    return (stripes[:, None, None] * np.ones((1, 300, 3))).astype(np.float32)
+
+
+def test_few_flat_regions_need_few_curves() -> None:
+    assert simple_curves(flag(2)) == place.LEAST_CURVES
+    assert simple_curves(flag(10)) == 10 * place.SHAPES_A_REGION
+
+
+def test_photographs_and_soft_pictures_get_the_default() -> None:
+    soft = np.linspace(0, 1, 300, dtype=np.float32)[None, :, None] * np.ones((400, 1, 3), np.float32)
+    noise = np.random.default_rng(0).uniform(0, 1, (400, 300, 3)).astype(np.float32)
+    moon = np.zeros((400, 300, 3), np.float32)
+    moon[:120, :100] = soft[:120, ::3]
+    for target in (soft, noise, moon, picture(400, 300)):
+        assert simple_curves(target) >= make_settings().curves
+
+
+def test_tiny_images_have_room_for_few_curves() -> None:
+    assert simple_curves(picture(16, 16)) == 256 // place.PIXELS_A_CURVE
+    assert simple_curves(picture(2, 2)) == 1

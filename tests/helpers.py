@@ -1,0 +1,130 @@
+"""Run the renderer and its reference on the same scene with the same plans; launch single kernels."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+import warp as wp
+
+from tests.reference import exact, splat
+from tests.reference.composite import composite
+from tests.reference.curves import Tensors, tensors
+from tests.reference.grid import Plan
+from warpsplat.kernels.constants import TILE
+from warpsplat.render.backend import Backend, Viewport
+from warpsplat.render.grid import Grid, GridBuffers
+from warpsplat.render.models import EXACT, Model, SplatModel
+from warpsplat.render.outline import Outline, OutlineBuffers
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.renderer import Capacity, Renderer
+from warpsplat.scene import Scene
+
+SPLAT = SplatModel()
+
+
+def renderer_for(
+    scene: Scene,
+    device: str,
+    scale: float = 1.0,
+    *,
+    model: Model = EXACT,
+    threads: int | None = None,
+    lanes: int | None = None,
+    capacity: Capacity | None = None,
+) -> Renderer:
+    """After a complete forward pass. ``lanes``: other than is usual on the device."""
+    backend = Backend.on(device, threads)
+    backend = replace(backend, lanes=lanes or backend.lanes)
+    viewport = Viewport(round(scene.canvas.width * scale), round(scene.canvas.height * scale), scale)
+    renderer = Renderer(Parameters(scene, backend), viewport, model=model, capacity=capacity)
+    renderer.forward_complete()
+    return renderer
+
+
+def grid_of(renderer: Renderer) -> GridBuffers:
+    assert isinstance(renderer.geometry, Grid)
+    return renderer.geometry.buffers
+
+
+def outline_of(renderer: Renderer) -> OutlineBuffers:
+    assert isinstance(renderer.geometry, Outline)
+    return renderer.geometry.buffers
+
+
+def plans_of(renderer: Renderer) -> list[Plan]:
+    b = grid_of(renderer)
+    arrays = (b.shape_stations.numpy(), b.shape_rows.numpy(), b.shape_reach.numpy())
+    return [Plan(int(c), int(r), float(z)) for c, r, z in zip(*arrays, strict=True)]
+
+
+def pieces_of(renderer: Renderer) -> list[list[int]]:
+    """Of each shape's cubics."""
+    pieces = outline_of(renderer).cubic_pieces.numpy().tolist()
+    first = renderer.parameters.arrays["cubic_first"].numpy()
+    return [pieces[a:b] for a, b in itertools.pairwise(first)]
+
+
+def reference_image(scene: Scene, renderer: Renderer, detach: bool = False) -> tuple[Tensors, torch.Tensor]:
+    """The parameters and the image that the reference makes of them with the renderer's plans."""
+    p, v = tensors(scene), renderer.viewport
+    if isinstance(renderer.geometry, Grid):
+        covers = splat.coverages(scene, p, plans_of(renderer), v.width, v.height, v.scale, detach)
+    else:
+        covers = exact.coverages(scene, p, pieces_of(renderer), v.width, v.height, v.scale)
+    return p, composite(covers, p, scene)
+
+
+def compare(
+    scene: Scene,
+    device: str,
+    scale: float = 1.0,
+    *,
+    tolerance: float = 1e-3,
+    model: Model = EXACT,
+    lanes: int | None = None,
+) -> None:
+    """Image and all gradients against the reference, for a random gradient of the image."""
+    renderer = renderer_for(scene, device, scale, model=model, lanes=lanes)
+    splats = isinstance(model, SplatModel)
+    detach = isinstance(model, SplatModel) and not model.through_scales
+    p, image = reference_image(scene, renderer, detach)
+    # The cut at Q_MAX makes single pixels differ where float32 and float64 decide differently.
+    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-3 if splats else 2e-4)
+    assert np.abs(renderer.read_image() - image.detach().numpy()).mean() < 2e-6
+    weights = np.random.default_rng(1).normal(size=(*image.shape,))
+    (image * torch.tensor(weights)).sum().backward()
+    renderer.write_image_grad(weights.astype(np.float32))
+    renderer.backward()
+    for name, got in renderer.parameters.gradients().items():
+        gradient = p[name].grad
+        want = np.zeros(got.shape) if gradient is None else gradient.numpy()
+        assert relative_error(got, want) < tolerance, name
+
+
+def coverage_images(renderer: Renderer) -> np.ndarray:
+    """Slots put together: [shape, padded height, padded width]; 0 where a shape has no slot."""
+    v, bins = renderer.viewport, renderer.bins.buffers
+    images = np.zeros((renderer.parameters.shape_count, TILE * v.tiles_y, TILE * v.tiles_x), np.float32)
+    shapes, tiles = bins.slot_shape.numpy(), bins.slot_tile.numpy()
+    coverage = renderer.coverage.buffers.coverage_pixels.numpy()
+    for slot in np.flatnonzero(shapes >= 0):
+        y, x = divmod(int(tiles[slot]), v.tiles_x)
+        block = coverage[slot].reshape(TILE, TILE).T
+        images[shapes[slot], TILE * y : TILE * (y + 1), TILE * x : TILE * (x + 1)] = block
+    return images
+
+
+def run(kernel: wp.Kernel, dim: int | tuple[int, ...], device: str, *sources: object, **values: Any) -> None:
+    """Launch one kernel, its parameters by name."""
+    program = Backend.on(device, 1).program()
+    program.launch(kernel, dim, *sources, **values)
+    program.run()
+
+
+def relative_error(got: np.ndarray, want: np.ndarray) -> float:
+    """Largest difference over the largest magnitude."""
+    return float(np.abs(got - want).max() / max(np.abs(want).max(), 1e-30))

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+import warp as wp
+
+from tests.helpers import relative_error, run
+from tests.reference import losses
+from tests.scenes import disc, mixed_scene, random_scene
+from warpsplat.kernels.loss import shape as kernels
+from warpsplat.render.backend import Backend
+from warpsplat.render.parameters import Parameters
+from warpsplat.scene import Kind, Scene
+
+SCENES = ["fills", "strokes", "mixed"]
+
+
+def scene_of(name: str) -> Scene:
+    if name == "mixed":
+        return mixed_scene(seed=6)
+    return random_scene(Kind.FILL if name == "fills" else Kind.STROKE, count=6, seed=6)
+
+
+def by_shape(scene: Scene, values: torch.Tensor) -> np.ndarray:
+    """Sums over each shape's cubics."""
+    ends = np.cumsum(scene.point_counts() // 3)
+    return np.array([part.sum() for part in np.split(values.detach().numpy(), ends[:-1])])
+
+
+def launch(kernel: wp.Kernel, scene: Scene, device: str, weight: float) -> tuple[np.ndarray, np.ndarray]:
+    """(gradient of the points, loss of each shape)."""
+    parameters = Parameters(scene, Backend.on(device))
+    each = wp.zeros(len(scene), dtype=float, device=device)
+    run(kernel, len(scene), device, parameters.arrays, weight=weight, shape_loss=each)
+    return parameters.gradients()["points"], each.numpy()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_bending(device: str, name: str) -> None:
+    scene = scene_of(name)
+    scene.points[: scene.first[1]] = scene.points[0]
+    got, each = launch(kernels.bending_backward, scene, device, 0.7)
+    x = torch.tensor(scene.points, dtype=torch.float64, requires_grad=True)
+    energy = losses.bending(scene, x)
+    (0.7 * energy.sum()).backward()
+    np.testing.assert_allclose(each, by_shape(scene, energy), rtol=1e-4, atol=1e-9)
+    assert x.grad is not None
+    assert relative_error(got, x.grad.numpy()) < 1e-4
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_xing(device: str, name: str) -> None:
+    scene = scene_of(name)
+    scene.points[:] += np.random.default_rng(0).normal(0, 6, scene.points.shape).astype(np.float32)
+    got, each = launch(kernels.xing_backward, scene, device, 0.7)
+    points = torch.tensor(scene.points, dtype=torch.float64, requires_grad=True)
+    value = losses.xing(scene, points)
+    assert float(value.detach()) > 0.05
+    (0.7 * value).backward()
+    count = (scene.point_counts() // 3).sum()
+    assert each.sum() / count == pytest.approx(float(value.detach()), rel=1e-4)
+    assert points.grad is not None
+    assert relative_error(got, points.grad.numpy()) < 1e-4
+
+
+def test_xing_is_zero_for_a_convex_outline(device: str) -> None:
+    scene = disc(10, 30, 15)
+    assert float(losses.xing(scene, torch.tensor(scene.points, dtype=torch.float64))) == 0
+    got, each = launch(kernels.xing_backward, scene, device, 1.0)
+    assert each[0] == 0
+    assert not got.any()

@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+import warp as wp
+
+from tests.helpers import run
+from warpsplat.kernels import adam
+from warpsplat.scene import Kind
+
+BOTH = (1 << Kind.FILL) | (1 << Kind.STROKE)
+
+
+def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> dict[str, Any]:
+    value = wp.array(start, dtype=float, device=device)
+    return {
+        "value": value,
+        **{name: wp.zeros_like(value) for name in ("grad", "moment1", "moment2")},
+        "owner": wp.array(owner, dtype=int, device=device),
+        "kind": wp.array(kind, dtype=int, device=device),
+        "ages": wp.zeros(len(kind), dtype=int, device=device),
+        "clock": wp.zeros(1, dtype=int, device=device),
+    }
+
+
+def step(s: dict[str, Any], gradient: np.ndarray, device: str, **values: float) -> None:
+    s["grad"].assign(gradient)
+    run(adam.advance, s["ages"].shape[0], device, s)
+    settings = {"kinds": BOTH, "step_count": 20, "rate": 0.1, "final": 0.1, "low": -100.0, "high": 100.0}
+    run(adam.adam_update, s["value"].shape, device, s, **{**settings, **values})
+
+
+def test_matches_torch(device: str) -> None:
+    """Rows of shapes of both kinds, two of one shape."""
+    rng = np.random.default_rng(7)
+    start = rng.normal(size=(5, 4)).astype(np.float32)
+    gradients = rng.normal(size=(20, 5, 4)).astype(np.float32)
+    s = state(start, [0, 1, 1, 2, 3], [0, 1, 0, 1], device)
+    x = torch.tensor(start, dtype=torch.float64, requires_grad=True)
+    optimizer = torch.optim.Adam([x], lr=0.1, betas=(0.9, 0.99), eps=1e-12)
+    schedule = torch.optim.lr_scheduler.LambdaLR(
+        optimizer, lambda n: 0.1 + 0.9 * 0.5 * (1 + np.cos(np.pi * min((n + 1) / 20, 1)))
+    )
+    for g in gradients:
+        step(s, g, device)
+        x.grad = torch.tensor(g, dtype=torch.float64)
+        optimizer.step()
+        schedule.step()
+    np.testing.assert_allclose(s["value"].numpy(), x.detach().numpy(), rtol=1e-4, atol=1e-4)
+    assert s["clock"].numpy()[0] == 20
+    assert (s["ages"].numpy() == 20).all()
+
+
+def test_keeps_bounds_and_ignores_what_is_not_finite(device: str) -> None:
+    s = state(np.array([[0.5, 0.5]], np.float32), [0], [0], device)
+    step(s, np.array([[-1.0, np.nan]], np.float32), device, rate=5.0, low=0.0, high=1.0)
+    np.testing.assert_array_equal(s["value"].numpy(), [[1.0, 0.5]])
+
+
+def test_a_row_is_corrected_by_the_age_of_its_own_shape(device: str) -> None:
+    """A shape placed late makes the step that it would have made at the start."""
+    s = state(np.zeros((3, 1), np.float32), [1, 0, 1], [0, 0], device)
+    s["ages"].assign(np.array([50, 0], np.int32))
+    step(s, np.ones((3, 1), np.float32), device, final=1.0)
+    moved = -s["value"].numpy()[:, 0]
+    np.testing.assert_allclose(moved[[0, 2]], 0.1, rtol=1e-5)
+    moments = np.array([0.1 / (1 - 0.9**51), 0.01 / (1 - 0.99**51)])
+    np.testing.assert_allclose(moved[1], 0.1 * moments[0] / np.sqrt(moments[1]), rtol=1e-4)
+
+
+def test_shapes_without_the_attribute_stay_as_they_are(device: str) -> None:
+    s = state(np.zeros((4, 1), np.float32), [0, 1, 2, 3], [0, 1, 0, 1], device)
+    step(s, np.ones((4, 1), np.float32), device, kinds=1 << Kind.STROKE, low=-1.0, high=-0.01)
+    assert (s["value"].numpy()[:, 0] < 0).tolist() == [False, True, False, True]
+    assert (s["moment2"].numpy()[:, 0] > 0).tolist() == [False, True, False, True]

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import MIXED, canvas, mixed_scene, random_scene
+from warpsplat.scene import ATTRIBUTES, Kind, Scene
+
+POINTS, COLORS = (next(a for a in ATTRIBUTES if a.name == name) for name in ("points", "colors"))
+
+
+def test_arrays_must_fit() -> None:
+    scene = random_scene(Kind.FILL)
+    for attribute in ATTRIBUTES:
+        value = getattr(scene, attribute.name)
+        with pytest.raises(ValueError, match=f"{attribute.name} "):
+            replace(scene, **{attribute.name: np.concatenate([value, value[:1]])})
+    with pytest.raises(ValueError, match="opacities"):
+        replace(scene, opacities=np.ones((4, 3), np.float32))
+    with pytest.raises(ValueError, match="first does not run from 0 to 48 points in 5 numbers"):
+        replace(scene, first=scene.first[:-1])
+
+
+@pytest.mark.parametrize(
+    ("kind", "count"),
+    [(Kind.FILL, 0), (Kind.FILL, 7), (Kind.FILL, 4), (Kind.STROKE, 1), (Kind.STROKE, 6), (Kind.STROKE, 12)],
+)
+def test_shapes_have_whole_cubics(kind: Kind, count: int) -> None:
+    with pytest.raises(ValueError, match=f"a {kind.name.lower()} cannot have {count} control points"):
+        Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32))
+
+
+def test_uniform_leaves_the_rest_at_0() -> None:
+    points = np.arange(48, dtype=np.float32).reshape(2, 12, 2)
+    scene = Scene.uniform(Kind.FILL, canvas(9, 9), points, opacities=np.array([0.5, 0.7], np.float32))
+    assert scene.first.tolist() == [0, 12, 24]
+    np.testing.assert_array_equal(scene.points_of(1), points[1])
+    np.testing.assert_array_equal(scene.opacities, np.float32([0.5, 0.7]))
+    assert not scene.colors.any()
+    assert not scene.widths.any()
+    with pytest.raises(TypeError, match="colours"):
+        Scene.uniform(Kind.FILL, canvas(9, 9), points, colours=np.zeros((2, 3), np.float32))
+
+
+def test_take_and_append() -> None:
+    """Shapes of different lengths keep what is theirs, in any order, twice as well."""
+    scene = mixed_scene(seed=1)
+    index = np.array([5, 0, 5, 3])
+    taken = scene.take(index)
+    both = scene.append(taken)
+    assert len(both) == len(scene) + 4
+    for i, j in [*enumerate(range(len(scene))), *enumerate(index, len(scene))]:
+        np.testing.assert_array_equal(both.points_of(i), scene.points_of(j))
+        assert both.kind[i] == scene.kind[j]
+        for name in ("colors", "opacities", "widths"):
+            np.testing.assert_array_equal(getattr(both, name)[i], getattr(scene, name)[j])
+    assert both.canvas is scene.canvas
+    empty = scene.take(np.arange(0))
+    assert len(empty) == len(empty.points) == 0
+    np.testing.assert_array_equal(empty.append(scene).points, scene.points)
+
+
+def test_alike_groups_every_shape_once() -> None:
+    scene = mixed_scene()
+    seen: list[int] = []
+    groups = list(scene.alike())
+    for kind, index, points in groups:
+        for i, own in zip(index, points, strict=True):
+            assert scene.kind[i] == kind
+            np.testing.assert_array_equal(own, scene.points_of(i))
+        seen += index.tolist()
+    assert sorted(seen) == list(range(len(scene)))
+    assert len(groups) == len(set(MIXED))
+
+
+def test_rows_of_shapes() -> None:
+    scene = mixed_scene()
+    index = np.array([6, 1, 2])
+    np.testing.assert_array_equal(scene.rows(COLORS, index), index)
+    wanted = np.concatenate([np.arange(scene.first[i], scene.first[i + 1]) for i in index])
+    np.testing.assert_array_equal(scene.rows(POINTS, index), wanted)

@@ -1,0 +1,249 @@
+"""What holds the house up, read from the source: who may import whom, how a kernel is written, how it is
+launched.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import os
+import re
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+ALLOWED: dict[str, tuple[str, ...]] = {
+    "errors": (),
+    "native": (),
+    "kernels": (),
+    "scene": ("kernels.constants", "errors"),
+    "files": ("errors", "native", "scene", "_version"),
+    "svg": ("errors", "scene", "files.inputs"),
+    "metrics": ("errors", "svg"),
+    "render": ("errors", "native", "scene", "kernels"),
+    "fit": ("errors", "scene", "kernels", "render", "svg", "metrics"),
+    "jobs": ("errors", "scene", "kernels.constants", "render", "fit", "files", "svg", "metrics"),
+}
+"""What each folder or module may import, itself and the version aside; a name stands for all that is in it.
+Those that are not named may import all but ``cli``."""
+
+HEAVY = {"numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "svgelements", "scipy"}
+"""What the command line imports only when a command runs: ``--help`` answers at once."""
+
+
+@functools.cache
+def modules() -> dict[str, ast.Module]:
+    """The package's modules by name without ``warpsplat.``; the package itself is ``""``."""
+    found = {}
+    for folder, _, files in os.walk(ROOT / "warpsplat", followlinks=True):
+        for file in files:
+            if file.endswith(".py"):
+                path = Path(folder, file)
+                parts = path.relative_to(ROOT / "warpsplat").with_suffix("").parts
+                name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+                found[name] = ast.parse(path.read_text(encoding="utf-8"))
+    return found
+
+
+def imported(nodes: Iterator[ast.AST]) -> set[str]:
+    """Full names of the modules, or of what is in them, that import statements among ``nodes`` name."""
+    names: set[str] = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative imports"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def own(names: set[str]) -> set[str]:
+    """The package's modules among ``names``, as in ``modules``."""
+    found = set()
+    for name in names:
+        if name == "warpsplat" or name.startswith("warpsplat."):
+            inner = name.removeprefix("warpsplat").removeprefix(".")
+            found.add(inner if inner in modules() else inner.rpartition(".")[0])
+    return found
+
+
+def at_import(tree: ast.Module) -> Iterator[ast.AST]:
+    """Nodes that run when the module is imported: no functions, and nothing for type checkers only."""
+    waiting: list[ast.AST] = list(tree.body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+            continue
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        yield node
+        waiting += ast.iter_child_nodes(node)
+
+
+def within(module: str, name: str) -> bool:
+    return module == name or module.startswith(f"{name}.")
+
+
+def test_imports_point_one_way() -> None:
+    wrong = []
+    for module, tree in modules().items():
+        home = module.partition(".")[0]
+        for other in own(imported(ast.walk(tree))) - {"", "_version"}:
+            if home in ALLOWED:
+                right = any(within(other, name) for name in (home, *ALLOWED[home]))
+            else:
+                right = home in ("cli", "__main__") or not within(other, "cli")
+            if not right:
+                wrong.append(f"{module} imports {other}")
+    assert not wrong
+
+
+def test_the_table_names_what_there_is() -> None:
+    for name, others in ALLOWED.items():
+        for module in (name, *others):
+            assert module in modules(), module
+
+
+def test_no_import_circles() -> None:
+    """Not even by imports inside functions."""
+    graph = {module: own(imported(ast.walk(tree))) - {module} for module, tree in modules().items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_the_command_line_starts_light() -> None:
+    """What ``--help`` imports; and no file of a command names a heavy library at its top."""
+    reached, waiting = set(), {"cli.main"}
+    while waiting:
+        module = waiting.pop()
+        reached.add(module)
+        names = imported(at_import(modules()[module]))
+        assert not {name.partition(".")[0] for name in names} & HEAVY, module
+        parents = {module.rpartition(".")[0] for module in own(names)}
+        waiting |= (own(names) | parents) - reached
+    assert len(reached) > 3
+    for module, tree in modules().items():
+        if within(module, "cli"):
+            assert not {name.partition(".")[0] for name in imported(at_import(tree))} & HEAVY, module
+
+
+# Kernels.
+
+IN, OUT = "# In:", "# Out:"
+SHAPE = re.compile(r"\[[^\[\]]+\]")
+
+
+def is_kernel(node: ast.AST) -> bool:
+    return isinstance(node, ast.FunctionDef) and "wp.kernel" in map(ast.unparse, node.decorator_list)
+
+
+def kernels() -> dict[str, tuple[ast.FunctionDef, list[str]]]:
+    """Each kernel with the lines of its file."""
+    found = {}
+    for path in sorted((ROOT / "kernels").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef) and is_kernel(node):
+                name = f"{path.relative_to(ROOT / 'kernels').with_suffix('')}.{node.name}"
+                found[name] = (node, text.splitlines())
+    return found
+
+
+KERNELS = kernels()
+by_kernel = pytest.mark.parametrize(("kernel", "lines"), KERNELS.values(), ids=KERNELS.keys())
+
+
+def marker(kernel: ast.FunctionDef, lines: list[str], text: str) -> int:
+    """The line (from 1) of a marker in the signature."""
+    rows = range(kernel.lineno, kernel.body[0].lineno)
+    (found,) = [row for row in rows if lines[row - 1].strip() == text]
+    return found
+
+
+def parts(kernel: ast.FunctionDef, lines: list[str]) -> tuple[list[ast.arg], list[ast.arg]]:
+    """Parameters under In and under Out."""
+    out = marker(kernel, lines, OUT)
+    given = kernel.args.args
+    return [a for a in given if a.lineno < out], [a for a in given if a.lineno > out]
+
+
+@by_kernel
+def test_signatures(kernel: ast.FunctionDef, lines: list[str]) -> None:
+    """``offset`` first, inputs before outputs, the shape at each array."""
+    inputs, outputs = parts(kernel, lines)
+    assert kernel.args.args[0].arg == "offset"
+    assert marker(kernel, lines, IN) == kernel.args.args[0].lineno - 1
+    assert inputs and outputs
+    for argument in kernel.args.args:
+        assert argument.annotation is not None
+        kind = ast.unparse(argument.annotation)
+        if "array" in kind:
+            end = lines[(argument.end_lineno or 0) - 1]
+            assert SHAPE.search(end.partition("#")[2]), f"{argument.arg}: no shape"
+        else:
+            assert argument in inputs, f"{argument.arg}: a number cannot be written to"
+    assert ast.get_docstring(kernel)
+
+
+STORES = {"atomic_add", "atomic_or", "atomic_and", "atomic_min", "atomic_max", "atomic_sub"}
+
+
+def written(kernel: ast.FunctionDef, parameters: set[str]) -> set[str]:
+    """Names of arrays that the kernel, or a function of ours that it hands them to, stores into."""
+    names: set[str] = set()
+    for node in ast.walk(kernel):
+        targets: list[ast.expr] = []
+        if isinstance(node, ast.Assign):
+            targets = node.targets
+        elif isinstance(node, ast.AugAssign):
+            targets = [node.target]
+        elif isinstance(node, ast.Call):
+            called = ast.unparse(node.func).rpartition(".")[2]
+            if called in STORES:
+                names.add(ast.unparse(node.args[0]))
+            elif called in FUNCTIONS:
+                order = [a.arg for a in FUNCTIONS[called].args.args]
+                stored = written(FUNCTIONS[called], set(order))
+                names |= {ast.unparse(a) for name, a in zip(order, node.args, strict=True) if name in stored}
+        for target in targets:
+            if isinstance(target, ast.Subscript):
+                names.add(ast.unparse(target.value))
+    return names & parameters
+
+
+FUNCTIONS = {
+    node.name: node
+    for path in sorted((ROOT / "kernels").rglob("*.py"))
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    if isinstance(node, ast.FunctionDef) and "wp.func" in map(ast.unparse, node.decorator_list)
+}
+
+
+@by_kernel
+def test_what_is_written_is_an_output(kernel: ast.FunctionDef, lines: list[str]) -> None:
+    inputs, outputs = parts(kernel, lines)
+    stored = written(kernel, {a.arg for a in kernel.args.args})
+    assert not stored & {a.arg for a in inputs}
+    assert stored == {a.arg for a in outputs}, "an output that nothing is written to"
+
+
+def test_kernels_are_launched_by_name_only() -> None:
+    """``Program.launch`` binds parameters by their names; Warp's own launch goes by position."""
+    homes = []
+    launches = 0
+    for module, tree in modules().items():
+        if within(module, "kernels"):
+            continue
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                name = ast.unparse(node.func)
+                homes += [module] if name in {"wp.launch", "wp.launch_tiled", "warp.launch"} else []
+                launches += name == "program.launch"
+    assert homes == ["render.program"]
+    assert launches > 25

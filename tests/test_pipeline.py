@@ -1,0 +1,165 @@
+"""Whole runs: determinism, the loop's promises, and a real photograph."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import picture
+from warpsplat.files.image import load_image
+from warpsplat.fit.loop import Progress
+from warpsplat.fit.settings import Density, Renderer, make_settings
+from warpsplat.jobs.vectorize import vectorize
+from warpsplat.render.backend import Backend
+from warpsplat.scene import Kind
+
+CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("renderer", ["exact", "splat"])
+def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: Renderer) -> None:
+    settings = make_settings(
+        kind=kind, renderer=renderer, curves=16, iterations=40, seed=3, coarse_pixels=1000
+    )
+    files = [vectorize(picture(), settings, Backend.on(device, n)).svg for n in (1, 2, 1)]
+    assert files[0] == files[1] == files[2]
+    other = replace(settings, seed=4)
+    assert vectorize(picture(), other, Backend.on(device)).svg != files[0]
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_the_loss_falls_and_the_count_stays(device: str, kind: Kind) -> None:
+    settings = make_settings(kind=kind, curves=20, iterations=80, density=Density(interval=10))
+    seen: list[Progress] = []
+    result = vectorize(picture(), settings, Backend.on(device), report=seen.append)
+    assert result.score
+    assert len(result.scene) == 20
+    assert result.score.paths == 20
+    assert seen[-1].step == seen[-1].steps == 80
+    assert seen[-1].psnr > seen[0].psnr + 2
+    assert result.score.psnr > 24
+    assert abs(result.score.psnr - result.render_psnr) < 2
+
+
+def test_paper_options_run(device: str) -> None:
+    settings = make_settings(
+        kind=Kind.STROKE,
+        renderer="splat",
+        curves=8,
+        iterations=30,
+        order="area",
+        through_scales=False,
+    )
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert len(result.scene) == 8
+    assert result.score.paths == 8
+
+
+def test_stop_ends_the_run_early_with_a_file(device: str) -> None:
+    settings = make_settings(curves=8, iterations=1000)
+    calls = 0
+
+    def stop() -> bool:
+        nonlocal calls
+        calls += 1
+        return calls >= 5
+
+    result = vectorize(picture(), settings, Backend.on(device), stop=stop)
+    assert result.score
+    assert result.stopped
+    assert result.iterations == 5
+    assert "<path" in result.svg
+
+
+@pytest.mark.parametrize("size", [(2, 2), (3, 50), (33, 17), (100, 33)])
+def test_odd_sizes(device: str, size: tuple[int, int]) -> None:
+    image = np.random.default_rng(0).uniform(size=(size[1], size[0], 3)).astype(np.float32)
+    result = vectorize(image, make_settings(curves=30, iterations=12), Backend.on(device))
+    assert result.score
+    assert (result.scene.canvas.width, result.scene.canvas.height) == size
+    assert np.isfinite(result.scene.points).all()
+
+
+FIGURES = [
+    ("exact", Kind.FILL, 26.0, 0.15),
+    ("exact", Kind.STROKE, 25.0, 0.4),
+    ("splat", Kind.FILL, 24.0, 0.7),
+]
+
+
+@pytest.mark.parametrize(("renderer", "kind", "figure", "gap"), FIGURES)
+def test_a_photograph_reaches_its_figure(renderer: Renderer, kind: Kind, figure: float, gap: float) -> None:
+    """451x300, 192 curves, 100 steps: PSNR of the file, and how much more the training render has."""
+    settings = make_settings(renderer=renderer, kind=kind, curves=192, iterations=100, coarse_pixels=30_000)
+    result = vectorize(load_image(CAT), settings, Backend.on("cpu"))
+    assert result.score
+    assert result.score.psnr > figure
+    assert abs(result.render_psnr - result.score.psnr) < gap
+
+
+def test_time_budget_sizes_the_run(device: str) -> None:
+    settings = make_settings(curves=12, time_budget="2s", coarse_pixels=1000)
+    vectorize(picture(), replace(settings, time_budget=None, iterations=4), Backend.on(device))  # compile
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert result.iterations > 20
+    assert result.seconds < 2.5, "a step past the deadline at the most"
+    assert not result.stopped
+
+
+def test_target_psnr_ends_the_run(device: str) -> None:
+    settings = make_settings(curves=20, iterations=3000, target_psnr=22.0)
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert result.score.psnr >= 22
+    assert result.iterations < 3000
+    assert not result.missed
+    missed = vectorize(picture(), replace(settings, iterations=10, target_psnr=60.0), Backend.on(device))
+    assert missed.score
+    assert missed.missed[0].startswith("target-psnr 60 dB: reached ")
+
+
+def test_max_bytes_is_kept(device: str) -> None:
+    for limit in (900, 3000):
+        settings = make_settings(curves=200, iterations=15, max_bytes=limit)
+        result = vectorize(picture(), settings, Backend.on(device))
+        assert result.score
+        assert result.score.bytes <= limit
+        assert len(result.scene) >= limit // 300 - 1
+    tiny = vectorize(picture(), replace(settings, max_bytes=50), Backend.on(device))
+    assert tiny.score
+    assert "max-bytes 50" in tiny.missed[0]
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("precision", [0, 1, 2])
+def test_max_bytes_are_used(device: str, kind: Kind, precision: int) -> None:
+    """On a photograph; its shapes fit a little more than the limit, and the least of them go."""
+    settings = make_settings("draft", curves=900, kind=kind, precision=precision, max_bytes="20KB")
+    result = vectorize(load_image(CAT), replace(settings, iterations=30), Backend.on(device))
+    assert result.score
+    assert 0.95 * 20_000 < result.score.bytes <= 20_000
+    assert result.missed == ()
+
+
+def test_a_simple_image_gets_fewer_shapes_unless_told(device: str) -> None:
+    target = np.ones((64, 64, 3), np.float32)
+    target[16:40, 20:50] = [1, 0, 0]
+    settings = make_settings(iterations=5)
+    assert len(vectorize(target, settings, Backend.on(device)).scene) == 32
+    told = make_settings(iterations=5, curves=50)
+    assert len(vectorize(target, told, Backend.on(device)).scene) == 50
+
+
+def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str) -> None:
+    """Splats leak: the file is worse than the render, and the estimate knows."""
+    settings = make_settings(curves=60, iterations=120, precision=0, renderer="splat")
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert result.render_psnr > result.estimated_psnr + 0.1
+    assert abs(result.estimated_psnr - result.score.psnr) < abs(result.render_psnr - result.score.psnr)

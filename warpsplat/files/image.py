@@ -1,0 +1,179 @@
+"""Reading images: whatever Pillow opens, as sRGB on white, upright.
+
+A photograph of 50 megapixels is 600 MB as floats, so that beside the result only strips of it are held.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from warpsplat.errors import ImageError
+from warpsplat.files.inputs import input_name, read_input
+from warpsplat.native import messages_hidden
+from warpsplat.scene import FloatArray
+
+MIN_SIDE = 2
+"""Smallest side of an image [px]: with one pixel there is nothing to fit a curve to."""
+
+MAX_PIXELS = 250_000_000
+"""Largest image [pixels]: the largest that cameras give. A small file may claim any size (a bomb)."""
+
+STRIP_PIXELS = 1 << 20
+"""Pixels that are converted at a time."""
+
+LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
+"""What Pillow makes of a sample 1 in PNGs of fewer than 8 bits; their transparent grey it leaves as it is."""
+
+
+def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
+    """Read an image: first frame, EXIF rotation applied, transparency composited on white.
+
+    Args:
+        source: a file, ``-`` for the standard input, or the bytes of an image.
+        name: what messages call it; without, the path.
+
+    Returns:
+        sRGB in [0, 1], shape (height, width, 3), float32. Grey images of 16 bits keep their precision.
+
+    Raises:
+        ImageError: missing, unreadable, truncated, not an image, too large, too small, or with pixels that
+            are no numbers. The message is one line that names the image and the cause.
+    """
+    if isinstance(source, Path):
+        name = name or input_name(source)
+        source = read_input(source)
+    name = name or "the image"
+    try:
+        # Pillow warns of what it can read all the same (odd metadata), and of bombs, which are refused;
+        # libtiff prints what is wrong with a file, whether or not it can be read.
+        with warnings.catch_warnings(), _pixel_limit(), messages_hidden():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(source)) as opened:
+                width, height = opened.size
+                if min(width, height) < MIN_SIDE:
+                    least = f"at least {MIN_SIDE}x{MIN_SIDE} are needed"
+                    raise ImageError(f"{width}x{height} pixels; {least}")
+                rawmode = _rawmode(opened)
+                opened.load()
+                _mend_transparency(opened, rawmode, source)
+                ImageOps.exif_transpose(opened, in_place=True)
+                return to_srgb(opened)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from None
+    except MemoryError:
+        raise
+    except UnidentifiedImageError:
+        raise ImageError(f"{name}: not an image, or a format that Pillow cannot read") from None
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
+        limit = f"{MAX_PIXELS / 1e6:g} million pixels"
+        raise ImageError(f"{name}: too large: more than {limit}") from None
+    except Exception as error:  # Pillow's decoders raise nearly every kind of exception on broken data
+        cause = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ImageError(f"{name}: damaged or unsupported image: {cause}") from error
+
+
+@contextlib.contextmanager
+def _pixel_limit() -> Iterator[None]:
+    """MAX_PIXELS in place of Pillow's own limit, which its decoders look up themselves."""
+    before = Image.MAX_IMAGE_PIXELS
+    Image.MAX_IMAGE_PIXELS = MAX_PIXELS
+    try:
+        yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = before
+
+
+def _rawmode(image: Image.Image) -> str:
+    """How the samples of an image that is not yet loaded lie in its file; empty where Pillow does not say."""
+    tiles: list[Any] = getattr(image, "tile", [])
+    return tiles[0].args if tiles and isinstance(tiles[0].args, str) else ""
+
+
+def _mend_transparency(image: Image.Image, rawmode: str, data: bytes) -> None:
+    """A PNG's transparent colour (tRNS) where Pillow compares it with samples of another depth."""
+    transparency = image.info.get("transparency")
+    if rawmode in LEVELS and isinstance(transparency, int):
+        image.info["transparency"] = LEVELS[rawmode] * transparency
+    if rawmode == "RGB;16B" and transparency is not None:
+        # Pillow has dropped the lower bytes, in which a colour may differ from the transparent one.
+        deep = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if deep is None or deep.ndim != 3 or deep.shape[2] != 4:
+            raise ImageError("16-bit colours with a transparent one cannot be read")
+        del image.info["transparency"]
+        image.putalpha(Image.fromarray(np.where(deep[..., 3] == 0, 0, 255).astype(np.uint8)))
+
+
+def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
+    """Rows, and the part of the image that they are."""
+    width, height = image.size
+    step = max(1, STRIP_PIXELS // width)
+    for top in range(0, height, step):
+        bottom = min(top + step, height)
+        yield slice(top, bottom), image.crop((0, top, width, bottom))
+
+
+def to_srgb(image: Image.Image) -> FloatArray:
+    """A loaded Pillow image of any mode as sRGB in [0, 1] on white, shape (height, width, 3).
+
+    Raises:
+        ImageError: pixels that are no numbers.
+    """
+    if image.mode == "F" or image.mode.startswith("I"):
+        return _grey_to_srgb(image)
+    transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
+    out = np.empty((image.height, image.width, 3), np.float32)
+    for rows, part in _strips(image):
+        if not transparent:
+            np.divide(np.asarray(part.convert("RGB")), np.float32(255), out=out[rows])
+            continue
+        rgba = np.asarray(part.convert("RGBA"), np.float32) / np.float32(255)
+        alpha = rgba[..., 3:]
+        out[rows] = rgba[..., :3] * alpha + (1 - alpha)
+    return out
+
+
+def _grey_to_srgb(image: Image.Image) -> FloatArray:
+    """One channel of 16 or 32 bits, integers or floats."""
+    top = _white(image)
+    transparent = image.info.get("transparency")
+    out = np.empty((image.height, image.width, 3), np.float32)
+    for rows, part in _strips(image):
+        samples = np.asarray(part)
+        grey = np.clip(samples.astype(np.float32) / np.float32(top), 0, 1)
+        if isinstance(transparent, int):
+            grey[samples == transparent] = 1
+        out[rows] = grey[..., None]
+    return out
+
+
+def _white(image: Image.Image) -> float:
+    """The sample that is white.
+
+    Raises:
+        ImageError: samples that are no numbers.
+    """
+    if image.mode.startswith("I;16") or image.format in {"PNG", "PPM"}:
+        return 65535.0
+    largest, missing = -np.inf, 0
+    for _, part in _strips(image):
+        samples: npt.NDArray[Any] = np.asarray(part)
+        finite = samples[np.isfinite(samples)]
+        missing += samples.size - finite.size
+        largest = max(largest, float(finite.max())) if finite.size else largest
+    if missing:
+        share = f"{missing} of {image.width * image.height} pixels"
+        raise ImageError(f"{share} are no numbers (NaN or infinite)")
+    # Neither format says what white is: the least of the usual ones that holds all samples.
+    tops = [255.0, 65535.0, 2.0**31 - 1] if image.mode == "I" else [1.0, 255.0, 65535.0]
+    return next((top for top in tops if largest <= top), largest)

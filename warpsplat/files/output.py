@@ -1,0 +1,275 @@
+"""Writing results: beside, then renamed, so that nothing half-written is ever found.
+
+An existing result keeps its permissions and, where the system allows it, its owner. Of a symbolic link the
+target is replaced. Of a file with several hard links only the name that was given is: the others keep the old
+content, as copies made with ``cp -al`` expect.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import hashlib
+import os
+import platform
+import re
+import secrets
+import stat
+import struct
+import sys
+import time
+import zlib
+from pathlib import Path
+
+from warpsplat.errors import OutputError, UsageError, WarpsplatError
+from warpsplat.files.inputs import STANDARD
+
+SVG_MARK = b"<metadata>warpsplat "
+"""In the head of every SVG written here (``svg.write_svg``)."""
+
+PNG_SOFTWARE = "warpsplat"
+"""Text of the ``Software`` chunk of every PNG written here."""
+
+HEAD = 2000
+"""Bytes at the start of a file in which its mark stands."""
+
+OLD = 86_400
+"""Age [s] from which a temporary file is a dead run's, whatever its name says: a write takes seconds."""
+
+_unfinished: set[str] = set()
+"""Temporary files of this process."""
+
+
+def check_output(path: Path, *sources: Path, ending: str | None = None, overwrite: bool = True) -> None:
+    """Find out before the work whether ``path`` can be written, or ``-``, the standard output.
+
+    Args:
+        path: the result.
+        sources: files that it must not replace.
+        ending: what the name must end with, ``.svg``; any if None.
+        overwrite: whether a file that warpsplat did not write may be replaced.
+
+    Raises:
+        UsageError: the folder is missing or not writable, ``path`` is no regular file, one of ``sources``, of
+            another ending, or somebody else's.
+    """
+    if path == STANDARD:
+        return
+    try:
+        _check_output(path, sources)
+        if ending and path.suffix.lower() != ending:
+            raise UsageError(f"{path}: the result is a file of type {ending}; give it a name that says so")
+        if not overwrite and not may_replace(path):
+            raise UsageError(f"{path}: exists and was not written by warpsplat; --overwrite replaces it")
+    except (OSError, ValueError) as error:
+        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise UsageError(f"{str(path)[:200]}: cannot be written: {cause}") from error
+
+
+def _check_output(path: Path, sources: tuple[Path, ...]) -> None:
+    target = check_target(path)
+    for source in sources:
+        if source.exists() and target == Path(os.path.realpath(source)):
+            raise UsageError(f"{path}: is the input itself; give another output")
+    try:
+        check_folder(target.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def check_folder(folder: Path) -> None:
+    """Find out whether files can be made in ``folder``, and remove what dead runs left there.
+
+    Raises:
+        UsageError: they cannot.
+    """
+    remove_stale(folder)
+    try:
+        handle, name = _temporary(folder)
+    except OSError as error:
+        raise UsageError(f"cannot write to {folder}: {error.strerror}") from error
+    os.close(handle)
+    _discard(name)
+
+
+def check_target(path: Path) -> Path:
+    """The file that a result is written to, behind all links: a regular one, or one that is not there yet.
+
+    Raises:
+        UsageError: a folder, a pipe, a device, a loop of links, or a file in a folder that is missing.
+        OSError: the name is too long, or what leads there may not be read.
+    """
+    if path.is_dir():
+        raise UsageError(f"{path}: is a folder, not a file")
+    target = _target(path)
+    folder = target.parent
+    if not folder.is_dir():
+        raise UsageError(f"{path}: {folder} is not a folder" if folder.exists() else _missing(path, folder))
+    with contextlib.suppress(FileNotFoundError):
+        if not stat.S_ISREG(os.lstat(target).st_mode):
+            raise UsageError(f"{path}: is a device or a pipe, not a file")
+    return target
+
+
+def _missing(path: Path, folder: Path) -> str:
+    linked = f", to which {path.name} links," if path.is_symlink() else ""
+    return f"{path}: the folder {folder}{linked} does not exist"
+
+
+def _target(path: Path) -> Path:
+    """The file itself, behind all links.
+
+    Raises:
+        UsageError: the links lead round in a circle.
+    """
+    real = Path(os.path.realpath(path))
+    if real.is_symlink():
+        raise UsageError(f"{path}: is a loop of links")
+    return real
+
+
+def may_replace(path: Path) -> bool:
+    """Whether ``path`` is free, empty, or a file that warpsplat wrote.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except FileNotFoundError:
+        return True
+    return not head or SVG_MARK in head or b"tEXtSoftware\0" + PNG_SOFTWARE.encode() in head
+
+
+def mark_png(png: bytes) -> bytes:
+    """A PNG with a ``Software`` chunk behind its header, by which ``may_replace`` knows it."""
+    chunk = b"tEXtSoftware\0" + PNG_SOFTWARE.encode()
+    whole = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    return png[:PNG_HEADER] + whole + png[PNG_HEADER:]
+
+
+PNG_HEADER = 33
+"""Length of a PNG's signature and header chunk [bytes]."""
+
+
+def write_result(path: Path, data: bytes) -> None:
+    """Write ``data`` to ``path`` atomically, or to the standard output for ``-``.
+
+    Raises:
+        OutputError: it could not be written.
+    """
+    if path != STANDARD:
+        write_atomically(path, data)
+        return
+    try:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except (OSError, ValueError) as error:
+        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise OutputError(f"standard output: could not be written: {cause}") from error
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write ``data`` to a new file beside ``path``, then rename it.
+
+    Raises:
+        OutputError: the disk is full, or the folder cannot be written; ``path`` is as it was.
+    """
+    name: str | None = None
+    try:
+        target = _target(path)
+        handle, name = _temporary(target.parent)
+        with os.fdopen(handle, "wb") as file:
+            _keep_attributes(target, handle)
+            file.write(data)
+            file.flush()
+            os.fsync(handle)
+        os.replace(name, target)
+        _unfinished.discard(name)
+    except BaseException as error:
+        if name:
+            _discard(name)
+        if isinstance(error, OSError):
+            raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
+        if isinstance(error, WarpsplatError):
+            raise OutputError(str(error)) from error
+        raise
+
+
+def _keep_attributes(target: Path, handle: int) -> None:
+    """Give a new file the owner and permissions of the one that it replaces; a free name has none."""
+    try:
+        old = os.stat(target)
+    except FileNotFoundError:
+        return
+    if not hasattr(os, "fchown"):  # Windows
+        return
+    for owner, group in ((-1, old.st_gid), (old.st_uid, -1)):
+        with contextlib.suppress(OSError):
+            os.fchown(handle, owner, group)
+    with contextlib.suppress(OSError):
+        os.fchmod(handle, stat.S_IMODE(old.st_mode))  # last: a new owner clears bits
+
+
+def _machine() -> str:
+    """Names where a process number means something: the host, and its name space of processes."""
+    space = ""
+    with contextlib.suppress(OSError):
+        space = os.readlink("/proc/self/ns/pid")
+    return hashlib.sha256(f"{platform.node()} {space}".encode()).hexdigest()[:8]
+
+
+TEMPORARY = re.compile(r"\.warpsplat-([0-9a-f]{8})-(\d{1,10})-[0-9a-f]{8}\.tmp")
+
+
+def _temporary(folder: Path) -> tuple[int, str]:
+    """A new file in ``folder``, open for writing, with the permissions that the process gives new files."""
+    name = os.path.join(folder, f".warpsplat-{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    _unfinished.add(name)
+    try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
+        return os.open(name, flags, 0o666), name
+    except BaseException:
+        _discard(name)
+        raise
+
+
+def _discard(name: str) -> None:
+    with contextlib.suppress(OSError):
+        os.unlink(name)
+    _unfinished.discard(name)
+
+
+@atexit.register
+def remove_unfinished() -> None:
+    """Remove the temporary files of this process, which ends."""
+    for name in list(_unfinished):
+        _discard(name)
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove the temporary files that dead runs left in ``folder``, never those of a run that lives."""
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            found = TEMPORARY.fullmatch(entry.name)
+            if not found or not entry.is_file(follow_symlinks=False):
+                continue
+            dead = found[1] == _machine() and not _alive(int(found[2]))
+            if dead or time.time() - entry.stat(follow_symlinks=False).st_mtime > OLD:
+                with contextlib.suppress(OSError):
+                    os.unlink(entry.path)
+
+
+def _alive(process: int) -> bool:
+    """Whether a process of this machine lives; where that cannot be asked, it may."""
+    if os.name != "posix" or process <= 0:
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True

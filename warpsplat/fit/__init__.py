@@ -1,0 +1,1 @@
+"""The optimisation of a scene against an image."""

@@ -1,0 +1,14 @@
+"""The file that settings ask for."""
+
+from __future__ import annotations
+
+from warpsplat.fit.settings import Settings
+from warpsplat.kernels import constants
+from warpsplat.scene import Scene
+from warpsplat.svg.write import write_svg
+
+
+def export(scene: Scene, settings: Settings, metadata: str = "") -> str:
+    """The file that ``settings`` ask for."""
+    plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
+    return write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)

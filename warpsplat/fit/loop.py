@@ -1,0 +1,122 @@
+"""The loop of a run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpsplat.fit.budget import Budget
+from warpsplat.fit.place import grid_scene
+from warpsplat.fit.schedule import CHECK_INTERVAL, LOOK_INTERVAL, phase_at, phases, shapes_at, work_done
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
+from warpsplat.fit.surgery import operate
+from warpsplat.fit.viewer_shift import look_at_file
+from warpsplat.render.backend import Backend
+from warpsplat.scene import FloatArray, Scene
+
+TARGET_MARGIN = 0.1
+"""How much more than the target the training render must have [dB], for the file to have it."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """State of a run between two steps."""
+
+    step: int
+    """Steps done."""
+    steps: int
+    """Steps in all."""
+    psnr: float
+    """Of the internal render at the current training size [dB]."""
+    seconds: float
+    """Since the start of the training."""
+    work: float
+    """Share of the run's work that is done, 0 to 1: a step counts by what its size makes it cost."""
+    fine: bool
+    """Whether the size is the finest: on a reduced image the same shapes have more decibels."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a run made."""
+
+    scene: Scene
+    render_psnr: float
+    """Of the last training render, at its size [dB]."""
+    estimated_psnr: float
+    """What the last step's loss stands for [dB]: from the first look at the file on, the file."""
+    iterations: int
+    """Steps done."""
+    interrupted: bool
+
+
+def fit(
+    image: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    *,
+    scene: Scene | None = None,
+    seconds: float | None = None,
+    report: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Fit:
+    """Optimise shapes against ``image``.
+
+    Args:
+        image: sRGB in [0, 1], shape (height, width, 3).
+        settings: all that decides the result.
+        backend: where to compute.
+        scene: shapes to start from, whose number stays; without, new ones.
+        seconds: time that the run should take, in place of the settings' iterations.
+        report: called every few steps.
+        stop: asked after every step; once true, the run ends. So does reaching ``target_psnr``.
+    """
+    rng = np.random.default_rng(settings.seed)
+    grows = scene is None
+    start = grid_scene(settings, image, shapes_at(settings, 0), rng) if scene is None else scene
+    state = FitState.start(start, backend, rng)
+    budget = Budget(seconds) if seconds is not None else None
+    if budget:
+        settings = budget.measure(state, settings, image)
+    started = time.monotonic()
+    plan = phases(settings, image.shape[1], image.shape[0])
+    step: Step | None = None
+    phase = None
+    interrupted = False
+    while True:
+        entered = phase_at(settings, plan, state.step)
+        if step is None or entered is not phase:
+            phase = entered
+            step = Step(state, settings, Target(image, phase))
+        step.advance()
+        done, finest = state.step, phase is plan[-1]
+        if done % CHECK_INTERVAL == 0 or done == settings.iterations:
+            step.make_room()
+            if report:
+                spent, work = time.monotonic() - started, work_done(settings, plan, done)
+                report(Progress(done, settings.iterations, step.psnr(), spent, work, finest))
+            if settings.target_psnr and finest and step.psnr() >= settings.target_psnr + TARGET_MARGIN:
+                break
+        if stop and stop():
+            interrupted = True
+            break
+        if done >= settings.iterations or (budget and budget.over()):
+            break
+        density = settings.density
+        surgical = done < density.stop * settings.iterations
+        if settings.viewer and finest and not surgical and done % LOOK_INTERVAL == 0:
+            look_at_file(step)
+        due = density.interval > 0 and done % density.interval == 0
+        if due and budget and phase is plan[0]:
+            slowness = (time.monotonic() - started) / (done * budget.costs[0])
+            settings = budget.fit(settings, done, slowness)
+            step.configure(settings)
+        missing = grows and state.parameters.shape_count < settings.curves
+        if due and done < settings.iterations and (missing or done < density.stop * settings.iterations):
+            step = operate(step, grows=grows)
+    return Fit(state.scene(), step.render_psnr(), step.psnr(), state.step, interrupted)

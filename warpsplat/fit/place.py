@@ -1,0 +1,194 @@
+"""First shapes: small circles or strokes on a jittered grid, with the colours of the image."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.fit.settings import Settings
+from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+
+OPACITY = 0.98
+"""Opacity of a new shape: it hides what it should replace, and may still become translucent."""
+
+COVER = 1.3
+"""Area of the first shapes over the area of the canvas: circles on a grid that leave few gaps."""
+
+STROKE_CUBICS = 3
+"""Cubics in a new stroke (paper section 3.2, as in DiffVG)."""
+
+STROKE_ASPECT = 3.0
+"""Length over width of a new stroke."""
+
+SURVEY_PIXELS = 400_000
+"""Largest image that colours and directions of the first shapes are taken from [pixels]."""
+
+SURVEY_SIGMA = 128.0
+"""Widest blur of that image [px]: its cost grows with the width."""
+
+LEVELS = 32
+"""Of a channel, to tell a drawing's colours."""
+
+FLAT_SHARE = 0.98
+"""Share of a drawing's pixels that its few colours hold; the rest are the soft pixels of outlines."""
+
+FLAT_COLORS = 12
+"""Most colours of a drawing whose shapes are counted."""
+
+LEAST_REGION = 1e-4
+"""Least area of a region that counts, over the area of the image."""
+
+SHAPES_A_REGION = 8
+"""Curves for a region of one colour: an outline has corners and holes."""
+
+LEAST_CURVES = 32
+"""For the simplest of drawings."""
+
+PIXELS_A_CURVE = 8
+"""Least pixels of an image for each curve: a curve has about as many numbers as these have."""
+
+Floats = npt.NDArray[np.floating]
+
+
+def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
+    """``target`` so small that a blur by ``sigma`` [px of ``target``] takes no time.
+
+    Returns:
+        the image, ``target`` itself if it is small enough, and how many of ``target``'s pixels a pixel spans.
+    """
+    height, width = target.shape[:2]
+    span = max(np.sqrt(width * height / SURVEY_PIXELS), sigma / SURVEY_SIGMA)
+    if span <= 1:
+        return target, 1.0
+    size = (max(1, round(width / span)), max(1, round(height / span)))
+    return np.asarray(cv2.resize(target, size, interpolation=cv2.INTER_AREA), np.float32), float(span)
+
+
+def simple_curves(target: FloatArray) -> int:
+    """The most curves that make sense: few for a drawing in a few flat colours, or for a tiny image.
+
+    A drawing gets ``SHAPES_A_REGION`` curves for each region of one colour, any image at the most one for
+    ``PIXELS_A_CURVE`` of its pixels.
+    """
+    height, width = target.shape[:2]
+    room = max(1, width * height // PIXELS_A_CURVE)
+    steps = np.round(survey(target)[0] * (LEVELS - 1)).astype(np.int32)
+    codes = (steps * [LEVELS * LEVELS, LEVELS, 1]).sum(axis=2)
+    counts = np.bincount(codes.ravel())
+    colors = np.argsort(-counts, kind="stable")[:FLAT_COLORS]
+    if counts[colors].sum() < FLAT_SHARE * codes.size:
+        return room
+    regions = 0
+    for color in colors[counts[colors] > 0]:
+        _, _, stats, _ = cv2.connectedComponentsWithStats((codes == color).astype(np.uint8), connectivity=4)
+        regions += int((stats[1:, cv2.CC_STAT_AREA] >= LEAST_REGION * codes.size).sum())
+    return min(room, max(LEAST_CURVES, SHAPES_A_REGION * regions))
+
+
+def background_color(target: FloatArray) -> FloatArray:
+    """The border's colour where most of the border is alike (a drawing on paper), else the mean."""
+    border = np.concatenate([target[0], target[-1], target[:, 0], target[:, -1]])
+    median = np.median(border, axis=0)
+    alike = np.abs(border - median).max(axis=1) < 8 / 255
+    color = median if alike.mean() > 0.5 else survey(target)[0].mean(axis=(0, 1))
+    # As the file will have it.
+    return np.asarray(np.round(color * 255) / 255, np.float32)
+
+
+def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatArray:
+    """Circles as rings of ``2 * chain_cubics`` cubics, shape (shape, 6 * chain_cubics, 2)."""
+    count = 2 * chain_cubics
+    handle = 4 / 3 * np.tan(np.pi / (2 * count))
+    angle = 2 * np.pi * np.arange(count) / count
+    on = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    turn = np.stack([-on[:, 1], on[:, 0]], axis=1)
+    following, following_turn = np.roll(on, -1, axis=0), np.roll(turn, -1, axis=0)
+    ring = np.stack([on, on + handle * turn, following - handle * following_turn], axis=1).reshape(-1, 2)
+    return np.asarray(centres[:, None] + radii[:, None, None] * ring[None], np.float32)
+
+
+def stroke_outlines(centres: Floats, lengths: Floats, angles: Floats) -> FloatArray:
+    """Straight strokes of three cubics, shape (shape, 10, 2)."""
+    t = np.linspace(-0.5, 0.5, 3 * STROKE_CUBICS + 1)
+    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    along = lengths[:, None] * t[None, :]
+    return np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
+
+
+def place(
+    settings: Settings,
+    canvas: Canvas,
+    centres: Floats,
+    areas: Floats,
+    angles: Floats,
+    colors: npt.NDArray[Any],
+) -> Scene:
+    """New shapes of the settings' kind: ``areas`` in px squared, ``angles`` (strokes) in rad."""
+    count = len(centres)
+    if settings.kind == Kind.FILL:
+        points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
+        widths = np.zeros(count)
+    else:
+        widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
+        points = stroke_outlines(centres, np.maximum(areas / widths, 2.0), angles)
+    return Scene.uniform(
+        settings.kind,
+        canvas,
+        points,
+        colors=np.asarray(colors, np.float32).reshape(count, 3),
+        opacities=np.full(count, OPACITY, np.float32),
+        widths=np.asarray(widths, np.float32),
+    )
+
+
+def canvas_for(target: FloatArray) -> Canvas:
+    """A canvas of ``target``'s size with a background of its colour."""
+    return Canvas(target.shape[1], target.shape[0], background_color(target))
+
+
+def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
+    """Direction along the contours at ``centres`` [rad]: the structure tensor's lesser eigenvector."""
+    grey = target.mean(axis=2)
+    gx, gy = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
+    xx, yy, xy = (cv2.GaussianBlur(g, (0, 0), max(sigma, 0.5)) for g in (gx * gx, gy * gy, gx * gy))
+    column, row = pixel_of(centres, target)
+    gradient = 0.5 * np.arctan2(2 * xy[row, column], (xx - yy)[row, column])
+    return np.asarray(gradient + np.pi / 2, np.float32)
+
+
+def shape_angles(settings: Settings, target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
+    """``contour_angles`` for strokes; 0 for filled shapes, which start as circles."""
+    if settings.kind == Kind.FILL:
+        return np.zeros(len(centres), np.float32)
+    return contour_angles(target, centres, sigma)
+
+
+def pixel_of(centres: Floats, target: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Column and row of the pixels that hold ``centres``, clamped to the image."""
+    column = np.clip(centres[:, 0].astype(np.intp), 0, target.shape[1] - 1)
+    row = np.clip(centres[:, 1].astype(np.intp), 0, target.shape[0] - 1)
+    return column, row
+
+
+def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.random.Generator) -> Scene:
+    """``count`` shapes that cover the canvas."""
+    canvas = canvas_for(target)
+    height, width = target.shape[:2]
+    rows = max(1, min(count, round(np.sqrt(count * height / width))))
+    per_row = np.full(rows, count // rows)
+    per_row[: count % rows] += 1
+    x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
+    y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
+    cell = np.sqrt(width * height / count)
+    centres = np.stack([x, y], axis=1) + rng.uniform(-0.25, 0.25, (count, 2)) * cell
+    centres = np.clip(centres, 0, [width, height])
+    small, span = survey(target, cell / 2)
+    blurred = cv2.GaussianBlur(small, (0, 0), max(cell / span / 4, 0.5))
+    column, row = pixel_of(centres / span, small)
+    areas = np.full(count, COVER * cell * cell)
+    angles = shape_angles(settings, small, centres / span, cell / span / 2)
+    scene = place(settings, canvas, centres, areas, angles, blurred[row, column])
+    return scene.take(rng.permutation(count))

@@ -1,0 +1,81 @@
+"""What happens when: image sizes, number of shapes, thresholds, turns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from warpsplat.fit.settings import Density, Settings
+
+SIZE_CHOICES = 12
+"""How many lengths of the shorter side are tried for a reduced image."""
+
+CHECK_INTERVAL = 10
+"""Steps between two looks at the loss and the counters of the device."""
+
+LOOK_INTERVAL = 25
+"""Steps between two looks at the file as a viewer shows it."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of steps at one image size."""
+
+    width: int
+    height: int
+
+
+def phases(settings: Settings, width: int, height: int) -> list[Phase]:
+    """Coarse, then fine, from ``settings.coarse`` of the iterations on; one where both are the same size."""
+
+    def fit(pixels: int) -> tuple[int, int]:
+        if pixels >= width * height:
+            return width, height
+        # One scale serves both sides, so that of the sizes a little smaller the one is taken where the longer
+        # side is the nearest to a whole number: the largest of those that are equally near.
+        short, long = min(width, height), max(width, height)
+        most = max(1, round(short * math.sqrt(pixels / (width * height))))
+        choices = range(most, max(0, most - SIZE_CHOICES), -1)
+        best = min(choices, key=lambda n: round(abs(long * n / short - round(long * n / short)), 2))
+        other = round(long * best / short)
+        return (best, other) if width <= height else (other, best)
+
+    coarse, fine = Phase(*fit(settings.coarse_pixels)), Phase(*fit(settings.fine_pixels))
+    return [fine] if coarse == fine else [coarse, fine]
+
+
+def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
+    """The phase that the step after ``step`` steps belongs to."""
+    return plan[0] if step < settings.coarse * settings.iterations else plan[-1]
+
+
+def work_done(settings: Settings, plan: list[Phase], step: int) -> float:
+    """Share of a run's work that ``step`` steps are: a step costs what its pixels cost."""
+    coarse = settings.coarse * settings.iterations if len(plan) > 1 else 0.0
+    first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
+    done = min(step, coarse) * first + max(step - coarse, 0.0) * last
+    return done / (coarse * first + (settings.iterations - coarse) * last)
+
+
+def fold_weight(settings: Settings, step: int) -> float:
+    """Weight of the fold loss; it grows geometrically over the run."""
+    growth = settings.fold_end / settings.fold_start
+    return float(settings.fold_start * growth ** (step / settings.iterations))
+
+
+def opacity_threshold(density: Density, progress: float) -> float:
+    """Falls linearly with ``progress`` (fraction of the run) until the set of curves is fixed."""
+    t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0
+    return density.opacity_start + t * (density.opacity_end - density.opacity_start)
+
+
+def shapes_at(settings: Settings, step: int) -> int:
+    """Shapes that a run should have after the turn at ``step``; at 0, those to start with.
+
+    All of them from ``grown`` on, and at the last turn in any case.
+    """
+    density, steps = settings.density, settings.iterations
+    if density.interval <= 0 or step + density.interval >= min(density.stop, 1.0) * steps:
+        return settings.curves
+    missing = 1.0 - step / (density.grown * steps) if density.grown > 0 else 0.0
+    return max(1, round(settings.curves * density.start ** max(missing, 0.0)))

@@ -1,0 +1,219 @@
+"""Settings of a run: the one home of every default, checked when made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, Literal
+
+from warpsplat.errors import UsageError
+from warpsplat.scene import ATTRIBUTES, Kind
+
+Quality = Literal["draft", "balanced", "high"]
+Order = Literal["age", "area"]
+Renderer = Literal["exact", "splat"]
+
+
+def default_rates() -> dict[str, float]:
+    """Learning rates by attribute, in the units of the table (``ATTRIBUTES``)."""
+    return {attribute.name: attribute.rate for attribute in ATTRIBUTES}
+
+
+@dataclass(frozen=True)
+class Density:
+    """Pruning and densification (paper section 3.4), and growth from few curves to all."""
+
+    start: float = 1 / 3
+    """Fraction of the curves at the start: the first ones settle as large shapes."""
+    grown: float = 0.5
+    """Fraction of the run at which all curves are there; until then their number grows geometrically."""
+    interval: int = 25
+    """Steps between two turns."""
+    stop: float = 0.75
+    """Fraction of the run after which the set of curves stays as it is."""
+    opacity_start: float = 0.2
+    """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""
+    opacity_end: float = 0.05
+    area: float = 6.0
+    """Prune below this area [px of the canvas, squared]."""
+    duplicate_color: float = 0.03
+    """Two curves are alike below this distance of colours ..."""
+    duplicate_overlap: float = 0.9
+    """... and above this overlap (intersection over union) of their boxes."""
+    replace: float = 0.1
+    """Replace at least this fraction of the curves each turn: those without which the error grows least."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All that decides the result, besides the image."""
+
+    kind: Kind = Kind.FILL
+    """Of new shapes."""
+    curves: int = 512
+    simplify: bool = False
+    """Whether an image that is simple gets fewer curves (``place.simple_curves``)."""
+    iterations: int = 1000
+    coarse: float = 0.7
+    """Fraction of the iterations on a reduced image."""
+    coarse_pixels: int = 100_000
+    """Size of that image [pixels]; a smaller image is not reduced."""
+    fine_pixels: int = 1_600_000
+    """Largest size of the image that the last iterations see [pixels]."""
+    seed: int = 0
+    chain_cubics: int = 2
+    """Cubics in each of the two chains of a closed curve."""
+    renderer: Renderer = "exact"
+    """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
+    order: Order = "age"
+    """Newest in front, or smallest in front as in the paper."""
+    ssim: float = 0.005
+    """Weight of 1 - SSIM beside the mean squared error."""
+    xing: float = 0.0
+    """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
+    bending: float = 5e-4
+    """Weight of the bending of the cubics [squared error of a pixel, summed over channels, per pixel]: burrs
+    and loops that do not lower the error straighten."""
+    fold_start: float = 0.2
+    """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
+    grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
+    fold_end: float = 3.0
+    through_scales: bool = True
+    """Whether gradients flow through the Gaussians' scales and angles."""
+    viewer: bool = True
+    """Whether the last steps take what a viewer shows, its rounding included, for the render."""
+    precision: int = 1
+    """Decimals of coordinates in the file."""
+    target_psnr: float | None = None
+    """Stop once the render has this PSNR at the finest size [dB]."""
+    time_budget: float | None = None
+    """Size the run to end within this time [s], start of the program not included."""
+    max_bytes: int | None = None
+    """Largest file [bytes]: as many curves as fit, ``curves`` at the most."""
+    rates: dict[str, float] = field(default_factory=default_rates)
+    """Adam's learning rates at the start, by attribute; they decay along a cosine."""
+    final_rate: float = 0.2
+    """Fraction of each rate that is left at the end."""
+    density: Density = field(default_factory=Density)
+
+    def __post_init__(self) -> None:
+        """Check ranges.
+
+        Raises:
+            UsageError: a value is out of its range.
+        """
+        checks = (
+            ("curves", self.curves, 1, 100_000),
+            ("iterations", self.iterations, 1, 1_000_000),
+            ("precision", self.precision, 0, 6),
+            ("seed", self.seed, 0, 2**32 - 1),
+            ("chain-cubics", self.chain_cubics, 1, 8),
+        )
+        for name, value, low, high in checks:
+            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+                raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+        goals = (
+            ("target-psnr", self.target_psnr),
+            ("time-budget", self.time_budget),
+            ("max-bytes", self.max_bytes),
+        )
+        for name, goal in goals:
+            if goal is not None and (
+                isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < math.inf
+            ):
+                raise UsageError(f"{name} must be a positive number, not {goal!r}")
+        if not isinstance(self.kind, Kind):
+            raise UsageError(f"kind must be a Kind, not {self.kind!r}")
+        choices = (
+            ("order", self.order, ("age", "area")),
+            ("renderer", self.renderer, ("exact", "splat")),
+        )
+        for name, choice, allowed in choices:
+            if choice not in allowed:
+                raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
+
+    def fingerprint(self) -> str:
+        """A short hash of all that decides the result."""
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
+SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
+UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
+BYTES = {
+    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
+    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
+}
+MAX_DIGITS = 15
+"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
+
+
+def parse_duration(value: str | float) -> float:
+    """``60``, ``60s``, ``2m`` or ``1.5h`` -> seconds.
+
+    Raises:
+        UsageError: none of these.
+    """
+    found = DURATION.fullmatch(str(value).strip())
+    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
+        raise UsageError(f"not a time: {value!r}; write 60s or 2m")
+    return float(found[1]) * UNITS[(found[2] or "s").lower()]
+
+
+def parse_bytes(value: str | int) -> int:
+    """``100000``, ``100KB`` or ``1MiB`` -> bytes.
+
+    Raises:
+        UsageError: none of these.
+    """
+    found = SIZE.fullmatch(str(value).strip())
+    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
+        raise UsageError(f"not a size: {value!r}; write 100KB, 1MB or 1GB")
+    return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
+
+
+PRESETS: dict[Quality, dict[str, Any]] = {
+    "draft": {"iterations": 200, "coarse": 0.9, "coarse_pixels": 50_000, "fine_pixels": 400_000},
+    "balanced": {},
+    "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
+}
+"""What each preset changes in the defaults."""
+
+SPLAT_SHARE = 0.5
+"""Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
+
+KINDS = {"closed": Kind.FILL, "open": Kind.STROKE}
+"""What options and batch files call the kinds of shapes."""
+
+QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
+
+DEFAULT_QUALITY: Quality = "balanced"
+
+
+def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Settings:
+    """The preset ``quality`` with ``overrides`` on top; overrides that are None are left out.
+
+    Without ``curves`` among them, a simple image gets fewer than the default (``Settings.simplify``).
+
+    Raises:
+        UsageError: an unknown name or a value out of range.
+    """
+    if quality not in PRESETS:
+        raise UsageError(f"quality must be one of {', '.join(PRESETS)}, not {quality!r}")
+    known = {f.name for f in fields(Settings)}
+    given = {name: value for name, value in overrides.items() if value is not None}
+    for name in given:
+        if name not in known:
+            raise UsageError(f"unknown setting {name!r}")
+    if "time_budget" in given:
+        given["time_budget"] = parse_duration(given["time_budget"])
+    if "max_bytes" in given:
+        given["max_bytes"] = parse_bytes(given["max_bytes"])
+    preset = Settings(simplify="curves" not in given, **PRESETS[quality])
+    if given.get("renderer") == "splat":
+        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations))
+    return replace(preset, **given)

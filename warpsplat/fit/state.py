@@ -1,0 +1,34 @@
+"""All that a run carries from step to step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warpsplat.render.backend import Backend
+from warpsplat.render.parameters import Parameters
+from warpsplat.scene import Scene
+
+
+@dataclass
+class FitState:
+    """What a run continues from: with this and its settings the rest follows."""
+
+    parameters: Parameters
+    """Values, moments and ages."""
+    clock: wp.array
+    """Steps done, on the device, shape (1,)."""
+    rng: np.random.Generator
+    step: int = 0
+    """Steps done."""
+
+    @staticmethod
+    def start(scene: Scene, backend: Backend, rng: np.random.Generator) -> FitState:
+        """Before the first step."""
+        return FitState(Parameters(scene, backend), backend.array(wp.int32, 1), rng)
+
+    def scene(self) -> Scene:
+        """The current scene, on the host."""
+        return self.parameters.scene()

@@ -1,0 +1,136 @@
+"""A training step: render, compare, adjoint, update."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import warp as wp
+
+from warpsplat.fit import losses
+from warpsplat.fit.losses import Aim, LossInputs
+from warpsplat.fit.optimizer import record_adam
+from warpsplat.fit.schedule import Phase, fold_weight
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.state import FitState
+from warpsplat.fit.units import Units
+from warpsplat.metrics import psnr
+from warpsplat.render.backend import Viewport
+from warpsplat.render.models import EXACT, Model, SplatModel
+from warpsplat.render.program import Program, capture
+from warpsplat.render.renderer import Capacity, Renderer
+from warpsplat.scene import FloatArray
+
+
+class Target:
+    """The image at the size of a phase."""
+
+    def __init__(self, image: FloatArray, phase: Phase) -> None:
+        """``image``: sRGB in [0, 1], shape (height, width, 3); reduced by area to the phase's size."""
+        height, width = image.shape[:2]
+        size = (phase.width, phase.height)
+        reduced = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        self.image = np.ascontiguousarray(reduced, np.float32)
+        self.viewport = Viewport(*size, phase.width / width)
+
+
+def model_for(settings: Settings, step: int) -> Model:
+    """The settings' model of coverage, as it is after ``step`` steps."""
+    if settings.renderer == "splat":
+        return SplatModel(settings.through_scales, fold_weight(settings, step))
+    return EXACT
+
+
+class Step:
+    """The launches of a step, recorded for the arrays of ``state`` as they are.
+
+    After surgery on the state a new one is made (``after_surgery``); this one then refuses to run.
+    """
+
+    def __init__(
+        self,
+        state: FitState,
+        settings: Settings,
+        target: Target,
+        *,
+        capacity: Capacity | None = None,
+        aim: Aim | None = None,
+    ) -> None:
+        """Without ``capacity``, the need is found by rendering."""
+        self.state, self.settings, self.target = state, settings, target
+        self.renderer = Renderer(
+            state.parameters, target.viewport, model=model_for(settings, state.step), capacity=capacity
+        )
+        self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport)
+        if capacity is None:
+            self.renderer.forward_complete()
+        self.record()
+
+    def record(self) -> None:
+        """Record the launches for the arrays and settings as they are now."""
+        self.renderer.check_current()
+        backend, parameters = self.renderer.backend, self.state.parameters
+        measure = backend.program("loss")
+        inputs = LossInputs(self.renderer, self.aim, self.settings, self.state.clock)
+        for record in losses.IMAGE_LOSSES:
+            record(measure, inputs)
+        update = backend.program("update")
+        for record_shapes in losses.SHAPE_LOSSES:
+            record_shapes(update, parameters, self.settings)
+        units = Units.of(self.settings, parameters.canvas)
+        record_adam(update, parameters, self.state.clock, self.settings, units)
+        self.programs: tuple[Program, ...] = (
+            self.renderer.forward_program,
+            measure,
+            self.renderer.backward_program,
+            update,
+        )
+        self._graph = capture(backend.device, self.programs)
+
+    def advance(self) -> None:
+        """Do the step. Nothing is allocated or read back."""
+        self.renderer.check_current()
+        if self._graph:
+            wp.capture_launch(self._graph)
+        else:
+            for program in self.programs:
+                program.run()
+        self.state.step += 1
+
+    def time(self, count: int) -> None:
+        """Render, compare and adjoint ``count`` times, without an update; for timing."""
+        self.renderer.check_current()
+        for _ in range(count):
+            for program in self.programs[:-1]:
+                program.run()
+        wp.synchronize_device(self.renderer.backend.device)
+
+    def make_room(self) -> None:
+        """Where the last steps ran out of capacity, go on with larger arrays."""
+        if self.renderer.make_room():
+            self.record()
+
+    def render(self) -> None:
+        """Render what there is now, all of it."""
+        if self.renderer.forward_complete():
+            self.record()
+
+    def configure(self, settings: Settings) -> None:
+        """Go on with other settings."""
+        self.settings = settings
+        self.record()
+
+    def after_surgery(self) -> Step:
+        """A step for the state's new arrays, at the same size."""
+        return Step(self.state, self.settings, self.target, capacity=self.renderer.capacity, aim=self.aim)
+
+    def psnr(self) -> float:
+        """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
+        look at the file on, an estimate of the file's. Reads a number a tile back from the device.
+        """
+        return -10 * math.log10(max(self.aim.mean_square(), 1e-12))
+
+    def render_psnr(self) -> float:
+        """Of the last render against the image, at its size [dB]. Reads the render back from the device."""
+        return psnr(255 * self.renderer.read_image(), 255 * self.target.image)

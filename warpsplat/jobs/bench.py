@@ -1,0 +1,177 @@
+"""Times the stages of a training step on a stated random scene."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import warp as wp
+
+from warpsplat.fit.place import STROKE_CUBICS, circle_outlines
+from warpsplat.fit.schedule import Phase
+from warpsplat.fit.settings import KINDS, Density, Settings, default_rates
+from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
+from warpsplat.render.backend import Backend
+from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+
+STAGES = ("outline", "bins", "forward", "loss", "backward", "update")
+
+RADIUS = (0.05, 0.1)
+"""Range of the shapes' radii over the width of the canvas."""
+
+LARGE = 2000
+"""Canvases wider than this [px] get shapes of half that radius."""
+
+HALF_WIDTH = 1.5
+"""Of the strokes [px]."""
+
+JITTER = 0.2
+"""Standard deviation of the control points' distance from the centre, over the radius."""
+
+SMOOTH = 8.0
+"""Standard deviation of the blur of the random target image [px]."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of repeated timings [ms]."""
+
+    median: float
+    low: float
+    high: float
+
+    @staticmethod
+    def of(seconds: list[float]) -> Spread:
+        """Median, lowest and highest."""
+        return Spread(*(round(1e3 * f(seconds), 3) for f in (statistics.median, min, max)))
+
+
+def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float, seed: int) -> Scene:
+    """Shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
+    rng = np.random.default_rng(seed)
+    centres = rng.uniform(0, [width, height], (curves, 2))
+    radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > LARGE else 1.0)
+    if kind == Kind.FILL:
+        circles = circle_outlines(np.zeros((curves, 2)), np.ones(curves), 2)
+        offsets = circles * (1 + JITTER * rng.normal(size=(curves, circles.shape[1], 1)))
+    else:
+        angle = rng.uniform(0, np.pi, curves)
+        along = np.linspace(-1, 1, 3 * STROKE_CUBICS + 1)
+        direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        offsets = along[None, :, None] * direction[:, None] + JITTER * rng.normal(
+            size=(curves, len(along), 2)
+        )
+    return Scene.uniform(
+        kind,
+        Canvas(width, height, np.zeros(3, np.float32)),
+        np.asarray(centres[:, None] + radii[:, None, None] * offsets, np.float32),
+        colors=rng.uniform(0, 1, (curves, 3)).astype(np.float32),
+        opacities=np.full(curves, opacity, np.float32),
+        widths=np.full(curves, 0.0 if kind == Kind.FILL else 2 * HALF_WIDTH, np.float32),
+    )
+
+
+def bench_target(width: int, height: int, seed: int) -> FloatArray:
+    """Smooth noise: sRGB in [0, 1], shape (height, width, 3)."""
+    noise = np.random.default_rng(seed).uniform(0, 1, (height, width, 3)).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(noise, (0, 0), SMOOTH), np.float32)
+
+
+def peak_memory(device: wp.Device) -> int | None:
+    """Largest memory so far [bytes]: of the process, or of the device's pool; None where it is not known."""
+    if device.is_cuda:
+        return int(wp.get_mempool_used_mem_high(device)) if wp.is_mempool_enabled(device) else None
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 1 if sys.platform == "darwin" else 1024
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def bench(
+    *,
+    curves: int,
+    width: int,
+    height: int,
+    kind: str,
+    renderer: Any,
+    backend: Backend,
+    opacity: float,
+    repeats: int,
+    seed: int,
+) -> dict[str, Any]:
+    """Time ``repeats`` steps after a warm-up. The scene stays as it is: all rates are 0.
+
+    Returns:
+        ``step``, ``forward_backward`` and each of ``stages`` as median, low and high [ms]; counts; memory.
+    """
+    settings = Settings(
+        kind=KINDS[kind],
+        curves=curves,
+        renderer=renderer,
+        rates=dict.fromkeys(default_rates(), 0.0),
+        density=Density(interval=0),
+        iterations=1000,
+    )
+    scene = bench_scene(KINDS[kind], curves, width, height, opacity, seed)
+    target = Target(bench_target(width, height, seed), Phase(width, height))
+    step = Step(FitState.start(scene, backend, np.random.default_rng(seed)), settings, target)
+    device, renderer_used = backend.device, step.renderer
+    steps: list[float] = []
+    both: list[float] = []
+    kernels: list[dict[tuple[str, str], float]] = []
+    for i in range(repeats + 3):
+        times = [_timed(device, step.advance)]
+        times.append(_timed(device, renderer_used.forward) + _timed(device, renderer_used.backward))
+        parts: dict[tuple[str, str], float] = {}
+        for program in step.programs:
+            for key, value in program.run_timed().items():
+                parts[key] = parts.get(key, 0.0) + value
+        if i >= 3:
+            steps.append(times[0])
+            both.append(times[1])
+            kernels.append(parts)
+    pairs = int(renderer_used.needed_slots.numpy()[0])
+    items = int(renderer_used.needed_samples.numpy()[0])
+    stages = {
+        s: Spread.of([sum(v for k, v in part.items() if k[0] == s) for part in kernels]) for s in STAGES
+    }
+    whole = Spread.of(steps)
+    return {
+        "kind": kind,
+        "renderer": renderer,
+        "device": str(device),
+        "device_name": device.name,
+        "threads": backend.threads,
+        "curves": curves,
+        "width": width,
+        "height": height,
+        "opacity": opacity,
+        "pairs": pairs,
+        "samples": items,
+        "step": asdict(whole),
+        "forward_backward": asdict(Spread.of(both)),
+        "stages": {name: asdict(spread) for name, spread in stages.items()},
+        "kernels": {
+            f"{stage}/{name}": asdict(Spread.of([part[(stage, name)] for part in kernels]))
+            for stage, name in kernels[0]
+        },
+        "megapixels_per_s": round(width * height / 1e3 / whole.median, 3),
+        "us_per_curve": round(1e3 * whole.median / curves, 3),
+        "ns_per_pixel": round(1e6 * whole.median / (width * height), 3),
+        "peak_memory": peak_memory(device),
+    }
+
+
+def _timed(device: wp.Device, function: Any) -> float:
+    begin = time.perf_counter()
+    function()
+    wp.synchronize_device(device)
+    return time.perf_counter() - begin

@@ -1,0 +1,239 @@
+"""Image in, SVG file and its score out."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpsplat import __version__
+from warpsplat.errors import Stopped
+from warpsplat.files.image import load_image
+from warpsplat.files.inputs import input_name, read_input
+from warpsplat.files.output import write_result
+from warpsplat.fit.export import export
+from warpsplat.fit.loop import Progress, fit
+from warpsplat.fit.place import simple_curves
+from warpsplat.fit.settings import Settings
+from warpsplat.metrics import Score, score_svg
+from warpsplat.render.backend import Backend
+from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene.geometry import areas
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run made."""
+
+    svg: str
+    scene: Scene
+    score: Score | None
+    """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
+    render_psnr: float
+    """Of the last training render against the image, at its size [dB]."""
+    estimated_psnr: float
+    """Of the file at that size, as the training saw it: the last look at it may be 25 steps old [dB]."""
+    iterations: int
+    """Steps done; fewer than asked for when stopped."""
+    seconds: float
+    stopped: bool
+    """Whether it was interrupted."""
+    missed: tuple[str, ...] = ()
+    """Goals that were not reached, each as a sentence."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON. Figures that were not measured are None."""
+        figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
+        return {
+            **(self.score.as_dict() if self.score else figures),
+            "render_psnr": round(self.render_psnr, 3),
+            "estimated_psnr": round(self.estimated_psnr, 3),
+            "curves": len(self.scene),
+            "iterations": self.iterations,
+            "seconds": round(self.seconds, 2),
+            "stopped": self.stopped,
+            "missed": list(self.missed),
+        }
+
+
+def job_key(settings: Settings, source: bytes) -> str:
+    """Names a result: the same program version, settings and image bytes give the same key."""
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} ".encode() + source)
+    return digest.hexdigest()[:24]
+
+
+def vectorize(
+    target: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    *,
+    metadata: str = "",
+    scene: Scene | None = None,
+    report: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    write: Callable[[str], None] | None = None,
+) -> Result:
+    """Fit curves to ``target`` (sRGB in [0, 1], (height, width, 3)) and score the file they make.
+
+    Args:
+        target: the image.
+        settings: all that decides the result.
+        backend: where to compute; does not change the result.
+        metadata: text for the file's metadata; that of a run that was stopped says so instead.
+        scene: curves to start from; without, new ones.
+        report: called every few steps.
+        stop: asked after every step; once true, the curves as they are make the file. True later, the score
+            is given up.
+        write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
+    """
+    started = time.monotonic()
+    if settings.simplify and scene is None:
+        settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
+    if settings.max_bytes:
+        height, width = target.shape[:2]
+        settings = replace(settings, curves=affordable_curves(settings, width, height))
+    seconds = training_seconds(settings, target, started)
+    made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
+    # A file that was cut short must not pass for a finished one.
+    svg, scene = export_within(made.scene, settings, "stopped" if made.interrupted else metadata)
+    if write:
+        write(svg)
+    score = _score(svg, target, stop, interrupted=made.interrupted)
+    seconds = time.monotonic() - started
+    return Result(
+        svg=svg,
+        scene=scene,
+        score=score,
+        render_psnr=made.render_psnr,
+        estimated_psnr=made.estimated_psnr,
+        iterations=made.iterations,
+        seconds=seconds,
+        stopped=made.interrupted,
+        missed=missed_goals(settings, score, seconds),
+    )
+
+
+def training_seconds(settings: Settings, target: FloatArray, started: float) -> float | None:
+    """What ``time_budget`` leaves for training, of a run that began at ``started`` (``time.monotonic``)."""
+    if settings.time_budget is None:
+        return None
+    tail = TAIL_SECONDS + TAIL_PER_PIXEL * target.shape[0] * target.shape[1]
+    return settings.time_budget - tail - (time.monotonic() - started)
+
+
+def export_within(scene: Scene, settings: Settings, metadata: str) -> tuple[str, Scene]:
+    """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
+    svg = export(scene, settings, metadata)
+    while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
+        excess = 1 - settings.max_bytes / len(svg.encode())
+        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
+        seen = areas(scene) * scene.opacities
+        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
+        svg = export(scene, settings, metadata)
+    return svg, scene
+
+
+QUICK_PIXELS = 1_000_000
+"""Of an image up to this size, an interrupted run is still scored, and a score that has begun goes on: it
+takes about a second."""
+
+
+def _score(
+    svg: str, target: FloatArray, stop: Callable[[], bool] | None, *, interrupted: bool
+) -> Score | None:
+    """The score of a file, or None where there is no time for it."""
+    quick = target.shape[0] * target.shape[1] <= QUICK_PIXELS
+    if (interrupted and not quick) or (not interrupted and stop and stop()):
+        return None
+    try:
+        return score_svg(svg, target, own=True, stop=None if quick else stop)
+    except Stopped:
+        return None
+
+
+TAIL_SECONDS = 0.3
+TAIL_PER_PIXEL = 3e-7
+"""Of a time budget: what the last step, exporting and scoring take [s]."""
+
+HEAD_BYTES = 400
+"""Of a file, besides its shapes."""
+
+STYLE_BYTES = {Kind.FILL: 45, Kind.STROKE: 65}
+"""Of a shape, besides its coordinates."""
+
+SPARE_CURVES = 1.04
+"""Curves trained over those expected to fit; shapes of a simple image are shorter."""
+
+
+def affordable_curves(settings: Settings, width: int, height: int) -> int:
+    """Curves that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
+
+    Coordinates are relative: each has as many digits before the point as the distance of two curves.
+    """
+    assert settings.max_bytes
+    numbers = 2 + (24 * settings.chain_cubics // 2 if settings.kind == Kind.FILL else 18)
+    separators = 2.0 + settings.precision if settings.precision else 1.3
+    room = settings.max_bytes - HEAD_BYTES
+    count = float(settings.curves)
+    for _ in range(8):  # settles within a curve
+        digits = max(0.0, 0.5 * math.log10(width * height / max(count, 1.0)))
+        count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (separators + digits)))
+    return max(1, min(settings.curves, round(SPARE_CURVES * count)))
+
+
+def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:
+    """The goals of ``settings`` that a run did not reach; without a score nobody knows."""
+    missed: list[str] = []
+    if score is None:
+        return ()
+    if settings.target_psnr and score.psnr < settings.target_psnr:
+        missed.append(f"target-psnr {settings.target_psnr:g} dB: reached {score.psnr:.2f} dB")
+    if settings.max_bytes and score.bytes > settings.max_bytes:
+        missed.append(f"max-bytes {settings.max_bytes}: reached {score.bytes}")
+    if settings.time_budget and seconds > settings.time_budget:
+        missed.append(f"time-budget {settings.time_budget:g} s: took {seconds:.1f} s")
+    return tuple(missed)
+
+
+def vectorize_file(
+    source: Path | bytes,
+    output: Path,
+    settings: Settings,
+    backend: Backend,
+    *,
+    name: str | None = None,
+    report: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Result:
+    """Read an image, vectorize it, write ``output`` atomically, and score it.
+
+    Args:
+        source: the image's file, or its bytes.
+        output: the SVG; ``-`` is the standard output.
+        settings: all that decides the result.
+        backend: where to compute.
+        name: how messages call the image; default: the file's name.
+        report: called every few steps.
+        stop: asked after every step, see ``vectorize``.
+
+    Raises:
+        ImageError: ``source`` cannot be read.
+        OutputError: ``output`` cannot be written.
+    """
+    if isinstance(source, Path):
+        name, source = name or input_name(source), read_input(source)
+    return vectorize(
+        load_image(source, name),
+        settings,
+        backend,
+        metadata=f"key={job_key(settings, source)}",
+        report=report,
+        stop=stop,
+        write=lambda svg: write_result(output, svg.encode()),
+    )

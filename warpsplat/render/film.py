@@ -1,0 +1,87 @@
+"""The compositing stage: lists and coverages -> image, and the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warpsplat.kernels import composite, constants
+from warpsplat.kernels.tile import column
+from warpsplat.render.backend import Backend, Viewport, buffer
+from warpsplat.render.bins import Bins
+from warpsplat.render.coverage import Coverage
+from warpsplat.render.paint import Paint
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.program import Program
+from warpsplat.render.tiles import to_tiles
+
+
+@dataclass
+class FilmBuffers:
+    """Images by tiles: [tile, channel, column]."""
+
+    image: wp.array = buffer(column, "tiles", 3, constants.TILE)
+    """sRGB in [0, 1]."""
+    image_grad: wp.array = buffer(column, "tiles", 3, constants.TILE)
+    inside: wp.array = buffer(column, "tiles", constants.TILE)
+    """1 for pixels of the image, 0 for the padding."""
+
+
+class Film:
+    """What the shapes are composited on."""
+
+    def __init__(self, backend: Backend, viewport: Viewport) -> None:
+        self._backend, self._viewport = backend, viewport
+        self.buffers = backend.allocate(FilmBuffers, {"tiles": viewport.tile_count})
+        whole = np.ones((viewport.height, viewport.width, 1), np.float32)
+        self.buffers.inside.assign(to_tiles(whole)[:, 0])
+
+    @property
+    def _dim(self) -> tuple[int, int]:
+        return self._viewport.tile_count, self._backend.lanes
+
+    def forward(self, program: Program, parameters: Parameters, bins: Bins, coverage: Coverage) -> None:
+        """Record lists and coverages -> ``image``."""
+        program.launch(
+            composite.composite_forward,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            lane_columns=self._backend.lane_size,
+            background=wp.vec3(*(float(x) for x in parameters.canvas.background)),
+            split=True,
+        )
+
+    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Paint) -> None:
+        """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
+        program.launch(
+            composite.composite_backward,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            law=coverage.law,
+            sum_grad=coverage.buffers.coverage,
+            split=True,
+        )
+
+    def removal_cost(
+        self, program: Program, bins: Bins, coverage: Coverage, target: wp.array, slot_cost: wp.array
+    ) -> None:
+        """Record what the squared error against ``target`` would grow by without each slot."""
+        program.launch(
+            composite.removal_cost,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            lane_columns=self._backend.lane_size,
+            target=target,
+            slot_cost=slot_cost,
+            split=True,
+        )

@@ -1,0 +1,97 @@
+"""Models of coverage: which stages make a shape's coverage of the pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import warp as wp
+
+from warpsplat.render.backend import Backend, Viewport
+from warpsplat.render.bins import Bins
+from warpsplat.render.coverage import Coverage, ExactCoverage, SplatCoverage
+from warpsplat.render.grid import Grid
+from warpsplat.render.outline import Outline
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.program import Program
+
+
+class Geometry(Protocol):
+    """What binning asks of the stage that samples the shapes."""
+
+    def samples(self) -> dict[str, wp.array]:
+        """``sample_first``, ``sample_last``, ``position`` and ``extent`` of ``kernels.bins.rectangles``."""
+
+    def forward(self, program: Program) -> None:
+        """Record attributes -> samples."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a model makes its stages for."""
+
+    backend: Backend
+    parameters: Parameters
+    viewport: Viewport
+    bins: Bins
+    samples: int
+    """Capacity for samples."""
+    slots: int
+    """Capacity for slots."""
+    needed: wp.array
+    """Where the need for samples is counted, shape (1,)."""
+
+
+class Model(Protocol):
+    """A way from shapes to coverages."""
+
+    @property
+    def samples_per_shape(self) -> int:
+        """First guess of the need."""
+
+    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+        """Allocate the two stages."""
+
+
+@dataclass(frozen=True)
+class ExactModel:
+    """The area that a viewer computes for the paths."""
+
+    samples_per_shape: int = 48
+
+    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+        """See ``Model``."""
+        outline = Outline(job.backend, job.parameters, job.viewport, job.samples, job.needed)
+        coverage = ExactCoverage(job.backend, job.parameters, job.viewport, outline, job.bins, job.slots)
+        return outline, coverage
+
+
+@dataclass(frozen=True)
+class SplatModel:
+    """The paper's Gaussians."""
+
+    through_scales: bool = True
+    """Whether gradients flow through the Gaussians' scales and angles."""
+    fold: float = 0.0
+    """Weight of the fold loss (fills; the folded fraction of the canvas), which the adjoint adds."""
+    samples_per_shape: int = 64
+
+    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+        """See ``Model``.
+
+        Raises:
+            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
+        """
+        grid = Grid(
+            job.backend,
+            job.parameters,
+            job.viewport,
+            job.samples,
+            job.needed,
+            through_scales=self.through_scales,
+            fold=self.fold,
+        )
+        return grid, SplatCoverage(job.backend, grid, job.bins, job.slots)
+
+
+EXACT = ExactModel()

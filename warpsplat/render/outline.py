@@ -1,0 +1,89 @@
+"""The outline stage: shapes -> polylines, and the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpsplat.kernels import outline
+from warpsplat.render.backend import Backend, Viewport, buffer
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.program import Program
+from warpsplat.render.ranges import record_ranges
+
+
+@dataclass
+class OutlineBuffers:
+    """What the stage owns."""
+
+    cubic_vertex: wp.array = buffer(wp.int32, "cubics")
+    """First vertex of each cubic, counted in its shape."""
+    cubic_pieces: wp.array = buffer(wp.int32, "cubics")
+    """Straight pieces of each cubic."""
+    vertex_count: wp.array = buffer(wp.int32, "shapes")
+    vertex_ends: wp.array = buffer(wp.int32, "shapes")
+    vertex_first: wp.array = buffer(wp.int32, "shapes")
+    vertex_last: wp.array = buffer(wp.int32, "shapes")
+    vertex_shape: wp.array = buffer(wp.int32, "vertices")
+    vertex: wp.array = buffer(wp.vec2, "vertices")
+    """[px]"""
+    extent: wp.array = buffer(wp.vec2, "vertices")
+    """How far the shape may reach beyond the vertex [px]."""
+    start_grad: wp.array = buffer(wp.vec2, "vertices")
+    """Of the first end of the edge that starts at a vertex."""
+    end_grad: wp.array = buffer(wp.vec2, "vertices")
+    """Of its second end."""
+    half_grad: wp.array = buffer(wp.float32, "vertices")
+    """Of half a stroke's width, by edge."""
+
+
+class Outline:
+    """Flattens curves as finely as their size in pixels asks for."""
+
+    def __init__(
+        self, backend: Backend, parameters: Parameters, viewport: Viewport, capacity: int, needed: wp.array
+    ) -> None:
+        self._parameters, self._viewport = parameters, viewport
+        self._capacity, self._needed = capacity, needed
+        self.buffers = backend.allocate(
+            OutlineBuffers,
+            {"cubics": parameters.cubic_count, "shapes": parameters.shape_count, "vertices": capacity},
+        )
+
+    def samples(self) -> dict[str, wp.array]:
+        """What tiles are found by: ``bins.rectangles``'s parameters."""
+        b = self.buffers
+        return {
+            "sample_first": b.vertex_first,
+            "sample_last": b.vertex_last,
+            "position": b.vertex,
+            "extent": b.extent,
+        }
+
+    def forward(self, program: Program) -> None:
+        """Record points, widths -> vertices."""
+        b, p = self.buffers, self._parameters
+        sources = (b, p.arrays, self._viewport)
+        program.launch(outline.plan_outline, p.shape_count, *sources)
+        record_ranges(
+            program,
+            b.vertex_count,
+            b.vertex_ends,
+            b.vertex_first,
+            b.vertex_last,
+            self._needed,
+            capacity=self._capacity,
+        )
+        program.launch(outline.outline_forward, p.cubic_count, *sources, split=True)
+
+    def backward(self, program: Program) -> None:
+        """Record gradients of the edges' ends -> gradients of the points."""
+        program.launch(
+            outline.outline_backward,
+            self._parameters.point_count,
+            self.buffers,
+            self._parameters.arrays,
+            self._viewport,
+            split=True,
+        )

@@ -1,0 +1,130 @@
+"""A scene's arrays on a device, with their gradients and Adam moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warpsplat.render.backend import Backend, view
+from warpsplat.scene import ATTRIBUTES, Attribute, Canvas, FloatArray, IndexArray, Kind, Scene
+
+ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3}
+"""What kernels read a row of so many numbers as."""
+
+
+@dataclass
+class Group:
+    """One attribute on the device: values, gradients and Adam moments, each (row, size) float32."""
+
+    attribute: Attribute
+    value: wp.array
+    grad: wp.array
+    moment1: wp.array
+    moment2: wp.array
+    owner: wp.array
+    """[row] the shape of each row."""
+
+
+class Parameters:
+    """Device arrays of a scene. Surgery (``rearrange``) carries moments and ages along with the rows."""
+
+    def __init__(self, scene: Scene, backend: Backend) -> None:
+        self.backend = backend
+        self.revision = 0
+        """Counts ``rearrange``: launches recorded on arrays of an earlier revision are out of date."""
+        zeros = {a.name: np.zeros(scene.shape_of(a), np.float32) for a in ATTRIBUTES}
+        self._upload(scene, (zeros, zeros), np.zeros(len(scene), np.int32))
+
+    def _upload(
+        self, scene: Scene, moments: tuple[dict[str, FloatArray], dict[str, FloatArray]], ages: np.ndarray
+    ) -> None:
+        self._scene = scene
+        counts = scene.point_counts()
+        cubics = counts // 3
+        shapes = np.arange(len(scene))
+        self.shape_count, self.point_count = len(scene), len(scene.points)
+        self.cubic_count = int(cubics.sum())
+        self.arrays: dict[str, wp.array] = {
+            "kind": self._ints(scene.kind),
+            "point_first": self._ints(scene.first),
+            "point_shape": self._ints(np.repeat(shapes, counts)),
+            "cubic_first": self._ints(np.concatenate([[0], np.cumsum(cubics)])),
+            "cubic_shape": self._ints(np.repeat(shapes, cubics)),
+            "ages": self._ints(ages),
+        }
+        """What kernels bind by name: the layout of the shapes, and each attribute with its gradient."""
+        owners = {"point": self.arrays["point_shape"], "shape": self._ints(shapes)}
+        self.groups: dict[str, Group] = {}
+        for a in ATTRIBUTES:
+            value, m1, m2 = (
+                self._floats(x, a) for x in (getattr(scene, a.name), moments[0][a.name], moments[1][a.name])
+            )
+            group = Group(a, value, wp.zeros_like(value), m1, m2, owners[a.per])
+            self.groups[a.name] = group
+            rows = (value.shape[0],)
+            self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
+            self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
+
+    def _ints(self, values: np.ndarray) -> wp.array:
+        return wp.array(np.ascontiguousarray(values, np.int32), dtype=wp.int32, device=self.backend.device)
+
+    def _floats(self, values: FloatArray, attribute: Attribute) -> wp.array:
+        flat = np.ascontiguousarray(values, np.float32).reshape(-1, attribute.size)
+        return wp.array(flat, dtype=wp.float32, device=self.backend.device)
+
+    @property
+    def kinds(self) -> frozenset[Kind]:
+        """Kinds of shapes that there are."""
+        return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+
+    @property
+    def canvas(self) -> Canvas:
+        """What the shapes lie on."""
+        return self._scene.canvas
+
+    def check_chains(self) -> None:
+        """Whether each fill can be halved into two chains of cubics.
+
+        Raises:
+            ValueError: one has an odd number of cubics.
+        """
+        odd = (self._scene.kind == Kind.FILL) & (self._scene.point_counts() % 6 != 0)
+        if odd.any():
+            raise ValueError(f"fill {int(np.flatnonzero(odd)[0])} has an odd number of cubics")
+
+    def scene(self) -> Scene:
+        """Copy the current values to the host."""
+        return replace(self._scene, **self._download("value"))
+
+    def gradients(self) -> dict[str, FloatArray]:
+        """Copy the gradients to the host, in the shapes of the scene's fields."""
+        return self._download("grad")
+
+    def _download(self, field: str) -> dict[str, Any]:
+        return {
+            name: getattr(group, field).numpy().reshape(self._scene.shape_of(group.attribute)).copy()
+            for name, group in self.groups.items()
+        }
+
+    def rearrange(self, keep: IndexArray, added: Scene) -> None:
+        """Keep the shapes ``keep`` (in that order) with their moments and ages, put ``added`` in front.
+
+        New shapes start with moments and age 0. Device arrays are made anew, so launches recorded on the
+        old ones must be recorded again: ``revision`` tells.
+        """
+        before = self.scene()
+
+        def carried(field: str) -> dict[str, FloatArray]:
+            old = self._download(field)
+            fresh = {a.name: np.zeros(added.shape_of(a), np.float32) for a in ATTRIBUTES}
+            return {
+                a.name: np.concatenate([old[a.name][before.rows(a, keep)], fresh[a.name]]) for a in ATTRIBUTES
+            }
+
+        ages = np.concatenate([self.arrays["ages"].numpy()[keep], np.zeros(len(added), np.int32)])
+        moments = carried("moment1"), carried("moment2")
+        self._upload(before.take(keep).append(added), moments, ages)
+        self.revision += 1

@@ -1,0 +1,1 @@
+"""SVG: written, checked, read, drawn by resvg."""

@@ -1,0 +1,241 @@
+"""What an SVG's text says, found without drawing it: the one gate that every foreign SVG passes first.
+
+Size, encoding, nesting and entities are bounded here, so that whatever reads the text afterwards (resvg, the
+reader of shapes) meets a well-formed document of bounded size.
+"""
+
+from __future__ import annotations
+
+import codecs
+import gzip
+import io
+import math
+import re
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from warpsplat.errors import ImageError
+from warpsplat.files.inputs import input_name, read_input
+
+NAMESPACE = "http://www.w3.org/2000/svg"
+
+MAX_BYTES = 256 << 20
+"""Longest text [bytes], unpacked."""
+
+MAX_DEPTH = 1000
+"""Deepest nesting of elements; resvg reads 1,024 levels."""
+
+MAX_EXPANSION = 16 << 20
+"""Most characters that a document's entities may grow to."""
+
+MAX_PIXELS = 200_000_000
+"""Largest picture that is drawn [pixels]: four bytes each, as many again for each layer, and 8 s to pack."""
+
+
+def read_svg_text(path: Path) -> str:
+    """Text of an SVG file, or of the standard input for ``-``; gzipped (``.svgz``) or not.
+
+    The encoding is the one that a byte order mark or the XML declaration names; the text returned names none
+    but UTF-8.
+
+    Raises:
+        ImageError: missing, unreadable, larger than ``MAX_BYTES`` or not text; the message names ``path``.
+    """
+    data = read_input(path, "an SVG", limit=MAX_BYTES)
+    name = input_name(path)
+    try:
+        if data[:2] == b"\x1f\x8b":
+            with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
+                data = packed.read(MAX_BYTES + 1)
+        text = _decode(data)
+    except (UnicodeDecodeError, LookupError, OSError, EOFError, zlib.error):
+        raise ImageError(f"{name}: not an SVG") from None
+    if len(data) > MAX_BYTES:
+        raise ImageError(f"{name}: is larger than {MAX_BYTES >> 20} MiB when unpacked")
+    return text
+
+
+DECLARED = re.compile(r"""(\s*<\?xml\b[^>]{0,200}?\sencoding\s*=\s*)["']([\w.:-]{1,40})["']""")
+
+ENCODINGS = ("utf-8", "ascii", "iso8859", "cp", "koi8", "mac", "shift_jis", "euc", "gb", "big5")
+"""How the names of the encodings of one byte a unit begin; Python knows others, which no viewer reads."""
+
+
+def _decode(data: bytes) -> str:
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = data.decode("utf-16")
+    elif data[:2] in {b"<\0", b"\0<"}:
+        text = data.decode("utf-16-le" if data[1] == 0 else "utf-16-be")
+    else:
+        declared = DECLARED.match(data[:400].decode("latin-1"))
+        encoding = codecs.lookup(declared[2]).name if declared else "utf-8"
+        if data.startswith(codecs.BOM_UTF8):
+            encoding = "utf-8-sig"
+        elif not encoding.startswith(ENCODINGS):
+            raise LookupError(encoding)
+        text = data.decode(encoding)
+    return DECLARED.sub(r'\1"UTF-8"', text, count=1)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What one pass over an SVG's text finds."""
+
+    root: dict[str, str] = field(default_factory=dict)
+    """Attributes of the root element."""
+    paths: int = 0
+    """Elements that draw an outline: paths and basic shapes, rectangles left out (they are backgrounds)."""
+    nodes: int = 0
+    """Points that the paths pass through; other outlines count as one."""
+
+
+DRAWN = {f"{NAMESPACE} {tag}" for tag in ("circle", "ellipse", "polygon", "polyline", "line")}
+PATH = f"{NAMESPACE} path"
+ROOT = f"{NAMESPACE} svg"
+
+
+def inspect_svg(text: str) -> Facts:
+    """Check an SVG's text and gather what it says, in one pass of linear time.
+
+    Raises:
+        ImageError: not well-formed, no SVG, too long, nested too deep, or with entities that multiply.
+    """
+    root: dict[str, str] = {}
+    depth = paths = nodes = longest = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, paths, nodes
+        if depth == 0:
+            if tag != ROOT:
+                raise ImageError(
+                    f"not an SVG: its root is <{tag.rpartition(' ')[2][:40]}> of no or another kind"
+                )
+            root.update(attributes)
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
+        if tag == PATH:
+            paths += 1
+            nodes += path_nodes(attributes.get("d", ""))
+        elif tag in DRAWN:
+            paths += 1
+            nodes += 1
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def entity(
+        name: str, parameter: int, value: str | None, base: str | None, system: str | None, *_: str | None
+    ) -> None:
+        # The declaration comes before any use, so that nothing has been expanded yet.
+        nonlocal longest
+        longest = max(longest, len(value or ""))
+        if "&" in (value or "") or longest * references > MAX_EXPANSION:
+            raise ImageError(f"the entity {name[:40]!r} multiplies; such SVGs are not read")
+
+    data = text.encode("utf-8", "surrogatepass")
+    if len(data) > MAX_BYTES:
+        raise ImageError(f"is larger than {MAX_BYTES >> 20} MiB")
+    references = text.count("&")
+    parser = expat.ParserCreate("utf-8", namespace_separator=" ")
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = start, end, entity
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise ImageError(f"cannot be rendered: not well-formed XML: {error}") from None
+    return Facts(root, paths, nodes)
+
+
+TOKEN = re.compile(r"([MLHVCSQTAZmlhvcsqtaz])|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+ARGUMENTS = {"m": 2, "l": 2, "t": 2, "h": 1, "v": 1, "s": 4, "q": 4, "c": 6, "a": 7, "z": 0}
+"""Numbers that each node of a path command takes (SVG 1.1 section 8.3)."""
+COMPACT_FLAGS = re.compile(r"([\s,]*)([01])[\s,]*([01])")
+
+
+def path_nodes(data: str) -> int:
+    """Points that a path passes through."""
+    nodes = count = position = 0
+    size = 0
+    arc = False
+    while found := TOKEN.search(data, position):
+        position = found.end()
+        if found[1]:
+            nodes += count // size if size else 0
+            count, size = 0, ARGUMENTS[found[1].lower()]
+            arc = found[1] in "aA"
+            continue
+        count += 1
+        if arc and count % 7 == 3:  # flags may stand without anything between them and the next number
+            flags = COMPACT_FLAGS.match(data, position)
+            if flags:
+                position = flags.end()
+                count += 2
+    return nodes + (count // size if size else 0)
+
+
+PIXELS_PER_UNIT = {
+    "": 1.0,
+    "px": 1.0,
+    "in": 96.0,
+    "cm": 96 / 2.54,
+    "mm": 96 / 25.4,
+    "pt": 96 / 72,
+    "pc": 16.0,
+    "em": 16.0,
+    "ex": 8.0,
+}
+"""CSS absolute lengths, and those relative to the font: 16 px where nothing is said, as in resvg."""
+
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+SEPARATOR = r"(?:\s*,\s*|\s+|(?=[-+]))"
+VIEW_BOX = re.compile(rf"\s*({NUMBER.pattern})" + 3 * rf"{SEPARATOR}({NUMBER.pattern})" + r"(?=[\s,]|$)")
+LENGTH = re.compile(rf"({NUMBER.pattern})(px|in|cm|mm|pt|pc|em|ex|%|)")
+
+
+def view_box(root: dict[str, str]) -> tuple[float, float, float, float] | None:
+    """The ``viewBox`` (x, y, width, height) of a root's attributes; None if there is none that counts."""
+    found = VIEW_BOX.match(root.get("viewBox", ""))
+    if not found:
+        return None
+    x, y, width, height = (float(part) for part in found.groups())
+    if not (width > 0 and height > 0 and all(map(math.isfinite, (x, y, width, height)))):
+        return None
+    return x, y, width, height
+
+
+def svg_size(root: dict[str, str]) -> tuple[float, float] | None:
+    """Size [px] at which a viewer (resvg) shows an SVG with these attributes of its root.
+
+    None where the root does not say it: resvg then takes the extent of what is drawn.
+
+    Raises:
+        ImageError: a size that is not positive, or of more than ``MAX_PIXELS``.
+    """
+    box = view_box(root)
+    own_font = "font-size" in root or "font" in root.get("style", "")
+    sides: list[float | None] = []
+    for i, name in enumerate(("width", "height")):
+        found = LENGTH.fullmatch(root.get(name, "").lstrip())
+        if found is None or (found[2] in {"em", "ex"} and own_font):
+            sides.append(None)
+        elif found[2] == "%":
+            sides.append(float(found[1]) / 100 * box[2 + i] if box else None)
+        else:
+            sides.append(float(found[1]) * PIXELS_PER_UNIT[found[2]])
+    width, height = sides
+    if box:
+        if width is None:
+            width = box[2] if height is None else height * box[2] / box[3]
+        if height is None:
+            height = width * box[3] / box[2]
+    for side in (width, height):
+        if side is not None and not side > 0:
+            raise ImageError("its width or height is not positive")
+    if width is None or height is None:
+        return None
+    if not width * height <= MAX_PIXELS:
+        raise ImageError(f"is {width:.6g}x{height:.6g} pixels, more than {MAX_PIXELS // 1_000_000} million")
+    return width, height

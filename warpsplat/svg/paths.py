@@ -1,0 +1,175 @@
+"""SVG path data as cubics (SVG 1.1 section 8.3), in time linear in its length."""
+
+from __future__ import annotations
+
+import cmath
+import math
+import re
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.errors import ImageError
+from warpsplat.svg.inspect import ARGUMENTS, NUMBER
+
+Points = npt.NDArray[np.float64]
+
+COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
+SPACE = re.compile(r"[\s,]*")
+FLAG = re.compile(r"[01]")
+
+
+def cubics(data: str, *, keep_dots: bool) -> list[tuple[Points, bool]]:
+    """Subpaths of path data as points p0, c, c, p3 ..., shape (1 + 3 cubics, 2), and which are closed.
+
+    ``keep_dots`` keeps subpaths without extent, which show in a stroke.
+
+    Raises:
+        ImageError: no path data.
+    """
+    data = data.strip()
+    if data in {"", "none"} or data[0] not in "Mm":
+        return []  # draws nothing, in viewers too
+    pen = _Pen()
+    for command, text in COMMAND.findall(data):
+        size = ARGUMENTS[command.lower()]
+        values = _arguments(text, command)
+        if (len(values) % size or not values) if size else (values or text.strip()):
+            raise ImageError(f"path data is broken at {(command + text)[:40]!r}")
+        for i in range(0, max(len(values), 1), max(size, 1)):
+            # Further pairs after a move are lines.
+            move_on = i and command in "Mm"
+            pen.draw(("l" if command == "m" else "L") if move_on else command, values[i : i + size])
+    return [
+        (np.array([(p.real, p.imag) for p in points]), is_closed)
+        for points, is_closed in pen.finish(keep_dots)
+        if len(points) > 1
+    ]
+
+
+def _arguments(text: str, command: str) -> list[float]:
+    if command not in "Aa":
+        if NUMBER.sub(" ", text).strip(", \t\r\n\f"):
+            raise ImageError(f"path data is broken at {(command + text)[:40]!r}")
+        return [float(value) for value in NUMBER.findall(text)]
+    # The flags of an arc are one character, and may stand without anything between them and the next number.
+    values: list[float] = []
+    position = SPACE.match(text).end()  # type: ignore[union-attr]  # matches the empty text
+    while position < len(text):
+        found = (FLAG if len(values) % 7 in {3, 4} else NUMBER).match(text, position)
+        if not found:
+            raise ImageError(f"path data is broken at {(command + text)[:40]!r}")
+        values.append(float(found[0]))
+        position = SPACE.match(text, found.end()).end()  # type: ignore[union-attr]
+    return values
+
+
+class _Pen:
+    """Draws commands as cubics; points are complex numbers."""
+
+    def __init__(self) -> None:
+        self.subpaths: list[tuple[list[complex], bool]] = []
+        self.points: list[complex] = []
+        self.at = self.start = 0j
+        self.control: tuple[str, complex] = ("", 0j)
+        """Kind (``c`` or ``q``) and last control point of the command before."""
+
+    def draw(self, command: str, v: list[float]) -> None:
+        """One command with the arguments of one node."""
+        kind = command.lower()
+        origin = self.at if command == kind else 0j
+        if kind == "m":
+            self._lift(False)
+            self.at = self.start = origin + complex(v[0], v[1])
+            self.points = [self.at]
+        elif kind == "z":
+            # Relative coordinates come back to the start but for rounding: no further cubic for that.
+            if not cmath.isclose(self.at, self.start, rel_tol=1e-9, abs_tol=1e-9):
+                self._line(self.start)
+            self._lift(True)
+        else:
+            if not self.points:  # goes on after a subpath was closed
+                self.points = [self.at]
+            self._segment(kind, v, origin)
+            return
+        self.control = ("", 0j)
+
+    def _segment(self, kind: str, v: list[float], origin: complex) -> None:
+        control = ("", 0j)
+        if kind == "h":
+            self._line(complex(origin.real + v[0], self.at.imag))
+        elif kind == "v":
+            self._line(complex(self.at.real, origin.imag + v[0]))
+        elif kind == "a":
+            self._arc(v, origin + complex(v[5], v[6]))
+        else:
+            points = [origin + complex(x, y) for x, y in zip(v[::2], v[1::2], strict=True)]
+            family = {"s": "c", "t": "q"}.get(kind, kind)
+            if family != kind:  # smooth: the control point before, mirrored
+                points.insert(0, 2 * self.at - self.control[1] if self.control[0] == family else self.at)
+            if family == "l":
+                self._line(points[0])
+            else:
+                control = (family, points[-2])
+                if family == "q":
+                    points = [(self.at + 2 * points[0]) / 3, (points[1] + 2 * points[0]) / 3, points[1]]
+                self.points += points
+                self.at = points[-1]
+        self.control = control
+
+    def _lift(self, is_closed: bool) -> None:
+        if self.points:
+            self.subpaths.append((self.points, is_closed))
+        self.points = []
+
+    def finish(self, keep_dots: bool) -> list[tuple[list[complex], bool]]:
+        """All subpaths; a closed point, if dots are kept, as a cubic without extent."""
+        self._lift(False)
+        return [
+            (3 * points + points if keep_dots and is_closed and len(points) == 1 else points, is_closed)
+            for points, is_closed in self.subpaths
+        ]
+
+    def _line(self, end: complex) -> None:
+        self.points += line(self.at, end)
+        self.at = end
+
+    def _arc(self, v: list[float], end: complex) -> None:
+        """An elliptical arc, a quarter of the ellipse a cubic (SVG 1.1 appendix F.6)."""
+        start, rx, ry = self.at, abs(v[0]), abs(v[1])
+        if start == end:
+            return
+        if not (rx > 0 and ry > 0):
+            self._line(end)
+            return
+        turn = cmath.rect(1.0, math.radians(v[2]))
+
+        def to_circle(p: complex) -> complex:
+            p = p / turn
+            return complex(p.real / rx, p.imag / ry)
+
+        half = to_circle((start - end) / 2)
+        scale = max(abs(half), 1.0)  # an ellipse too small grows until it reaches
+        half /= scale
+        across = math.sqrt(max(1 / abs(half) ** 2 - 1, 0.0)) * (-1 if bool(v[3]) == bool(v[4]) else 1)
+        center = complex(half.imag, -half.real) * across
+        first = cmath.phase(half - center)
+        sweep = (cmath.phase(-half - center) - first) % math.tau
+        sweep -= 0 if v[4] else math.tau
+        count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-9))
+        reach = 4 / 3 * math.tan(sweep / count / 4)
+
+        def back(p: complex) -> complex:
+            return (start + end) / 2 + turn * complex(
+                (p + center).real * rx * scale, (p + center).imag * ry * scale
+            )
+
+        for i in range(count):
+            a, b = (cmath.rect(1.0, first + sweep * (i + k) / count) for k in (0, 1))
+            self.points += [back(a + 1j * a * reach), back(b - 1j * b * reach), back(b)]
+        self.points[-1] = self.at = end
+
+
+def line(start: complex, end: complex) -> list[complex]:
+    """A straight cubic without its first point."""
+    return [start + (end - start) / 3, start + 2 / 3 * (end - start), end]

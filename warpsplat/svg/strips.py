@@ -1,0 +1,98 @@
+"""Large images, strip by strip: less memory, both cores, and a chance to stop in between."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from warpsplat.errors import ImageError, Stopped
+from warpsplat.svg.viewer import render_own, render_svg
+
+Bytes = npt.NDArray[np.uint8]
+Stop = Callable[[], bool]
+
+STRIP_PIXELS = 1 << 20
+"""Pixels of a strip."""
+
+WHOLE_PIXELS = 1 << 22
+"""Up to here an SVG is drawn in one piece. In strips, edges move by thousandths of a pixel: a viewer cuts
+curves at the border of its canvas. The PSNR changes by less than 0.0001 dB.
+"""
+
+DRAWERS = 4
+"""Most strips that are drawn at once."""
+
+OUR_HEAD = re.compile(
+    r'<svg xmlns="http://www\.w3\.org/2000/svg" width="(\d+)" height="(\d+)" '
+    r'viewBox="0 0 \1 \2">\n<metadata>warpsplat '
+)
+"""Of a file whose canvas units are its pixels, so that a strip of it is another view box."""
+
+
+def check(stop: Stop | None) -> None:
+    """Give up if the caller wants it.
+
+    Raises:
+        Stopped: ``stop`` says so.
+    """
+    if stop and stop():
+        raise Stopped
+
+
+def rows_of(width: int, height: int, overlap: int = 0) -> Iterator[slice]:
+    """Strips of ``STRIP_PIXELS`` from top to bottom, each ``overlap`` rows longer where there are so many."""
+    step = max(1, STRIP_PIXELS // width)
+    for top in range(0, height - overlap, step):
+        yield slice(top, min(top + step + overlap, height))
+
+
+def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: bool = False) -> Bytes:
+    """An SVG drawn by resvg at ``width`` x ``height`` px: sRGB and opacity, shape (height, width, 4).
+
+    A large one is drawn in strips if it is a file of ours of that size, else in one piece. ``own`` says that
+    this program wrote the text just now, so that it needs no precautions.
+
+    Raises:
+        ImageError: not an SVG, or one of other proportions.
+        Stopped: ``stop`` says so.
+    """
+    check(stop)
+    head = OUR_HEAD.match(text)
+    cuttable = head is not None and (int(head[1]), int(head[2])) == (width, height)
+
+    def drawn(text: str, height: int) -> Bytes:
+        image = render_own(text) if own else render_svg(text, width=width, height=height)
+        return _pixels(image, width, height)
+
+    if not cuttable or width * height <= WHOLE_PIXELS:
+        return drawn(text, height)
+
+    def strip(rows: slice) -> Bytes:
+        check(stop)
+        tall = rows.stop - rows.start
+        view = f'width="{width}" height="{tall}" viewBox="0 {rows.start} {width} {tall}"'
+        part = re.sub(r'width="\d+" height="\d+" viewBox="[^"]*"', view, text, count=1)
+        return drawn(part, tall)
+
+    out = np.empty((height, width, 4), np.uint8)
+    strips = list(rows_of(width, height))
+    with ThreadPoolExecutor(min(DRAWERS, os.cpu_count() or 1)) as drawers:
+        try:
+            for rows, part in zip(strips, drawers.map(strip, strips), strict=True):
+                out[rows] = part
+        except BaseException:
+            drawers.shutdown(wait=False, cancel_futures=True)
+            raise
+    return out
+
+
+def _pixels(image: Image.Image, width: int, height: int) -> Bytes:
+    if image.size != (width, height):
+        raise ImageError(f"renders as {image.width}x{image.height}, the image has {width}x{height} pixels")
+    return np.asarray(image.convert("RGBA") if image.mode != "RGBA" else image)

@@ -1,0 +1,144 @@
+"""An SVG as a viewer shows it: drawn by resvg, an independent renderer.
+
+Texts written by this program are drawn in the process. Foreign ones pass ``inspect_svg`` and are drawn in a
+process of their own under limits, because resvg can be made to crash, stall and fill the memory.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import resvg_py
+from PIL import Image, PngImagePlugin
+
+from warpsplat.errors import ImageError, ResourceError
+from warpsplat.svg import draw_child
+from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
+
+Pixels = npt.NDArray[np.float64]
+
+OPTIONS: dict[str, Any] = {"dpi": 96.0, "skip_system_fonts": True}
+
+
+def _open(png: bytes) -> Image.Image:
+    # Not by Image.open, whose limit on pixels is meant for files of unknown origin.
+    return PngImagePlugin.PngImageFile(io.BytesIO(png))
+
+
+def render_own(text: str) -> Image.Image:
+    """Render SVG text written by this program with resvg, at its own size, in this process.
+
+    Raises:
+        ImageError: resvg does not accept the text.
+    """
+    try:
+        return _open(bytes(resvg_py.svg_to_bytes(svg_string=text, **OPTIONS)))
+    except ValueError as error:
+        raise ImageError(f"cannot be rendered: {_first_line(str(error))}") from error
+    except BaseException as error:
+        # pyo3's class for a panic of Rust code derives from BaseException and cannot be imported.
+        if type(error).__name__ != "PanicException":
+            raise
+        raise ImageError(f"cannot be rendered: resvg fails: {_first_line(str(error))}") from None
+
+
+def render_svg(
+    text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
+) -> Image.Image:
+    """Render any SVG text with resvg, at its own size, at a size in px, or magnified by ``zoom``.
+
+    Raises:
+        ImageError: see ``draw_png``.
+    """
+    return _open(draw_png(text, width=width, height=height, zoom=zoom))
+
+
+def draw_png(
+    text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
+) -> bytes:
+    """Any SVG text as a PNG, as ``render_svg`` draws it.
+
+    Raises:
+        ImageError: not an SVG, one that resvg does not accept or fails on, or a picture of more than
+            ``MAX_PIXELS``, or one that takes more time or memory than its size and length explain.
+        ResourceError: no further process can be started.
+    """
+    pixels = shown_pixels(text, width, height, zoom)
+    seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
+    memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
+    options = {**OPTIONS, "width": width, "height": height, "zoom": zoom}
+    request = {"path": sys.path, "seconds": seconds, "memory": memory, "options": options}
+    try:
+        done = subprocess.run(
+            # Isolated, and with this program's module path instead of one of its own making.
+            [sys.executable, "-I", "-S", str(Path(draw_child.__file__))],
+            input=json.dumps(request).encode() + b"\n" + text.encode(),
+            capture_output=True,
+            timeout=WALL_FACTOR * seconds,
+            start_new_session=True,  # Ctrl-C is for this process to act on
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise ImageError(f"cannot be rendered within {WALL_FACTOR * seconds} s") from None
+    except OSError as error:
+        raise ResourceError(f"no process to draw the SVG in: {error.strerror or error}") from error
+    if done.returncode == 0:
+        return done.stdout
+    message = done.stderr.decode(errors="replace")
+    if done.returncode == draw_child.REFUSED:
+        raise ImageError(f"cannot be rendered: {_first_line(message)}")
+    if "memory allocation" in message or "MemoryError" in message:
+        raise ImageError(f"cannot be rendered with {memory >> 20} MiB of memory")
+    if -done.returncode in LIMIT_SIGNALS:
+        raise ImageError(f"cannot be rendered within {seconds} s of processor time")
+    raise ImageError("cannot be rendered: resvg fails on what it draws")
+
+
+CPU_SECONDS = 4.0
+CPU_PER_BYTE = 5e-6
+CPU_PER_PIXEL = 1.2e-7
+"""Bounds of the processor time for a drawing [s]: three times what large plain ones take."""
+WALL_FACTOR = 3
+"""Bound of the time on the clock, over that of the processor time."""
+MEMORY = 3 << 29
+MEMORY_PER_BYTE = 100
+MEMORY_PER_PIXEL = 12
+"""Bounds of the address space for a drawing [bytes]: three layers, and 100 times the text."""
+LIMIT_SIGNALS = (9, 24)
+"""SIGKILL and SIGXCPU, which end a process at its processor time."""
+
+
+def shown_pixels(text: str, width: int | None, height: int | None, zoom: float | None) -> float:
+    """Pixels of the picture that ``draw_png`` makes; 0 where only drawing it tells.
+
+    Raises:
+        ImageError: not an SVG, or more than ``MAX_PIXELS``.
+    """
+    own = svg_size(inspect_svg(text).root)
+    if width and height:
+        pixels = float(width * height)
+    elif width or height:
+        raise ValueError("width and height go together")
+    else:
+        pixels = max(own[0], 1.0) * max(own[1], 1.0) * (zoom or 1.0) ** 2 if own else 0.0
+    if not pixels <= MAX_PIXELS:
+        raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
+    return pixels
+
+
+def _first_line(message: str) -> str:
+    return (message.strip().splitlines() or ["no cause given"])[0][:200]
+
+
+def on_white(image: Image.Image) -> Pixels:
+    """RGB in 0..255, shape (height, width, 3), transparency composited on white."""
+    rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
+    alpha = rgba[..., 3:] / 255.0
+    return np.asarray(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha))
