@@ -25,7 +25,7 @@ from warpsplat.scene import FloatArray
 MIN_SIDE = 2
 """Smallest side of an image [px]: with one pixel there is nothing to fit a curve to."""
 
-MAX_PIXELS = 250_000_000
+MAX_PIXELS = 120_000_000
 """Largest image [pixels]: the largest that cameras give. A small file may claim any size (a bomb)."""
 
 STRIP_PIXELS = 1 << 20
