@@ -1,6 +1,6 @@
 """Options that commands share.
 
-Defaults are those of ``warpsplat.fit.settings``: an option not given is None.
+Those that decide the result come from ``warpsplat.jobs.options``; one that is not given is None.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ from typing import Any, TypeVar
 import click
 
 from warpsplat.cli.say import set_voice
-from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Settings, make_settings
-from warpsplat.scene import Kind
+from warpsplat.jobs.options import OPTIONS, Option
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-_defaults = Settings()
 
 
 FILE: click.Path = click.Path(path_type=Path, readable=False)
@@ -51,41 +49,22 @@ def voice_options(function: Function) -> Function:
     return function
 
 
+def flag(option: Option) -> Callable[[Function], Function]:
+    """The flag of an option of the table."""
+    shown = f"{option.help}  [default: {option.default}]" if option.default else option.help
+    if option.kind is not None:
+        shown = f"{option.help}  [default]" if option.default else option.help
+        return click.option(
+            f"--{option.name}", "kind", flag_value=option.kind, type=click.UNPROCESSED, help=shown
+        )
+    kind = click.Choice(option.choices) if option.choices else option.type
+    return click.option(f"--{option.name}", type=kind, metavar=option.metavar or None, help=shown)
+
+
 def quality_options(function: Function) -> Function:
     """What decides the result."""
-    options = [
-        click.option(
-            "--curves",
-            type=int,
-            metavar="N",
-            help=f"Number of shapes.  [default: {_defaults.curves}; fewer for a simple image]",
-        ),
-        click.option(
-            "--closed", "kind", flag_value=Kind.FILL, type=click.UNPROCESSED, help="Filled shapes.  [default]"
-        ),
-        click.option("--open", "kind", flag_value=Kind.STROKE, type=click.UNPROCESSED, help="Strokes."),
-        click.option(
-            "--quality", type=click.Choice(QUALITIES), help=f"Effort.  [default: {DEFAULT_QUALITY}]"
-        ),
-        click.option(
-            "--renderer",
-            type=click.Choice(["exact", "splat"]),
-            help=f"Model of coverage: the file's, or the paper's Gaussians.  [default: {_defaults.renderer}]",
-        ),
-        click.option("--iterations", type=int, metavar="N", help="Steps; overrides the effort's number."),
-        click.option("--target-psnr", type=float, metavar="DB", help="Stop once this is reached."),
-        click.option("--time-budget", metavar="TIME", help="Size the run to end within 60s, 2m ..."),
-        click.option("--max-bytes", metavar="SIZE", help="Largest file, 100KB ...; fewer curves if need be."),
-        click.option("--seed", type=int, metavar="N", help=f"Random seed.  [default: {_defaults.seed}]"),
-        click.option(
-            "--precision",
-            type=int,
-            metavar="N",
-            help=f"Decimals of coordinates.  [default: {_defaults.precision}]",
-        ),
-    ]
-    for option in reversed(options):
-        function = option(function)
+    for option in reversed(OPTIONS):
+        function = flag(option)(function)
     return function
 
 
@@ -104,13 +83,3 @@ def run_options(function: Function) -> Function:
     for option in reversed(options):
         function = option(function)
     return function
-
-
-def settings_from(given: dict[str, Any]) -> Settings:
-    """Settings from options; those not given come from the preset.
-
-    Raises:
-        UsageError: a value is out of range.
-    """
-    quality = given.pop("quality", None) or DEFAULT_QUALITY
-    return make_settings(quality, **given)

@@ -8,12 +8,13 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import FILE, overwrite_option, run_options
+from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name
 from warpsplat.files.output import check_output, write_result
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.options import BY_NAME
 
 
 @click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
@@ -22,10 +23,8 @@ from warpsplat.fit.settings import Settings, make_settings
 @click.option("-o", "--output", type=FILE, required=True, help="SVG to write; - is the standard output.")
 @overwrite_option
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
-@click.option("--time-budget", metavar="TIME", help="Size the run to end within 60s, 2m ...")
-@click.option(
-    "--precision", type=int, metavar="N", help=f"Decimals of coordinates.  [default: {Settings.precision}]"
-)
+@flag(BY_NAME["time-budget"])
+@flag(BY_NAME["precision"])
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(

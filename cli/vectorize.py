@@ -8,9 +8,10 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import FILE, overwrite_option, quality_options, run_options, settings_from
+from warpsplat.cli.options import FILE, overwrite_option, quality_options, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
+from warpsplat.jobs.options import settings_from
 
 
 def summary(output: Path, values: dict[str, Any]) -> str:

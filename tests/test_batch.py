@@ -15,7 +15,8 @@ from tests.scenes import random_scene
 from tests.test_cli import run
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.plan import MAX_FILE, load_jobs
+from warpsplat.jobs.batch_file import MAX_FILE
+from warpsplat.jobs.plan import load_jobs
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg

@@ -221,3 +221,15 @@ def test_libraries_print_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[st
     with pytest.raises(ImageError, match="damaged"):
         load_image(path)
     assert capfd.readouterr() == ("", "")
+
+
+def test_few_bytes_that_claim_many_pixels(tmp_path: Path) -> None:
+    """A blank scan packs to nothing; a drawing of the same size does not, and is read."""
+    blank = Image.new("1", (6000, 4000), 1)
+    blank.save(tmp_path / "blank.tif", compression="group4")
+    with pytest.raises(ImageError, match=r"claims 6000x4000 pixels in \d+ bytes"):
+        load_image(tmp_path / "blank.tif")
+    for row in range(0, 4000, 40):
+        blank.paste(0, (row, row, row + 300, row + 20))
+    blank.save(tmp_path / "drawing.tif", compression="group4")
+    assert load_image(tmp_path / "drawing.tif").shape == (4000, 6000, 3)

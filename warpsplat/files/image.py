@@ -28,6 +28,10 @@ MIN_SIDE = 2
 MAX_PIXELS = 120_000_000
 """Largest image [pixels]: the largest that cameras give. A small file may claim any size (a bomb)."""
 
+BOMB_PIXELS = 16_000_000
+PIXELS_A_BYTE = 10_000
+"""A large image of more pixels a byte is a bomb, or blank: a drawing in two colours packs to a tenth of that."""
+
 STRIP_PIXELS = 1 << 20
 """Pixels that are converted at a time."""
 
@@ -64,6 +68,8 @@ def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
                 if min(width, height) < MIN_SIDE:
                     least = f"at least {MIN_SIDE}x{MIN_SIDE} are needed"
                     raise ImageError(f"{width}x{height} pixels; {least}")
+                if width * height > max(BOMB_PIXELS, PIXELS_A_BYTE * len(source)):
+                    raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
                 rawmode = _rawmode(opened)
                 opened.load()
                 _mend_transparency(opened, rawmode, source)

@@ -186,9 +186,6 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 SPLAT_SHARE = 0.5
 """Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
 
-KINDS = {"closed": Kind.FILL, "open": Kind.STROKE}
-"""What options and batch files call the kinds of shapes."""
-
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 DEFAULT_QUALITY: Quality = "balanced"

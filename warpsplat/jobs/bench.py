@@ -14,9 +14,10 @@ import warp as wp
 
 from warpsplat.fit.place import STROKE_CUBICS, circle_outlines
 from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import KINDS, Density, Settings, default_rates
+from warpsplat.fit.settings import Density, Settings, default_rates
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
+from warpsplat.jobs.options import KINDS
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 

@@ -28,19 +28,16 @@ from typing import Any
 
 import yaml
 
-from warpsplat.errors import ImageError, UsageError
-from warpsplat.files.inputs import read_input
+from warpsplat.errors import UsageError
 from warpsplat.files.output import HEAD, check_folder, check_target, may_replace
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import Settings
+from warpsplat.jobs.batch_file import BatchFile
+from warpsplat.jobs.options import BY_NAME, KINDS, Option, settings_from
 from warpsplat.jobs.vectorize import job_key
-from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 
-SETTING_KEYS = ("curves", "quality", "iterations", "seed", "precision", "renderer")
-GOAL_KEYS = ("target-psnr", "time-budget", "max-bytes")
-KIND_KEYS = ("closed", "open")
 TEXT_KEYS = ("output", "device")
-KEYS = (*SETTING_KEYS, *GOAL_KEYS, *KIND_KEYS, *TEXT_KEYS)
+KEYS = (*BY_NAME, *TEXT_KEYS)
 
 
 @dataclass(frozen=True)
@@ -69,15 +66,6 @@ class Job:
 TAIL = b"</svg>\n"
 """How every SVG that was written here ends; one that was cut short does not."""
 
-MAX_FILE = 1 << 20
-"""Largest batch file [bytes]: reading a mebibyte of YAML takes some seconds."""
-
-MAX_DEPTH = 16
-"""Deepest nesting of a batch file; four is what one needs."""
-
-MAX_SCALAR = 4096
-"""Longest single value [characters]: that of the longest path."""
-
 
 @dataclass(frozen=True)
 class _Value:
@@ -87,91 +75,7 @@ class _Value:
     line: int
 
 
-class _File:
-    """A parsed YAML file that can name the line of each of its keys."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        try:
-            text = read_input(path, "a YAML file", limit=MAX_FILE).decode("utf-8-sig")
-        except ImageError as error:
-            raise UsageError(str(error)) from error
-        except UnicodeDecodeError as error:
-            raise UsageError(f"{path}: cannot be read: not UTF-8, at byte {error.start}") from error
-        self.loader: Any = None
-        try:
-            self.loader = yaml.SafeLoader(text)
-            self._check()
-            self.root = yaml.compose(text, yaml.SafeLoader)
-            self.loader = yaml.SafeLoader("")
-        except yaml.MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
-            raise self.error(mark.line + 1 if mark else 1, f"not valid YAML: {error.problem}") from None
-        except yaml.reader.ReaderError as error:
-            line = text.count("\n", 0, error.position) + 1
-            raise self.error(line, f"not valid YAML: character {error.character!r} is not allowed") from None
-        except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
-            # An escape beyond Unicode, say: the scanner lets chr() raise.
-            cause = str(error).splitlines()[0]
-            raise self.error(self.loader.line + 1 if self.loader else 1, f"not valid YAML: {cause}") from None
-
-    def _check(self) -> None:
-        """Refuse what is too deep or too long for a batch file before it is built."""
-        depth = 0
-        while self.loader.check_event():
-            event = self.loader.get_event()
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            line = event.start_mark.line + 1 if event.start_mark else 1
-            if depth > MAX_DEPTH:
-                raise self.error(line, f"nested deeper than {MAX_DEPTH} levels")
-            if isinstance(event, yaml.ScalarEvent) and len(event.value) > MAX_SCALAR:
-                raise self.error(line, f"a value of more than {MAX_SCALAR} characters")
-
-    def error(self, line: int, message: str) -> UsageError:
-        return UsageError(f"{self.path}:{line}: {message}")
-
-    def mapping(
-        self, node: yaml.Node | None, where: str, allowed: tuple[str, ...]
-    ) -> dict[str, tuple[int, yaml.Node]]:
-        """Key -> (line, value node); unknown and repeated keys are errors."""
-        if not isinstance(node, yaml.MappingNode):
-            line = node.start_mark.line + 1 if node else 1
-            raise self.error(line, f"{where} must be a mapping with keys out of: {', '.join(allowed)}")
-        result: dict[str, tuple[int, yaml.Node]] = {}
-        for key_node, value_node in node.value:
-            line = key_node.start_mark.line + 1
-            key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
-            if key not in allowed:
-                raise self.error(
-                    line, f"unknown key {key[:100]!r} in {where}; known are: {', '.join(allowed)}"
-                )
-            if key in result:
-                raise self.error(line, f"key {key!r} is there twice in {where}")
-            result[key] = (line, value_node)
-        return result
-
-    def value(self, node: yaml.Node) -> Any:
-        try:
-            return self.loader.construct_object(node, deep=True)
-        except Exception as error:  # tags and scalars of YAML's own types raise what their constructors raise
-            line = node.start_mark.line + 1
-            cause = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise self.error(line, f"not a plain value: {cause}") from error
-
-    def text(self, line: int, key: str, value: Any) -> str:
-        """``value`` as a path or name.
-
-        Raises:
-            UsageError: it is no text, or holds what no name can.
-        """
-        if not isinstance(value, str):
-            raise self.error(line, f"{key}: must be text, not {value!r}")
-        if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
-            raise self.error(line, f"{key}: {value!r} holds a character that no name can have")
-        return value
-
-
-def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, _Value]:
+def _options(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, _Value]:
     """The values of KEYS, each checked by itself, so that an error can name its line."""
     options: dict[str, _Value] = {}
     for key, (line, node) in entries.items():
@@ -180,37 +84,49 @@ def _options(file: _File, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str
         value = file.value(node)
         if not isinstance(node, yaml.ScalarNode):
             raise file.error(line, f"{key}: must be one value, not a list or mapping")
-        if key in (*TEXT_KEYS, "quality"):
+        if key in TEXT_KEYS or BY_NAME[key].choices:
             file.text(line, key, value)
-        if key in KIND_KEYS and value is not True:
-            raise file.error(line, f"{key}: must be true, not {value!r}; leave it out or give the other kind")
-        if key in (*SETTING_KEYS, *GOAL_KEYS):
-            try:
-                if key == "quality":
-                    make_settings(value)
-                else:
-                    if value is None:
-                        raise UsageError(f"{key} has no value")
-                    make_settings(**{key.replace("-", "_"): value})
-            except (UsageError, TypeError) as error:
-                raise file.error(line, f"{key}: {error}") from error
+        if key in BY_NAME:
+            _check_setting(file, line, BY_NAME[key], value)
         options[key] = _Value(value, line)
     if "closed" in options and "open" in options:
         raise file.error(options["open"].line, "open: closed is there as well; give one of them")
     return options
 
 
+def _check_setting(file: BatchFile, line: int, option: Option, value: Any) -> None:
+    """Whether a setting can have a value.
+
+    Raises:
+        UsageError: it cannot; the message names line and key.
+    """
+    key = option.name
+    if option.kind is not None:
+        if value is not True:
+            raise file.error(line, f"{key}: must be true, not {value!r}; leave it out or give the other kind")
+        return
+    try:
+        if value is None:
+            raise UsageError(f"{key} has no value")
+        settings_from({option.setting: value})
+    except (UsageError, TypeError) as error:
+        raise file.error(line, f"{key}: {error}") from error
+
+
 def _merge(defaults: dict[str, _Value], own: dict[str, _Value]) -> dict[str, Any]:
     """A job's options over the defaults; a job's kind replaces the default kind."""
     merged = dict(defaults)
-    if any(kind in own for kind in KIND_KEYS):
-        for kind in KIND_KEYS:
+    if any(kind in own for kind in KINDS):
+        for kind in KINDS:
             merged.pop(kind, None)
     merged.update(own)
-    return {key.replace("-", "_"): item.value for key, item in merged.items()}
+    values = {key.replace("-", "_"): item.value for key, item in merged.items() if key not in KINDS}
+    for key in merged.keys() & KINDS.keys():
+        values["kind"] = KINDS[key]
+    return values
 
 
-def _images(file: _File, line: int, node: yaml.Node) -> list[Path]:
+def _images(file: BatchFile, line: int, node: yaml.Node) -> list[Path]:
     """Files that the patterns match, each once, in the order of the patterns and sorted within one."""
     patterns = file.value(node)
     if isinstance(patterns, str):
@@ -251,7 +167,7 @@ def load_jobs(path: Path) -> list[Job]:
     Raises:
         UsageError: anything wrong with the file; the message names its line and key.
     """
-    file = _File(path)
+    file = BatchFile(path)
     top = file.mapping(file.root, "a batch file", ("defaults", "jobs"))
     defaults = {}
     if "defaults" in top:
@@ -269,10 +185,8 @@ def load_jobs(path: Path) -> list[Job]:
             raise file.error(start, "key 'images' is missing in a job")
         own = _options(file, entries)
         options = _merge(defaults, own)
-        stroke, fill = options.pop("open", False), options.pop("closed", False)
-        kind = Kind.STROKE if stroke else Kind.FILL if fill else None
         output, device = options.pop("output", None), options.pop("device", "auto")
-        settings = make_settings(options.pop("quality", "balanced"), kind=kind, **options)
+        settings = settings_from(options)
         try:
             folder_given = None if output is None else path.parent / Path(output).expanduser()
         except RuntimeError as error:
@@ -297,7 +211,7 @@ class _Planned:
     line: int
 
 
-def _named(file: _File, line: int, planned: list[_Planned]) -> list[Job]:
+def _named(file: BatchFile, line: int, planned: list[_Planned]) -> list[Job]:
     """Give each result a name; no two may have one, and none that of its image.
 
     Of a.png and a.jpg in one folder the results keep the endings; an image in two jobs cannot have one
@@ -319,7 +233,7 @@ def _named(file: _File, line: int, planned: list[_Planned]) -> list[Job]:
     return jobs
 
 
-def _check_outputs(file: _File, lines: list[int], jobs: list[Job]) -> None:
+def _check_outputs(file: BatchFile, lines: list[int], jobs: list[Job]) -> None:
     """Find out before the work whether every result can be written.
 
     Raises:

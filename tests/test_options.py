@@ -1,0 +1,43 @@
+"""One home of options: flags, keys of batch files and the README's table say the same."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+import pytest
+
+from warpsplat.cli.vectorize import command
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.jobs.options import OPTIONS, Option
+from warpsplat.jobs.plan import KEYS
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROWS = [
+    [cell.strip() for cell in line.strip("|").split("|")] for line in README.splitlines() if line[:3] == "| `"
+]
+
+
+@pytest.mark.parametrize("option", OPTIONS, ids=lambda o: o.name)
+def test_flags_keys_and_readme(option: Option) -> None:
+    flags = {name: p for p in command.params if isinstance(p, click.Option) for name in p.opts}
+    flag = flags[f"--{option.name}"]
+    assert option.kind is not None or command.make_context("vectorize", ["a.png"]).params[flag.name] is None
+    assert option.help.rstrip(".") in (flag.help or "")
+    assert option.name in KEYS
+    rows = [row for row in ROWS if re.search(rf"`--{option.name}[ `]", row[0])]
+    assert len(rows) == 1, "a row of the README's table"
+    if option.default and option.kind is None:
+        assert rows[0][2].strip("`") == option.default
+
+
+@pytest.mark.parametrize("option", OPTIONS, ids=lambda o: o.name)
+def test_a_default_is_what_a_run_takes(option: Option) -> None:
+    settings = make_settings()
+    if option.kind is not None:
+        assert (settings.kind == option.kind) == bool(option.default)
+    elif option.default and hasattr(settings, option.setting):
+        assert str(getattr(settings, option.setting)) == option.default.partition(";")[0]
+    else:
+        assert option.name == "quality" or option.setting in Settings.__dataclass_fields__

@@ -1,0 +1,110 @@
+"""A parsed YAML file that can name the line of each of its keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from warpsplat.errors import ImageError, UsageError
+from warpsplat.files.inputs import read_input
+
+MAX_FILE = 1 << 20
+"""Largest batch file [bytes]: reading a mebibyte of YAML takes some seconds."""
+
+MAX_DEPTH = 16
+"""Deepest nesting of a batch file; four is what one needs."""
+
+MAX_SCALAR = 4096
+"""Longest single value [characters]: that of the longest path."""
+
+
+class BatchFile:
+    """A parsed YAML file that can name the line of each of its keys."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            text = read_input(path, "a YAML file", limit=MAX_FILE).decode("utf-8-sig")
+        except ImageError as error:
+            raise UsageError(str(error)) from error
+        except UnicodeDecodeError as error:
+            raise UsageError(f"{path}: cannot be read: not UTF-8, at byte {error.start}") from error
+        self.loader: Any = None
+        try:
+            self.loader = yaml.SafeLoader(text)
+            self._check()
+            self.root = yaml.compose(text, yaml.SafeLoader)
+            self.loader = yaml.SafeLoader("")
+        except yaml.MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            raise self.error(mark.line + 1 if mark else 1, f"not valid YAML: {error.problem}") from None
+        except yaml.reader.ReaderError as error:
+            line = text.count("\n", 0, error.position) + 1
+            raise self.error(line, f"not valid YAML: character {error.character!r} is not allowed") from None
+        except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
+            # An escape beyond Unicode, say: the scanner lets chr() raise.
+            cause = str(error).splitlines()[0]
+            raise self.error(self.loader.line + 1 if self.loader else 1, f"not valid YAML: {cause}") from None
+
+    def _check(self) -> None:
+        """Refuse what is too deep or too long for a batch file before it is built."""
+        depth = 0
+        while self.loader.check_event():
+            event = self.loader.get_event()
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            line = event.start_mark.line + 1 if event.start_mark else 1
+            if depth > MAX_DEPTH:
+                raise self.error(line, f"nested deeper than {MAX_DEPTH} levels")
+            if isinstance(event, yaml.ScalarEvent) and len(event.value) > MAX_SCALAR:
+                raise self.error(line, f"a value of more than {MAX_SCALAR} characters")
+
+    def error(self, line: int, message: str) -> UsageError:
+        """An error that names the file and the line."""
+        return UsageError(f"{self.path}:{line}: {message}")
+
+    def mapping(
+        self, node: yaml.Node | None, where: str, allowed: tuple[str, ...]
+    ) -> dict[str, tuple[int, yaml.Node]]:
+        """Key -> (line, value node); unknown and repeated keys are errors."""
+        if not isinstance(node, yaml.MappingNode):
+            line = node.start_mark.line + 1 if node else 1
+            raise self.error(line, f"{where} must be a mapping with keys out of: {', '.join(allowed)}")
+        result: dict[str, tuple[int, yaml.Node]] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
+            if key not in allowed:
+                raise self.error(
+                    line, f"unknown key {key[:100]!r} in {where}; known are: {', '.join(allowed)}"
+                )
+            if key in result:
+                raise self.error(line, f"key {key!r} is there twice in {where}")
+            result[key] = (line, value_node)
+        return result
+
+    def value(self, node: yaml.Node) -> Any:
+        """What a node stands for.
+
+        Raises:
+            UsageError: nothing plain.
+        """
+        try:
+            return self.loader.construct_object(node, deep=True)
+        except Exception as error:  # tags and scalars of YAML's own types raise what their constructors raise
+            line = node.start_mark.line + 1
+            cause = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise self.error(line, f"not a plain value: {cause}") from error
+
+    def text(self, line: int, key: str, value: Any) -> str:
+        """``value`` as a path or name.
+
+        Raises:
+            UsageError: it is no text, or holds what no name can.
+        """
+        if not isinstance(value, str):
+            raise self.error(line, f"{key}: must be text, not {value!r}")
+        if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
+            raise self.error(line, f"{key}: {value!r} holds a character that no name can have")
+        return value

@@ -1,0 +1,74 @@
+"""What a user may set for a run: the one home of flags, keys of batch files and their words.
+
+The command line makes its flags of this table, batch files take their keys from it, and a test compares the
+table in the README with it. Defaults are those of ``fit.settings``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, make_settings
+from warpsplat.scene import Kind
+
+_defaults = Settings()
+
+
+@dataclass(frozen=True)
+class Option:
+    """One setting, as users know it."""
+
+    name: str
+    """The flag without its dashes, and the key of batch files."""
+    type: type
+    """``str`` for what ``make_settings`` reads itself: times and sizes."""
+    help: str
+    default: str = ""
+    """As it is shown; empty where there is none."""
+    metavar: str = ""
+    choices: tuple[str, ...] = ()
+    kind: Kind | None = None
+    """Of a flag that says a kind of shapes."""
+
+    @property
+    def setting(self) -> str:
+        """The keyword of ``make_settings``."""
+        return "kind" if self.kind is not None else self.name.replace("-", "_")
+
+
+OPTIONS = (
+    Option("curves", int, "Number of shapes.", f"{_defaults.curves}; fewer for a simple image", "N"),
+    Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
+    Option("open", bool, "Strokes.", kind=Kind.STROKE),
+    Option("quality", str, "Effort.", DEFAULT_QUALITY, choices=QUALITIES),
+    Option(
+        "renderer",
+        str,
+        "Model of coverage: the file's, or the paper's Gaussians.",
+        _defaults.renderer,
+        choices=get_args(Renderer),
+    ),
+    Option("iterations", int, "Steps; overrides the effort's number.", metavar="N"),
+    Option("target-psnr", float, "Stop once this is reached.", metavar="DB"),
+    Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
+    Option("max-bytes", str, "Largest file, 100KB ...; fewer curves if need be.", metavar="SIZE"),
+    Option("seed", int, "Random seed.", str(_defaults.seed), "N"),
+    Option("precision", int, "Decimals of coordinates.", str(_defaults.precision), "N"),
+)
+
+BY_NAME: Mapping[str, Option] = {option.name: option for option in OPTIONS}
+
+KINDS: Mapping[str, Kind] = {o.name: o.kind for o in OPTIONS if o.kind is not None}
+"""What flags and keys call the kinds of shapes."""
+
+
+def settings_from(given: Mapping[str, Any]) -> Settings:
+    """Settings from keywords of ``make_settings``; those that are None come from the preset.
+
+    Raises:
+        UsageError: a value is out of range.
+    """
+    values = dict(given)
+    return make_settings(values.pop("quality", None) or DEFAULT_QUALITY, **values)
