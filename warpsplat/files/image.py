@@ -30,7 +30,7 @@ MAX_PIXELS = 120_000_000
 
 BOMB_PIXELS = 16_000_000
 PIXELS_A_BYTE = 10_000
-"""A large image of more pixels a byte is a bomb, or blank: a drawing in two colours packs to a tenth of that."""
+"""A large image of more pixels a byte is a bomb, or blank: drawings in two colours have a tenth of that."""
 
 STRIP_PIXELS = 1 << 20
 """Pixels that are converted at a time."""

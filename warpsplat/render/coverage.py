@@ -65,8 +65,105 @@ class Coverage(Protocol):
         """Record gradients in the coverages' place -> gradients of the samples."""
 
 
+@dataclass(frozen=True)
+class Stages:
+    """What the parts of a coverage read and write."""
+
+    backend: Backend
+    parameters: Parameters
+    viewport: Viewport
+    outline: Outline
+    bins: Bins
+    coverage: CoverageBuffers
+    slots: int
+
+    @property
+    def sources(self) -> tuple[object, ...]:
+        """Where launches find their arrays."""
+        arrays = self.coverage, self.bins.buffers, self.outline.buffers, self.parameters.arrays
+        return (*arrays, self.viewport)
+
+
+class FillCoverage:
+    """Fills by signed area: states first, then coverages of what is seen."""
+
+    def __init__(self, stages: Stages) -> None:
+        self._stages = stages
+        self.buffers = stages.backend.allocate(FillBuffers, {"slots": stages.slots})
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        program.launch(fill.fill_states, self._stages.slots, *self._stages.sources, self.buffers, split=True)
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``."""
+        backend = self._stages.backend
+        program.launch(
+            fill.fill_forward,
+            (self._stages.slots, backend.lanes),
+            *self._stages.sources,
+            self.buffers,
+            lane_rows=backend.lane_size,
+            split=True,
+        )
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the edges' ends."""
+        program.launch(
+            fill.fill_backward,
+            self._stages.outline.buffers.vertex.shape[0],
+            *self._stages.sources,
+            sum_grad=self._stages.coverage.coverage_pixels,
+            split=True,
+        )
+
+
+class StrokeCoverage:
+    """Strokes by distance: states and coverages in one go."""
+
+    def __init__(self, stages: Stages) -> None:
+        self._stages = stages
+        sizes = {"slots": stages.slots, "lanes": stages.backend.lanes}
+        self.buffers = stages.backend.allocate(StrokeBuffers, sizes)
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        backend = self._stages.backend
+        program.launch(
+            stroke.stroke_forward,
+            (self._stages.slots, backend.lanes),
+            *self._stages.sources,
+            self.buffers,
+            lane_rows=backend.lane_size,
+            split=True,
+        )
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``: all are there."""
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the segments' ends and of the widths."""
+        stages = self._stages
+        program.launch(
+            stroke.stroke_backward,
+            stages.outline.buffers.vertex.shape[0],
+            *stages.sources,
+            self.buffers,
+            sum_grad=stages.coverage.coverage_pixels,
+            split=True,
+        )
+        program.launch(stroke.widths_backward, stages.parameters.shape_count, *stages.sources)
+
+
+EXACT_PARTS: dict[Kind, type[FillCoverage] | type[StrokeCoverage]] = {
+    Kind.FILL: FillCoverage,
+    Kind.STROKE: StrokeCoverage,
+}
+"""The part that covers each kind of shape."""
+
+
 class ExactCoverage:
-    """The area that a viewer computes: fills by signed area, strokes by distance, both of polylines."""
+    """The area that a viewer computes, of polylines: a part for each kind of shape that there is."""
 
     law = constants.AREA
 
@@ -79,75 +176,26 @@ class ExactCoverage:
         bins: Bins,
         slots: int,
     ) -> None:
-        self._backend, self._parameters = backend, parameters
-        self._outline, self._slots = outline, slots
-        sizes = {"slots": slots, "lanes": backend.lanes}
-        self.buffers = backend.allocate(CoverageBuffers, sizes)
-        self._sources = (self.buffers, bins.buffers, outline.buffers, viewport)
-        self.fill = backend.allocate(FillBuffers, sizes if Kind.FILL in parameters.kinds else NONE)
-        self.stroke = backend.allocate(StrokeBuffers, sizes if Kind.STROKE in parameters.kinds else NONE)
+        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
+        self._outline = outline
+        stages = Stages(backend, parameters, viewport, outline, bins, self.buffers, slots)
+        self.parts = [EXACT_PARTS[kind](stages) for kind in sorted(parameters.kinds)]
 
     def states(self, program: Program) -> None:
-        """See ``Coverage``: strokes find state and coverage in one go."""
-        kinds, p = self._parameters.kinds, self._parameters.arrays
-        if Kind.FILL in kinds:
-            program.launch(
-                fill.fill_states, self._slots, *self._sources, self.fill, kind=p["kind"], split=True
-            )
-        if Kind.STROKE in kinds:
-            program.launch(
-                stroke.stroke_forward,
-                (self._slots, self._backend.lanes),
-                *self._sources,
-                self.stroke,
-                p,
-                lane_rows=self._backend.lane_size,
-                split=True,
-            )
+        """See ``Coverage``."""
+        for part in self.parts:
+            part.states(program)
 
     def values(self, program: Program) -> None:
-        """See ``Coverage``: fills that nothing is seen of are left out."""
-        if Kind.FILL in self._parameters.kinds:
-            program.launch(
-                fill.fill_forward,
-                (self._slots, self._backend.lanes),
-                *self._sources,
-                self.fill,
-                kind=self._parameters.arrays["kind"],
-                lane_rows=self._backend.lane_size,
-                split=True,
-            )
+        """See ``Coverage``."""
+        for part in self.parts:
+            part.values(program)
 
     def backward(self, program: Program) -> None:
-        """See ``Coverage``: gradients of the edges' ends and of the widths."""
-        p = self._parameters
-        edges = self._outline.buffers.vertex.shape[0]
-        gradient = self.buffers.coverage_pixels
-        if Kind.FILL in p.kinds:
-            program.launch(
-                fill.fill_backward,
-                edges,
-                *self._sources,
-                kind=p.arrays["kind"],
-                sum_grad=gradient,
-                split=True,
-            )
-        if Kind.STROKE in p.kinds:
-            program.launch(
-                stroke.stroke_backward,
-                edges,
-                *self._sources,
-                self.stroke,
-                p.arrays,
-                sum_grad=gradient,
-                split=True,
-            )
-            program.launch(stroke.widths_backward, p.shape_count, *self._sources, p.arrays)
+        """See ``Coverage``: from the edges on to the points."""
+        for part in self.parts:
+            part.backward(program)
         self._outline.backward(program)
-
-
-NONE = {"slots": 0, "lanes": 0}
-"""Sizes of what no shape needs."""
 
 
 class SplatCoverage:

@@ -52,6 +52,29 @@ class GridBuffers:
     station_width_grad: wp.array = buffer(wp.float32, "gaussians")
 
 
+@dataclass(frozen=True)
+class GridKernels:
+    """What puts one kind of shape on a grid, and the adjoint."""
+
+    plan: wp.Kernel
+    forward: wp.Kernel
+    stations_backward: wp.Kernel
+    points_backward: wp.Kernel
+
+
+GRIDS = {
+    Kind.FILL: GridKernels(
+        fill.plan_fill, fill.fill_grid_forward, fill.fill_stations_backward, fill.fill_points_backward
+    ),
+    Kind.STROKE: GridKernels(
+        stroke.plan_stroke,
+        stroke.stroke_grid_forward,
+        stroke.stroke_stations_backward,
+        stroke.stroke_points_backward,
+    ),
+}
+
+
 class Grid:
     """Puts a grid of Gaussians along and across each shape."""
 
@@ -93,10 +116,8 @@ class Grid:
         """Record points, widths -> Gaussians."""
         b, p = self.buffers, self._parameters
         sources = (b, p.arrays, self._viewport)
-        if Kind.FILL in p.kinds:
-            program.launch(fill.plan_fill, p.shape_count, *sources, split=True)
-        if Kind.STROKE in p.kinds:
-            program.launch(stroke.plan_stroke, p.shape_count, *sources, split=True)
+        for kind in sorted(p.kinds):
+            program.launch(GRIDS[kind].plan, p.shape_count, *sources, split=True)
         record_ranges(
             program,
             b.gaussian_count,
@@ -106,10 +127,8 @@ class Grid:
             self._needed,
             capacity=self._capacity,
         )
-        if Kind.FILL in p.kinds:
-            program.launch(fill.fill_grid_forward, self._capacity, *sources, split=True)
-        if Kind.STROKE in p.kinds:
-            program.launch(stroke.stroke_grid_forward, self._capacity, *sources, split=True)
+        for kind in sorted(p.kinds):
+            program.launch(GRIDS[kind].forward, self._capacity, *sources, split=True)
         program.launch(gaussians.gaussians_forward, self._capacity, b, split=True)
 
     def backward(self, program: Program) -> None:
@@ -125,9 +144,6 @@ class Grid:
             split=True,
         )
         program.launch(gaussians.positions_backward, self._capacity, b, split=True)
-        if Kind.FILL in p.kinds:
-            program.launch(fill.fill_stations_backward, self._capacity, *sources, split=True)
-            program.launch(fill.fill_points_backward, p.point_count, *sources, split=True)
-        if Kind.STROKE in p.kinds:
-            program.launch(stroke.stroke_stations_backward, self._capacity, *sources, split=True)
-            program.launch(stroke.stroke_points_backward, p.point_count, *sources, split=True)
+        for kind in sorted(p.kinds):
+            program.launch(GRIDS[kind].stations_backward, self._capacity, *sources, split=True)
+            program.launch(GRIDS[kind].points_backward, p.point_count, *sources, split=True)
