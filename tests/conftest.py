@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 from pathlib import Path
 
@@ -13,6 +14,9 @@ import pytest
 import warp as wp
 
 wp.config.log_level = wp.LOG_ERROR
+
+# What a suite in a shell's background inherits, its programs would ignore too, and run on after Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -184,7 +184,10 @@ def test_ctrl_c_at_any_early_moment_shows_no_traceback(image: Path, seed: int) -
             break
     time.sleep(random.Random(seed).uniform(0, 0.3))
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    try:
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
     assert b"Traceback" not in said
     assert process.returncode in {130, -signal.SIGINT}
 
