@@ -233,3 +233,24 @@ def test_few_bytes_that_claim_many_pixels(tmp_path: Path) -> None:
         blank.paste(0, (row, row, row + 300, row + 20))
     blank.save(tmp_path / "drawing.tif", compression="group4")
     assert load_image(tmp_path / "drawing.tif").shape == (4000, 6000, 3)
+
+
+def test_missing_strips_are_not_black(tmp_path: Path) -> None:
+    """A TIFF of one strip of 20 rows that says it has 40,000."""
+    path = save(tmp_path, Image.fromarray(RGB), "a.tif")
+    head = (257).to_bytes(2, "little")  # the tag of the height: type, count and value follow
+    data = bytearray(path.read_bytes())
+    place = data.index(head, 8)
+    data[place + 8 : place + 12] = (40_000).to_bytes(4, "little")
+    path.write_bytes(data)
+    with pytest.raises(ImageError, match=r"a\.tif: damaged: pixel data for 660 of 33x40000 pixels only"):
+        load_image(path)
+
+
+@pytest.mark.parametrize("compression", [None, "tiff_lzw"])
+def test_many_strips_of_a_picture_on_its_side(tmp_path: Path, compression: str | None) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    how = {"compression": compression, "strip_size": 200}
+    pixels = load_image(save(tmp_path, Image.fromarray(RGB), "a.tif", exif=exif, **how))
+    np.testing.assert_allclose(pixels * 255, np.rot90(RGB, -1), atol=1e-4)

@@ -113,8 +113,11 @@ def _state(before: dict[str, bytes], after: dict[str, bytes], count: int) -> str
 
 def kill_once(
     rng: random.Random, scratch: Path, whole: dict[str, dict[str, bytes]], span: dict[str, float]
-) -> Kill:
-    """End a run at a random moment, then run again; half of the runs find old results, some no kernels."""
+) -> Kill | None:
+    """End a run at a random moment, then run again; half of the runs find old results, some no kernels.
+
+    None where the run was done before that moment.
+    """
     command, number, cold = rng.choice(list(ARGUMENTS)), rng.choice(SIGNALS), rng.random() < 0.1
     folder, cache = scratch / "folder", scratch / "cache" if cold else None
     folder.mkdir()
@@ -127,7 +130,9 @@ def kill_once(
     moment = rng.uniform(0, span[command] + (COMPILING if cold else 0))
     process = start(folder, command, cache)
     time.sleep(moment)
-    running = process.poll() is None
+    if process.poll() is not None:
+        process.communicate()
+        return None
     process.send_signal(number)
     sent = time.monotonic()
     try:
@@ -139,14 +144,14 @@ def kill_once(
     after = results(folder)
     faults = [f"{name} is not whole" for name in broken(folder)]
     faults += [f"{name} is gone" for name in before if name not in after]
-    # 0: it was done before; minus the signal: Python had not begun, a shell says the same of both.
+    # 0: it was just done; minus the signal: Python had not begun, or was ending; a shell says 128 + it.
     if code not in (0, 128 + number, -number):
         faults.append(f"exit code {code}")
     if "Traceback" in said:
         faults.append("traceback")
     if wait > (LATE + COMPILING if cold else LATE):
         faults.append("late")
-    if running and code == 0 and wait > ENDING:
+    if code == 0 and wait > ENDING:
         faults.append("went on")
     again = start(folder, command, cache)
     said = again.communicate(timeout=120)[1]
@@ -178,11 +183,13 @@ def main() -> None:
                 span[command] = time.monotonic() - begin
                 whole[command] = results(Path(scratch))
                 assert len(whole[command]) == len(INPUTS[command]), said
-    kills = []
-    for _ in range(given.count):
+    kills: list[Kill] = []
+    while len(kills) < given.count:
         with tempfile.TemporaryDirectory() as scratch:
-            kills.append(kill_once(rng, Path(scratch), whole, span))
-        print(kills[-1].line(), flush=True)
+            kill = kill_once(rng, Path(scratch), whole, span)
+        if kill:
+            kills.append(kill)
+            print(kill.line(), flush=True)
     print()
     counts = Counter((k.command, k.number.name, k.code, k.left, bool(k.faults)) for k in kills)
     for (command, name, code, left, is_faulty), count in sorted(counts.items()):

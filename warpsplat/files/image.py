@@ -70,6 +70,7 @@ def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
                     raise ImageError(f"{width}x{height} pixels; {least}")
                 if width * height > max(BOMB_PIXELS, PIXELS_A_BYTE * len(source)):
                     raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
+                _check_covered(opened)
                 rawmode = _rawmode(opened)
                 opened.load()
                 _mend_transparency(opened, rawmode, source)
@@ -98,6 +99,21 @@ def _pixel_limit() -> Iterator[None]:
         yield
     finally:
         Image.MAX_IMAGE_PIXELS = before
+
+
+def _check_covered(image: Image.Image) -> None:
+    """Refuse a TIFF whose strips do not make up its picture: Pillow would show the rest as black.
+
+    Raises:
+        ImageError: parts are missing.
+    """
+    if image.format != "TIFF":  # the frame of a GIF need not fill it
+        return
+    extents = {tile[1] for tile in getattr(image, "tile", [])}
+    # Areas: the sides of a picture that lies on its side are swapped already, those of its strips are not.
+    covered = sum((right - left) * (bottom - top) for left, top, right, bottom in extents)
+    if covered < image.width * image.height:
+        raise ImageError(f"damaged: pixel data for {covered} of {image.width}x{image.height} pixels only")
 
 
 def _rawmode(image: Image.Image) -> str:
