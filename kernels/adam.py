@@ -16,15 +16,28 @@ PI = wp.constant(3.141592653589793)
 def advance(
     # In:
     offset: wp.int32,
+    step_count: wp.int32,  # length of the decay
+    final: wp.float32,  # fraction of the learning rates at the end
     # Out:
     ages: wp.array[wp.int32],  # [shape_count] steps since the shape was placed, this one included
     clock: wp.array[wp.int32],  # [1] steps since the start, this one included
+    bias1: wp.array[wp.float32],  # [shape_count] what the moments fall short of at that age
+    bias2: wp.array[wp.float32],  # [shape_count]
+    decay: wp.array[wp.float32],  # [1] fraction of the learning rates at this step
 ):
-    """Count the step, on the device, so that a captured graph can be replayed unchanged."""
+    """Count the step, on the device, so that a captured graph can be replayed unchanged.
+
+    The rates decay along a cosine. Biases go by the shape's own age, so that a shape placed late starts as one
+    placed at the start did.
+    """
     i = offset + wp.tid()
     ages[i] = ages[i] + 1
+    bias1[i] = 1.0 - wp.pow(BETA1, float(ages[i]))
+    bias2[i] = 1.0 - wp.pow(BETA2, float(ages[i]))
     if i == 0:
         clock[0] = clock[0] + 1
+        progress = wp.min(float(clock[0]) / float(step_count), 1.0)
+        decay[0] = final + (1.0 - final) * 0.5 * (1.0 + wp.cos(PI * progress))
 
 
 @wp.kernel
@@ -35,29 +48,24 @@ def adam_update(
     owner: wp.array[wp.int32],  # [row_count] the shape of each row
     kind: wp.array[wp.int32],  # [shape_count]
     kinds: wp.int32,  # the kinds that have the attribute, a bit each
-    ages: wp.array[wp.int32],  # [shape_count]
-    clock: wp.array[wp.int32],  # [1]
-    step_count: wp.int32,  # length of the decay
+    bias1: wp.array[wp.float32],  # [shape_count]
+    bias2: wp.array[wp.float32],  # [shape_count]
+    decay: wp.array[wp.float32],  # [1]
     rate: wp.float32,  # learning rate at the start, in the attribute's unit
-    final: wp.float32,  # fraction of it at the end
-    low: wp.float32,  # bounds, kept by projection
+    low: wp.float32,  # bounds
     high: wp.float32,
     # Out:
     value: wp.array2d[wp.float32],  # [row_count, size] updated
     moment1: wp.array2d[wp.float32],  # [row_count, size] updated
     moment2: wp.array2d[wp.float32],  # [row_count, size] updated
 ):
-    """Cosine decay by the clock; bias correction by the shape's own age, so that a shape placed late starts
-    as one placed at the start did.
-    """
+    """A step of Adam, one thread a number; bounds are kept by projection."""
     i, j = wp.tid()
     row = offset + i
     shape = owner[row]
     if (kinds >> kind[shape]) & 1 == 0:
         return
-    progress = wp.min(float(clock[0]) / float(step_count), 1.0)
-    current = rate * (final + (1.0 - final) * 0.5 * (1.0 + wp.cos(PI * progress)))
-    age = float(ages[shape])
+    current = rate * decay[0]
     g = grad[row, j]
     # A gradient that is not finite must not poison the moments.
     if not wp.isfinite(g):
@@ -66,6 +74,6 @@ def adam_update(
     m2 = BETA2 * moment2[row, j] + (1.0 - BETA2) * g * g
     moment1[row, j] = m1
     moment2[row, j] = m2
-    m1_hat = m1 / (1.0 - wp.pow(BETA1, age))
-    m2_hat = m2 / (1.0 - wp.pow(BETA2, age))
+    m1_hat = m1 / bias1[shape]
+    m2_hat = m2 / bias2[shape]
     value[row, j] = wp.clamp(value[row, j] - current * m1_hat / (wp.sqrt(m2_hat) + EPSILON), low, high)

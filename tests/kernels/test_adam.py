@@ -22,13 +22,17 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
         "kind": wp.array(kind, dtype=int, device=device),
         "ages": wp.zeros(len(kind), dtype=int, device=device),
         "clock": wp.zeros(1, dtype=int, device=device),
+        "bias1": wp.zeros(len(kind), dtype=float, device=device),
+        "bias2": wp.zeros(len(kind), dtype=float, device=device),
+        "decay": wp.zeros(1, dtype=float, device=device),
     }
 
 
 def step(s: dict[str, Any], gradient: np.ndarray, device: str, **values: float) -> None:
     s["grad"].assign(gradient)
-    run(adam.advance, s["ages"].shape[0], device, s)
-    settings = {"kinds": BOTH, "step_count": 20, "rate": 0.1, "final": 0.1, "low": -100.0, "high": 100.0}
+    decay = {"step_count": 20, "final": values.pop("final", 0.1)}
+    run(adam.advance, s["ages"].shape[0], device, s, **decay)
+    settings = {"kinds": BOTH, "rate": 0.1, "low": -100.0, "high": 100.0}
     run(adam.adam_update, s["value"].shape, device, s, **{**settings, **values})
 
 

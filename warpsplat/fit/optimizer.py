@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import warp as wp
 
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.units import Units
 from warpsplat.kernels import adam
+from warpsplat.render.backend import buffer
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
+
+
+@dataclass
+class AdamBuffers:
+    """What a step's updates share."""
+
+    bias1: wp.array = buffer(wp.float32, "shapes")
+    """What the first moments of each shape fall short of at its age."""
+    bias2: wp.array = buffer(wp.float32, "shapes")
+    decay: wp.array = buffer(wp.float32, 1)
+    """Fraction of the learning rates at this step."""
 
 
 def record_adam(
@@ -18,7 +32,16 @@ def record_adam(
 
     ``clock``: steps so far, on the device, shape (1,).
     """
-    program.launch(adam.advance, parameters.shape_count, parameters.arrays, clock=clock)
+    buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
+    program.launch(
+        adam.advance,
+        parameters.shape_count,
+        buffers,
+        parameters.arrays,
+        clock=clock,
+        step_count=settings.iterations,
+        final=settings.final_rate,
+    )
     for name, group in parameters.groups.items():
         attribute = group.attribute
         if not parameters.kinds & set(attribute.kinds):
@@ -27,12 +50,10 @@ def record_adam(
             adam.adam_update,
             group.value.shape,
             group,
+            buffers,
             parameters.arrays,
             kinds=sum(1 << kind for kind in attribute.kinds),
-            clock=clock,
-            step_count=settings.iterations,
             rate=units.resolve(settings.rates[name], attribute.rate_unit),
-            final=settings.final_rate,
             low=units.resolve(*attribute.low),
             high=units.resolve(*attribute.high),
             split=True,
