@@ -27,7 +27,7 @@ def advance(
 ):
     """Count the step, on the device, so that a captured graph can be replayed unchanged.
 
-    The rates decay along a cosine. Biases go by the shape's own age, so that a shape placed late starts as one
+    The rates decay along a cosine. Biases go by the shape's own age: a shape placed late starts as one
     placed at the start did.
     """
     i = offset + wp.tid()
