@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests import ROOT
 from tests.fit.pictures import picture
 from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
@@ -16,7 +16,7 @@ from warpsplat.jobs.vectorize import vectorize
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Kind
 
-CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
+CAT = ROOT / "docs" / "images" / "cat.jpg"
 
 
 @pytest.mark.parametrize("kind", list(Kind))
