@@ -15,6 +15,8 @@ from tests import ROOT
 from tests.forks import QUICK, Forks, make_image
 from tests.fuzz.corpus import own_svg
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forks]:

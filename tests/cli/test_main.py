@@ -29,6 +29,7 @@ def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
     assert "\\b" not in done.stdout
 
 
+@pytest.mark.slow
 def test_a_run_never_imports_torch(image: Path, tmp_path: Path) -> None:
     code = (
         "import sys; from warpsplat.cli.main import main\n"
@@ -119,6 +120,7 @@ def test_odd_requests_are_one_line(
     assert set(os.listdir()) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("streams", "code"),
     [
@@ -141,6 +143,7 @@ def test_standard_streams_that_are_full_or_closed(image: Path, streams: str, cod
     render_svg(output.read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="names of bytes")
 def test_control_characters_of_names_are_escaped(tmp_path: Path) -> None:
     path = tmp_path / os.fsdecode(b"a\x1b[31m\n\xff.png")

@@ -24,6 +24,7 @@ from warpsplat.render.backend import THREADS_PER_CORE, Backend, available_cores
 from warpsplat.svg.viewer import render_svg
 
 
+@pytest.mark.slow
 def test_ctrl_c_writes_the_best_so_far(image: Path, tmp_path: Path) -> None:
     """In a terminal: the progress bar shows, Ctrl-C ends the run, the file is there and valid."""
     output = tmp_path / "a.svg"
@@ -102,6 +103,7 @@ def test_the_bar_weighs_steps_and_shows_no_decibels_that_fall(image: Path) -> No
     assert "dB" in _quality(seen[5])
 
 
+@pytest.mark.slow
 def test_compiling_is_said_on_a_terminal_or_with_v(image: Path, tmp_path: Path) -> None:
     options = ("vectorize", image, "-o", image.parent / "a.svg", *QUICK, "--iterations", 1)
     code = "import warp; warp.load_module = lambda *_, **__: exit(9)\n"

@@ -15,7 +15,7 @@ import pytest
 
 from warpsplat.svg.viewer import render_svg
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+pytestmark = [pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"), pytest.mark.slow]
 
 MOMENTS = {
     "import": """

@@ -18,6 +18,8 @@ from tests import ROOT
 from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
 from warpsplat.svg.viewer import render_svg
 
+pytestmark = pytest.mark.slow
+
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 GENTLE = [signal.SIGINT, signal.SIGTERM]
 BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {QUICK[-1]}}}\njobs: [{{images: '*.png'}}]\n"

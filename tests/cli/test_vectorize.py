@@ -96,6 +96,7 @@ def test_an_output_is_what_its_name_says(image: Path, capsys: pytest.CaptureFixt
     assert os.listdir(image.parent) == ["photo.png"]
 
 
+@pytest.mark.slow
 def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     direct = image.parent / "a.svg"
     assert run("vectorize", image, "-o", direct, "-q", *QUICK) == 0
@@ -108,6 +109,7 @@ def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[st
     assert not os.path.exists("-")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_a_limit_of_file_size_is_a_failure_to_write(image: Path) -> None:
     run_it = ("vectorize", image, "-o", image.parent / "a.svg", "--curves", 200, "--iterations", 2)
