@@ -20,7 +20,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
+from tests import ROOT
+
 QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "12")
 NOBODY = 65534
 """A user without rights, by custom."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests import ROOT
 
 ALLOWED: dict[str, tuple[str, ...]] = {
     "errors": (),

@@ -15,7 +15,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.forks import ROOT, make_image
+from tests import ROOT
+from tests.forks import make_image
 from warpsplat.errors import WarpsplatError
 from warpsplat.svg.viewer import render_svg
 

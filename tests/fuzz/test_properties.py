@@ -30,6 +30,8 @@ from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
 from warpsplat.svg.write import write_svg
 
+pytestmark = pytest.mark.slow
+
 
 def examples(count: int) -> Callable[[Any], Any]:
     """The same ``count`` examples on every run; none is stored."""

@@ -11,6 +11,8 @@ from tests.fuzz.campaign import campaign, shrink
 from tests.fuzz.cases import TARGETS, Case, Cases, Command, judge
 from tests.fuzz.worker import Outcome, Worker
 
+pytestmark = pytest.mark.slow
+
 SEED = 21
 COUNTS = {"image": 120, "svg": 60, "yaml": 50, "options": 50}
 

@@ -19,7 +19,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[2]
+from tests import ROOT
+
 MAX_SECONDS = 10.0
 """No run on a small input may take longer."""
 MAX_MEMORY = 2 << 30

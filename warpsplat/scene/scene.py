@@ -81,6 +81,22 @@ class Scene:
         return len(self.kind)
 
     @staticmethod
+    def of(canvas: Canvas, kind: IntArray, first: IntArray, **attributes: FloatArray) -> Scene:
+        """Shapes with the ``attributes`` that are known.
+
+        Args:
+            canvas: what they lie on.
+            kind: shape (shape,).
+            first: shape (shape + 1,).
+            attributes: of the table, ``points`` among them; those left out are 0.
+        """
+        rows: dict[str, Any] = {}
+        for a in ATTRIBUTES:
+            if a.per == "shape":
+                rows[a.name] = np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
+        return Scene(canvas, kind, first, **(rows | attributes))
+
+    @staticmethod
     def uniform(kind: Kind, canvas: Canvas, points: FloatArray, **attributes: FloatArray) -> Scene:
         """Shapes of one kind with equally many control points.
 
@@ -91,18 +107,12 @@ class Scene:
             attributes: the others of the table; those left out are 0.
         """
         count, each = points.shape[:2]
-        rows: dict[str, Any] = {}
-        for attribute in ATTRIBUTES:
-            if attribute.per == "shape":
-                empty = np.zeros((count, attribute.size) if attribute.size > 1 else count, np.float32)
-                rows[attribute.name] = np.asarray(attributes.pop(attribute.name, empty), np.float32)
-        return Scene(
-            canvas=canvas,
-            kind=np.full(count, kind, np.int32),
-            first=each * np.arange(count + 1, dtype=np.int32),
+        return Scene.of(
+            canvas,
+            np.full(count, kind, np.int32),
+            each * np.arange(count + 1, dtype=np.int32),
             points=np.ascontiguousarray(points, np.float32).reshape(-1, 2),
-            **rows,
-            **attributes,
+            **{name: np.asarray(values, np.float32) for name, values in attributes.items()},
         )
 
     def shape_of(self, attribute: Attribute) -> tuple[int, ...]:

@@ -74,10 +74,10 @@ def _load_scene(text: str, width: int, height: int) -> tuple[Scene, bool]:
     rows: list[tuple[Points, Shape]] = []
     for shape in shapes:
         rows += [(p, shape) for p in ([_ring(shape.subpaths)] if filled else shape.subpaths)]
-    scene = Scene(
-        canvas=Canvas(width, height, background.astype(np.float32)),
-        kind=np.full(len(rows), Kind.FILL if filled else Kind.STROKE, np.int32),
-        first=starts_of(np.array([len(points) for points, _ in rows])),
+    scene = Scene.of(
+        Canvas(width, height, background.astype(np.float32)),
+        np.full(len(rows), Kind.FILL if filled else Kind.STROKE, np.int32),
+        starts_of(np.array([len(points) for points, _ in rows])),
         points=np.concatenate([points for points, _ in rows]).astype(np.float32),
         colors=np.array([shape.color for _, shape in rows], np.float32),
         opacities=np.array([shape.opacity for _, shape in rows], np.float32),

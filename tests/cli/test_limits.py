@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.forks import QUICK, ROOT, Forks, make_image
+from tests import ROOT
+from tests.forks import QUICK, Forks, make_image
 from tests.fuzz.corpus import own_svg
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,11 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from warpsplat.svg.viewer import render_svg
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+pytestmark = [pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"), pytest.mark.slow]
 
 MOMENTS = {
     "import": """
@@ -79,14 +77,6 @@ def strike_in(owner, name, call=1, times=1):
 from warpsplat.cli.main import main
 main({arguments!r})
 """
-
-
-@pytest.fixture
-def image(tmp_path: Path) -> Path:
-    path = tmp_path / "photo.png"
-    y, x = np.mgrid[:40, :60]
-    Image.fromarray(np.stack([4 * x, 6 * y, 0 * x + 90], axis=2).astype(np.uint8)).save(path)
-    return path
 
 
 def strike(number: int, moment: str, *arguments: object) -> subprocess.CompletedProcess[str]:

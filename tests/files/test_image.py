@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.files.samples import RGB, RNG, bad_files, save
 from warpsplat.errors import ImageError
 from warpsplat.files.image import load_image
-
-RNG = np.random.default_rng(0)
-RGB = RNG.integers(0, 256, (20, 33, 3), dtype=np.uint8)
-
-
-def save(folder: Path, image: Image.Image, name: str, **options: object) -> Path:
-    path = folder / name
-    image.save(path, **options)
-    return path
 
 
 def test_plain(tmp_path: Path) -> None:
@@ -81,27 +73,6 @@ def test_animation_gives_its_first_frame(tmp_path: Path) -> None:
     frames = [Image.new("RGB", (8, 8), c) for c in ("red", "blue")]
     path = save(tmp_path, frames[0], "a.gif", save_all=True, append_images=frames[1:])
     np.testing.assert_allclose(load_image(path)[0, 0], [1, 0, 0])
-
-
-def bad_files(folder: Path) -> dict[str, Path]:
-    whole = save(folder, Image.fromarray(RGB), "whole.png").read_bytes()
-    jpeg = save(folder, Image.fromarray(np.tile(RGB, (4, 4, 1))), "whole.jpg").read_bytes()
-    contents = {
-        "empty.png": b"",
-        "text.png": b"hello, I am text\n" * 10,
-        "truncated.png": whole[: len(whole) // 2],
-        "truncated.jpg": jpeg[: len(jpeg) // 2],
-        "corrupt.png": whole[:60] + b"\x00" * 40 + whole[100:],
-    }
-    files = {}
-    for name, data in contents.items():
-        files[name] = folder / name
-        files[name].write_bytes(data)
-    files["one.png"] = save(folder, Image.new("RGB", (1, 1)), "one.png")
-    files["missing.png"] = folder / "missing.png"
-    files["folder.png"] = folder / "folder.png"
-    files["folder.png"].mkdir()
-    return files
 
 
 def test_bad_files_give_one_line_with_name_and_cause(tmp_path: Path) -> None:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import click
 import pytest
 
+from tests import ROOT
 from warpsplat.cli.vectorize import command
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.options import OPTIONS, Option
 from warpsplat.jobs.plan import KEYS
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")] for line in README.splitlines() if line[:3] == "| `"
 ]

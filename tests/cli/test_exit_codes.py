@@ -17,8 +17,9 @@ import pytest
 import warp as wp
 from PIL import Image
 
+from tests import ROOT
+from tests.cli.helpers import run
 from tests.fuzz.corpus import own_svg
-from tests.test_cli import run
 from warpsplat.errors import ExitCode
 
 CPU = "--device cpu"
@@ -207,7 +208,7 @@ def test_every_code_and_command_is_in_the_table() -> None:
 
 
 def test_the_readme_lists_the_codes() -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+    readme = (ROOT / "README.md").read_text("utf-8")
     section = readme.split("### Exit codes")[1].split("\n#")[0]
     listed = [int(number) for number in re.findall(r"^\| (\d+) \|", section, re.MULTILINE)]
     assert listed == sorted(set(ExitCode)), "each code once, in order"

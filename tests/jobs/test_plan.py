@@ -1,18 +1,16 @@
-"""Batch files: what is accepted, what is refused with line and key, and what a run does."""
+"""Batch files: what is accepted, and what is refused with line and key before anything starts."""
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
 import warpsplat.configs
+from tests.cli.helpers import run
+from tests.jobs.helpers import write
 from tests.scenes import random_scene
-from tests.test_cli import run
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.batch_file import MAX_FILE
@@ -20,22 +18,6 @@ from warpsplat.jobs.plan import load_jobs
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    rng = np.random.default_rng(0)
-    (tmp_path / "in" / "deep").mkdir(parents=True)
-    for name in ("in/a.png", "in/b.png", "in/b.jpg", "in/deep/c.png"):
-        Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(tmp_path / name)
-    (tmp_path / "in" / "broken.png").write_bytes(b"no image")
-    return tmp_path
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "jobs.yaml"
-    path.write_text(text)
-    return path
 
 
 def test_jobs(folder: Path) -> None:
@@ -147,42 +129,6 @@ def test_unknown_device_stops_before_anything_starts(folder: Path) -> None:
     assert not (folder / "in" / "a.svg").exists()
 
 
-def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = "defaults: {curves: 4, iterations: 6, device: cpu, output: out}\njobs: [{images: in/*.png}]\n"
-    path = write(folder, text)
-    assert run("batch", path) == 5
-    captured = capsys.readouterr()
-    assert "3 images: 2 made, 0 skipped, 1 failed" in captured.out
-    assert "broken.png: not an image" in captured.err
-    assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg"]
-    times = {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
-
-    assert run("batch", path, "--json") == 5
-    values = json.loads(capsys.readouterr().out)
-    assert (values["made"], values["skipped"], values["failed"]) == (0, 2, 1)
-    assert times == {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
-
-    Image.new("RGB", (32, 24), "red").save(folder / "in" / "a.png")  # another image under the old name
-    (folder / "in" / "broken.png").unlink()
-    assert run("batch", path, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["made"] == 1
-
-    write(folder, text.replace("curves: 4", "curves: 5"))
-    assert run("batch", path, "-q") == 0
-    assert capsys.readouterr() == ("", "")
-    assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
-
-
-def test_a_stopped_result_is_made_again(folder: Path) -> None:
-    path = write(folder, "jobs: [{images: in/a.png, curves: 4, iterations: 5, device: cpu}]")
-    assert run("batch", path, "-q") == 0
-    job = load_jobs(path)[0]
-    assert job.done(job.image.read_bytes())
-    svg = job.output.read_text()
-    job.output.write_text(svg[: svg.index("key=")] + "stopped" + svg[svg.index("</metadata>") :])
-    assert not job.done(job.image.read_bytes())
-
-
 def test_examples_are_valid(tmp_path: Path) -> None:
     examples = sorted(Path(p) for p in warpsplat.configs.__path__)[0]
     files = sorted(examples.glob("*.yaml"))
@@ -194,13 +140,6 @@ def test_examples_are_valid(tmp_path: Path) -> None:
         copy = tmp_path / file.name
         copy.write_text(file.read_text())
         assert load_jobs(copy)
-
-
-def test_missed_goals_have_their_exit_code(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = "jobs: [{images: in/a.png, curves: 3, iterations: 3, target-psnr: 90, output: out, device: cpu}]"
-    assert run("batch", write(folder, text)) == 6
-    assert "goal missed: target-psnr 90 dB" in capsys.readouterr().err
-    assert (folder / "out/a.svg").exists()
 
 
 def test_a_batch_file_is_bounded(tmp_path: Path) -> None:
@@ -220,43 +159,6 @@ def test_aliases_are_not_multiplied(folder: Path) -> None:
     with pytest.raises(UsageError, match="device: must be one value") as caught:
         load_jobs(write(folder, "\n".join(lines)))
     assert len(str(caught.value)) < 1000
-
-
-class PanicException(BaseException):
-    pass
-
-
-FAILURES: list[tuple[BaseException, str]] = [
-    (MemoryError(), "not enough memory"),
-    (RuntimeError("Failed to allocate 99 bytes on device 'cpu'"), "not enough memory: Failed to allocate 99"),
-    (PanicException("index out of bounds"), "renderer gave up: index out of bounds"),
-    (RecursionError("too deep"), "internal error: RecursionError: too deep"),
-    (OSError(28, "No space left on device", "/x"), "/x: No space left"),
-]
-
-
-@pytest.mark.parametrize(("error", "words"), FAILURES)
-def test_whatever_an_image_throws_is_its_own_failure(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    error: BaseException,
-    words: str,
-) -> None:
-    def load(data: bytes, name: str) -> np.ndarray:
-        if name.endswith("a.png"):
-            raise error
-        return np.full((24, 32, 3), 0.5, np.float32)
-
-    monkeypatch.setattr("warpsplat.jobs.vectorize.load_image", load)
-    text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
-    assert run("batch", write(folder, text), "--json") == 5
-    captured = capsys.readouterr()
-    values = json.loads(captured.out)
-    assert [r["status"] for r in values["results"]] == ["failed", "made"]
-    assert words in values["results"][0]["error"]
-    assert "a.png" in values["results"][0]["error"]
-    assert words in captured.err
 
 
 def test_files_of_others_are_named_before_anything_starts(

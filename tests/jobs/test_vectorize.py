@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests import ROOT
 from tests.fit.pictures import picture
 from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
@@ -16,9 +16,10 @@ from warpsplat.jobs.vectorize import vectorize
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Kind
 
-CAT = Path(__file__).parents[1] / "docs" / "images" / "cat.jpg"
+CAT = ROOT / "docs" / "images" / "cat.jpg"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("renderer", ["exact", "splat"])
 def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: Renderer) -> None:
@@ -92,6 +93,7 @@ FIGURES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("renderer", "kind", "figure", "gap"), FIGURES)
 def test_a_photograph_reaches_its_figure(renderer: Renderer, kind: Kind, figure: float, gap: float) -> None:
     """451x300, 192 curves, 100 steps: PSNR of the file, and how much more the training render has."""

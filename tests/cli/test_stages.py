@@ -14,8 +14,11 @@ from typing import Any
 
 import pytest
 
-from tests.forks import MOMENTS, QUICK, ROOT, Forks, Task, make_image
+from tests import ROOT
+from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
 from warpsplat.svg.viewer import render_svg
+
+pytestmark = pytest.mark.slow
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 GENTLE = [signal.SIGINT, signal.SIGTERM]

@@ -1,0 +1,43 @@
+"""Runs of the command line, in this process or by a shell."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from warpsplat.cli.main import main
+
+QUICK = ["--curves", "8", "--iterations", "12", "--device", "cpu"]
+
+
+def run(*arguments: object) -> int:
+    """Exit code of the command line in this process."""
+    with pytest.raises(SystemExit) as caught:
+        main([str(a) for a in arguments])
+    return int(caught.value.code or 0)
+
+
+def one_line(text: str) -> str:
+    lines = text.strip().splitlines()
+    assert len(lines) == 1, text
+    assert "Traceback" not in text
+    return lines[0]
+
+
+def shell(
+    script: str, *arguments: object, given: bytes = b"", **environment: str
+) -> subprocess.CompletedProcess[bytes]:
+    """Run ``warpsplat`` as a shell does; ``$W`` is the program with the arguments."""
+    command = shlex.join([sys.executable, "-m", "warpsplat", *map(str, arguments)])
+    return subprocess.run(
+        ["sh", "-c", script.replace("$W", command)],
+        input=given,
+        capture_output=True,
+        timeout=120,
+        check=False,
+        env=os.environ | environment,
+    )

@@ -1,0 +1,119 @@
+"""``vectorize`` as a user meets it: exit codes, messages, files."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import QUICK, one_line, run, shell
+from tests.files.samples import bad_files
+from warpsplat.metrics import psnr
+from warpsplat.svg.viewer import on_white, render_svg
+
+
+@pytest.mark.parametrize("kind", ["--closed", "--open"])
+def test_vectorize(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str) -> None:
+    output = tmp_path / "out.svg"
+    assert run("vectorize", image, "-o", output, kind, "--json", *QUICK) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["paths"] == 8
+    assert values["bytes"] == output.stat().st_size
+    shown = on_white(render_svg(output.read_text()))
+    assert values["psnr"] == pytest.approx(psnr(shown, on_white(Image.open(image))), abs=0.01)
+
+
+def test_summary_and_default_output(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("vectorize", image, *QUICK) == 0
+    assert (tmp_path / "photo.svg").exists()
+    captured = capsys.readouterr()
+    assert re.fullmatch(r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}, 8 paths, .* s\n", captured.out)
+    assert captured.err == "", "no progress bar where stderr is no terminal"
+
+
+def test_bad_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, path in bad_files(tmp_path).items():
+        before = set(os.listdir(tmp_path))
+        assert run("vectorize", path, "-o", tmp_path / "out.svg", *QUICK) == 3, name
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert str(path) in one_line(captured.err)
+        assert set(os.listdir(tmp_path)) == before
+
+
+def test_the_image_is_not_overwritten(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = image.read_bytes()
+    assert run("vectorize", image, "-o", image, *QUICK) == 2
+    assert "is the input itself" in one_line(capsys.readouterr().err)
+    assert image.read_bytes() == before
+
+
+def test_a_full_disk_is_one_line(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    assert run("vectorize", image, "-o", tmp_path / "a.svg", *QUICK) == 4
+    assert "No space left on device" in one_line(capsys.readouterr().err)
+    assert os.listdir(tmp_path) == ["photo.png"]
+
+
+def test_a_link_stays_a_link(image: Path, tmp_path: Path) -> None:
+    real, link = tmp_path / "real.svg", tmp_path / "link.svg"
+    link.symlink_to(real)
+    assert run("vectorize", image, "-o", link, "-q", *QUICK) == 0
+    assert link.is_symlink()
+    assert real.read_text().startswith("<svg")
+
+
+def test_a_file_of_others_is_replaced_with_overwrite_only(
+    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(image.parent)
+    drawn = Path("photo.svg")
+    drawn.write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+    before = drawn.read_bytes()
+    assert run("vectorize", image, *QUICK) == 2
+    assert "photo.svg: exists and was not written by warpsplat" in one_line(capsys.readouterr().err)
+    assert drawn.read_bytes() == before
+    assert run("vectorize", image, "--overwrite", *QUICK) == 0
+    assert run("vectorize", image, *QUICK) == 0
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.txt", "a", "a.svgz"])
+def test_an_output_is_what_its_name_says(image: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert run("vectorize", image, "-o", image.parent / name, *QUICK) == 2
+    assert ".svg" in one_line(capsys.readouterr().err)
+    assert os.listdir(image.parent) == ["photo.png"]
+
+
+@pytest.mark.slow
+def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    direct = image.parent / "a.svg"
+    assert run("vectorize", image, "-o", direct, "-q", *QUICK) == 0
+    piped = shell("cd / && $W", "vectorize", "-", "-o", "-", "--json", *QUICK, given=image.read_bytes())
+    assert piped.returncode == 0
+    assert piped.stdout == direct.read_bytes()
+    assert json.loads(piped.stderr)["bytes"] == len(piped.stdout)
+    assert run("vectorize", "-", *QUICK) == 2
+    assert "give -o" in one_line(capsys.readouterr().err)
+    assert not os.path.exists("-")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+def test_a_limit_of_file_size_is_a_failure_to_write(image: Path) -> None:
+    run_it = ("vectorize", image, "-o", image.parent / "a.svg", "--curves", 200, "--iterations", 2)
+    done = shell("ulimit -f 1; $W", *run_it, "--device", "cpu")
+    assert done.returncode == 4
+    assert b"File too large" in done.stderr
+    assert done.stderr.count(b"\n") == 1

@@ -1,0 +1,58 @@
+"""What a further loss takes: a function in one of the two tuples of ``fit/losses.py``."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import picture
+from tests.kernels import trials
+from warpsplat.fit import losses
+from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.losses import LossInputs
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.render.backend import Backend
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.program import Program
+from warpsplat.render.renderer import render
+
+
+def record_blue(program: Program, inputs: LossInputs) -> None:
+    program.launch(
+        trials.blue_backward,
+        inputs.renderer.viewport.tile_count,
+        inputs.renderer.film.buffers,
+        inputs.aim,
+        weight=0.5,
+        split=True,
+    )
+
+
+def record_thin(program: Program, parameters: Parameters, settings: Settings) -> None:
+    program.launch(
+        trials.thin_backward,
+        parameters.shape_count,
+        parameters.arrays,
+        weight=1.0 / settings.curves,
+        split=True,
+    )
+
+
+def short_fit(device: str) -> Fit:
+    return fit(picture(), make_settings(curves=8, iterations=40), Backend.on(device))
+
+
+def test_a_loss_of_the_image_changes_what_is_fitted(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = render(short_fit(device).scene, backend=Backend.on(device)).mean(axis=(0, 1))
+    monkeypatch.setattr(losses, "IMAGE_LOSSES", (*losses.IMAGE_LOSSES, record_blue))
+    after = render(short_fit(device).scene, backend=Backend.on(device)).mean(axis=(0, 1))
+    assert after[2] > before[2] + 0.1
+    np.testing.assert_allclose(after[:2], before[:2], atol=0.1)
+
+
+def test_a_loss_of_the_shapes_changes_what_is_fitted(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = short_fit(device).scene.opacities
+    monkeypatch.setattr(losses, "SHAPE_LOSSES", (*losses.SHAPE_LOSSES, record_thin))
+    after = short_fit(device).scene.opacities
+    assert before.mean() > 0.8
+    assert after.mean() < before.mean() - 0.3

@@ -1,0 +1,95 @@
+"""What a run of a batch does: made, skipped, failed, goals."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import run
+from tests.jobs.helpers import write
+from warpsplat.jobs.plan import load_jobs
+
+
+def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "defaults: {curves: 4, iterations: 6, device: cpu, output: out}\njobs: [{images: in/*.png}]\n"
+    path = write(folder, text)
+    assert run("batch", path) == 5
+    captured = capsys.readouterr()
+    assert "3 images: 2 made, 0 skipped, 1 failed" in captured.out
+    assert "broken.png: not an image" in captured.err
+    assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg"]
+    times = {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
+
+    assert run("batch", path, "--json") == 5
+    values = json.loads(capsys.readouterr().out)
+    assert (values["made"], values["skipped"], values["failed"]) == (0, 2, 1)
+    assert times == {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
+
+    Image.new("RGB", (32, 24), "red").save(folder / "in" / "a.png")  # another image under the old name
+    (folder / "in" / "broken.png").unlink()
+    assert run("batch", path, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 1
+
+    write(folder, text.replace("curves: 4", "curves: 5"))
+    assert run("batch", path, "-q") == 0
+    assert capsys.readouterr() == ("", "")
+    assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
+
+
+def test_a_stopped_result_is_made_again(folder: Path) -> None:
+    path = write(folder, "jobs: [{images: in/a.png, curves: 4, iterations: 5, device: cpu}]")
+    assert run("batch", path, "-q") == 0
+    job = load_jobs(path)[0]
+    assert job.done(job.image.read_bytes())
+    svg = job.output.read_text()
+    job.output.write_text(svg[: svg.index("key=")] + "stopped" + svg[svg.index("</metadata>") :])
+    assert not job.done(job.image.read_bytes())
+
+
+def test_missed_goals_have_their_exit_code(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "jobs: [{images: in/a.png, curves: 3, iterations: 3, target-psnr: 90, output: out, device: cpu}]"
+    assert run("batch", write(folder, text)) == 6
+    assert "goal missed: target-psnr 90 dB" in capsys.readouterr().err
+    assert (folder / "out/a.svg").exists()
+
+
+class PanicException(BaseException):
+    pass
+
+
+FAILURES: list[tuple[BaseException, str]] = [
+    (MemoryError(), "not enough memory"),
+    (RuntimeError("Failed to allocate 99 bytes on device 'cpu'"), "not enough memory: Failed to allocate 99"),
+    (PanicException("index out of bounds"), "renderer gave up: index out of bounds"),
+    (RecursionError("too deep"), "internal error: RecursionError: too deep"),
+    (OSError(28, "No space left on device", "/x"), "/x: No space left"),
+]
+
+
+@pytest.mark.parametrize(("error", "words"), FAILURES)
+def test_whatever_an_image_throws_is_its_own_failure(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    words: str,
+) -> None:
+    def load(data: bytes, name: str) -> np.ndarray:
+        if name.endswith("a.png"):
+            raise error
+        return np.full((24, 32, 3), 0.5, np.float32)
+
+    monkeypatch.setattr("warpsplat.jobs.vectorize.load_image", load)
+    text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
+    assert run("batch", write(folder, text), "--json") == 5
+    captured = capsys.readouterr()
+    values = json.loads(captured.out)
+    assert [r["status"] for r in values["results"]] == ["failed", "made"]
+    assert words in values["results"][0]["error"]
+    assert "a.png" in values["results"][0]["error"]
+    assert words in captured.err

@@ -1,0 +1,62 @@
+"""Foreign SVGs, improved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import random_scene
+from tests.svg.foreign import FOREIGN, HEAD
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.refine import refine
+from warpsplat.metrics import score_svg
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+from warpsplat.scene import Kind
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
+
+
+def test_nothing_is_added(device: str) -> None:
+    """A file without a background gets none; one with a background keeps it."""
+    target = np.full((30, 40, 3), 0.4, np.float32)
+    for behind in ("", '<rect width="40" height="30" fill="#ccc"/>'):
+        text = f'{HEAD}width="40" height="30">{behind}<path d="M5 5H35V25Z" fill="red"/></svg>'
+        result, before = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
+        assert result.score and result.score.psnr > before
+        assert result.svg.count("<rect") == (1 if behind else 0)
+        assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
+
+
+def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
+    scene = random_scene(Kind.FILL, count=6, width=48, height=40, seed=2)
+    target = render(scene, backend=Backend.on(device))
+    rng = np.random.default_rng(0)
+    moved = replace(scene, points=scene.points + rng.normal(0, 1, scene.points.shape).astype(np.float32))
+    text = write_svg(moved)
+    result, before = refine(text, target, make_settings(iterations=120), Backend.on(device), name="a.svg")
+    assert result.score
+    assert result.score.psnr > before + 4
+    assert result.score.paths == 6
+    assert result.score.nodes <= 6 * 6
+
+
+def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
+    text = (
+        HEAD
+        + 'width="40" height="30"><path d="M5 5H35V25Z"/>'
+        + ('<path d="M9 9h2v2h2v2h2v2h2v2h-10z" fill="red"/></svg>')
+    )
+    target = np.full((30, 40, 3), 0.4, np.float32)
+    result, _ = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
+    assert result.score
+    assert result.score.nodes <= 20
+
+
+def test_no_improvement_changes_nothing(device: str) -> None:
+    text = HEAD + FOREIGN["lines"]
+    target = (on_white(render_svg(text)) / 255).astype(np.float32)
+    result, _ = refine(text, target, make_settings(iterations=5), Backend.on(device), name="a.svg")
+    assert result.svg == text

@@ -1,0 +1,90 @@
+"""The text of an SVG: encodings, entities, nodes; hostile ones within bounds."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import pytest
+
+from tests.cli.helpers import run
+from tests.svg.foreign import HEAD, PATH, SMALL
+from warpsplat.errors import ImageError
+from warpsplat.svg import inspect as inspect_module
+from warpsplat.svg.inspect import inspect_svg, path_nodes, read_svg_text
+
+ENCODED = {
+    "utf-8-sig": "",
+    "utf-16": "UTF-16",
+    "utf-16-le": "UTF-16",
+    "utf-16-be": "UTF-16",
+    "latin-1": "ISO-8859-1",
+    "cp1252": "windows-1252",
+}
+
+
+@pytest.mark.parametrize("codec", ENCODED)
+@pytest.mark.parametrize("packed", [False, True])
+def test_encodings(codec: str, packed: bool, tmp_path: Path) -> None:
+    declaration = f'<?xml version="1.0" encoding="{ENCODED[codec]}"?>' if ENCODED[codec] else ""
+    data = f"{declaration}{SMALL}<title>Größe</title>{PATH}</svg>".encode(codec)
+    svg = tmp_path / "a.svg"
+    svg.write_bytes(gzip.compress(data) if packed else data)
+    text = read_svg_text(svg)
+    assert "Größe" in text
+    assert text.startswith('<?xml version="1.0" encoding="UTF-8"?>' if declaration else "<svg")
+    assert run("render", svg, "-o", tmp_path / "a.png") == 0
+
+
+@pytest.mark.parametrize("encoding", ["hex", "punycode", "none-such", "UTF-16", "unicode_escape"])
+def test_encodings_that_are_none(encoding: str, tmp_path: Path) -> None:
+    svg = tmp_path / "a.svg"
+    svg.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{SMALL}</svg>')
+    with pytest.raises(ImageError, match=r"a\.svg: not an SVG"):
+        read_svg_text(svg)
+
+
+def test_a_packed_file_is_unpacked_within_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inspect_module, "MAX_BYTES", 1 << 20)
+    svg = tmp_path / "a.svgz"
+    svg.write_bytes(gzip.compress(SMALL.encode() + bytes(50 << 20)))
+    with pytest.raises(ImageError, match="larger than 1 MiB when unpacked"):
+        read_svg_text(svg)
+
+
+LAUGHS = "".join(f'<!ENTITY l{i} "{10 * f"&l{i - 1};"}">' for i in range(1, 12))
+
+
+ENTITIES = {
+    "laughs": f'<!DOCTYPE svg [<!ENTITY l0 "ha">{LAUGHS}]>{SMALL}<title>&l11;</title></svg>',
+    "square": f'<!DOCTYPE svg [<!ENTITY a "{"a" * 50_000}">]>{SMALL}<g id="{"&a;" * 50_000}"/></svg>',
+}
+
+
+@pytest.mark.parametrize("name", ENTITIES)
+def test_entities_that_multiply(name: str) -> None:
+    with pytest.raises(ImageError, match="multiplies"):
+        inspect_svg(ENTITIES[name])
+
+
+def test_external_entities_are_not_read(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("M0 0H40V30H0z")
+    text = f'<!DOCTYPE svg [<!ENTITY x SYSTEM "{secret.as_uri()}">]>{SMALL}<path d="&x;"/></svg>'
+    with pytest.raises(ImageError, match="cannot be rendered"):
+        inspect_svg(text)
+
+
+def test_reading_is_linear() -> None:
+    """Texts that a search from each position would take minutes for."""
+    assert inspect_svg(f"{SMALL}<!--{'<path ' * 200_000}--></svg>").paths == 0
+    assert inspect_svg(f'{SMALL}<g style="fill:{" " * 1_000_000}"/></svg>').nodes == 0
+    assert path_nodes("1" * 1_000_000 + "e" * 1_000_000) == 0
+    assert inspect_svg(f'{HEAD}viewBox="0{" " * 500_000}x"/>').paths == 0
+
+
+@pytest.mark.parametrize(
+    ("data", "count"), [("m0 0a1 1 0 012 2 1 1 0 0 0 5 5", 3), ("M1e-1 2e-5L3 4", 2), ("z", 0)]
+)
+def test_nodes_of_compact_data(data: str, count: int) -> None:
+    assert path_nodes(data) == count

@@ -1,0 +1,46 @@
+"""Path data as the viewer reads it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.svg.foreign import HEAD, ROUND
+from warpsplat.errors import ImageError
+from warpsplat.metrics import psnr
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
+
+
+def test_path_data_as_the_viewer_reads_it() -> None:
+    """Every command, absolute and relative, smooth ones after others, arcs of all flags."""
+    rng = np.random.default_rng(5)
+    sizes = {"l": 2, "h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "t": 2, "z": 0, "m": 2, "a": 7}
+    for _ in range(12):
+        data = "M20 15"
+        for command in rng.choice([*sizes], 8):
+            relative = rng.random() < 0.5
+            v = [f"{x:.1f}" for x in rng.uniform(*((-15, 15) if relative else (3, 27)), sizes[command])]
+            if command == "a":
+                v[:5] = [
+                    *(f"{x:.1f}" for x in rng.uniform(2, 20, 3)),
+                    *(str(x) for x in rng.integers(0, 2, 2)),
+                ]
+            data += (command if relative else command.upper()) + " ".join(v)
+        text = f'{HEAD}width="40" height="30"><path {ROUND} stroke-width="2" d="{data}"/></svg>'
+        scene, _ = load_scene(text, 40, 30, data)
+        assert psnr(on_white(render_svg(write_svg(scene, precision=4))), on_white(render_svg(text))) > 36, (
+            data
+        )
+
+
+def test_hostile_path_data_is_read_in_linear_time() -> None:
+    for data in (
+        "M0 0" + "z" * 200_000,
+        "M0 0h9" + "S1 1 2 2" * 50_000,
+        "M" + " " * 500_000,
+        "M" + "1" * 500_000,
+    ):
+        with pytest.raises(ImageError):
+            load_scene(f'{HEAD}width="40" height="30"><path d="{data}"/><text/></svg>', 40, 30, "a.svg")
