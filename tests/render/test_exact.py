@@ -27,6 +27,7 @@ def test_image_and_gradients(device: str, kind: Kind, cubics: int, scale: float)
     compare(random_scene(kind, cubics=cubics, seed=3), device, scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_self_overlap_and_off_canvas(device: str, seed: int) -> None:
     """Points thrown about: loops, opposite windings, outlines across every border of the canvas."""

@@ -64,6 +64,7 @@ def flip(path: Path) -> None:
     path.write_bytes(data)
 
 
+@pytest.mark.slow
 def test_a_damaged_cache_is_made_anew(cache: Path) -> None:
     assert doubles()
     good = find(cache, ".o").read_bytes()
@@ -94,6 +95,7 @@ def test_a_whole_cache_is_used_as_it_is(cache: Path, monkeypatch: pytest.MonkeyP
     assert doubles()
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_is_replaced(
     cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

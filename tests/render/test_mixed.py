@@ -22,6 +22,7 @@ STROKES = [(Kind.STROKE, n) for n in (4, 1, 3, 2, 5)]
 ODD = [*MIXED, (Kind.FILL, 1), (Kind.STROKE, 4), (Kind.FILL, 3)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shapes", [FILLS, STROKES, ODD], ids=["fills", "strokes", "mixed"])
 @pytest.mark.parametrize("scale", [1.0, 1.6])
 def test_exact(device: str, shapes: list[tuple[Kind, int]], scale: float) -> None:
@@ -34,6 +35,7 @@ def test_splat(device: str, seed: int, through_scales: bool) -> None:
     compare(mixed_scene(seed=seed), device, model=SplatModel(through_scales))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
 def test_sixteen_lanes_against_the_reference(device: str, model: Model) -> None:
     compare(mixed_scene(seed=2), device, model=model, lanes=16)

@@ -40,6 +40,7 @@ def splatted(scene: Scene, device: str) -> FloatArray:
     return render(scene, model=SPLAT, backend=Backend.on(device))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "cubics", "scale"), CASES)
 @pytest.mark.parametrize("through_scales", [True, False])
 def test_image_and_gradients(
