@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from warpsplat.cli.options import FILE
+from warpsplat.cli.say import say
 from warpsplat.errors import ImageError, UsageError
 
 
@@ -35,10 +36,10 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
     if as_json:
-        click.echo(json.dumps({"image": str(image), "svg": str(svg), **values}))
+        say(json.dumps({"image": str(image), "svg": str(svg), **values}))
         return
     for name, unit in (("psnr", " dB"), ("ssim", ""), ("ms_ssim", ""), ("paths", ""), ("nodes", "")):
         shown = "-" if values[name] is None else values[name]
-        click.echo(f"{name:12}{shown}{unit if values[name] is not None else ''}")
-    click.echo(f"{'bytes':12}{values['bytes']}")
-    click.echo(f"{'gzip_bytes':12}{values['gzip_bytes']}")
+        say(f"{name:12}{shown}{unit if values[name] is not None else ''}")
+    say(f"{'bytes':12}{values['bytes']}")
+    say(f"{'gzip_bytes':12}{values['gzip_bytes']}")

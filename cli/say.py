@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import click
 
-from warpsplat.errors import printable
+from warpsplat.errors import OutputError, printable
 
 
 def open_standard_streams() -> None:
@@ -37,15 +37,19 @@ def say(text: str, *, err: bool = False) -> None:
     """Print lines, control characters escaped. A stderr that takes no more is no reason to fail.
 
     Raises:
-        OSError: stdout cannot be written.
+        OutputError: stdout cannot be written.
+        BrokenPipeError: nobody reads it any more.
     """
     text = "\n".join(printable(line) for line in text.split("\n"))
     try:
         click.echo(text, err=err)
-    except OSError:
-        if not err:
+    except OSError as error:
+        silence(sys.stderr if err else sys.stdout)  # what is left in its buffer cannot be written either
+        if err:
+            return
+        if isinstance(error, BrokenPipeError):
             raise
-        silence(sys.stderr)
+        raise OutputError(f"standard output: could not be written: {error.strerror or error}") from error
 
 
 def silence(stream: object) -> None:

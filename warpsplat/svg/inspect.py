@@ -59,6 +59,9 @@ def read_svg_text(path: Path) -> str:
 
 DECLARED = re.compile(r"""(\s*<\?xml\b[^>]{0,200}?\sencoding\s*=\s*)["']([\w.:-]{1,40})["']""")
 
+HEAD = 400
+"""Characters at the start in which an XML declaration stands."""
+
 ENCODINGS = ("utf-8", "ascii", "iso8859", "cp", "koi8", "mac", "shift_jis", "euc", "gb", "big5")
 """How the names of the encodings of one byte a unit begin; Python knows others, which no viewer reads."""
 
@@ -69,14 +72,15 @@ def _decode(data: bytes) -> str:
     elif data[:2] in {b"<\0", b"\0<"}:
         text = data.decode("utf-16-le" if data[1] == 0 else "utf-16-be")
     else:
-        declared = DECLARED.match(data[:400].decode("latin-1"))
+        declared = DECLARED.match(data[:HEAD].decode("latin-1"))
         encoding = codecs.lookup(declared[2]).name if declared else "utf-8"
         if data.startswith(codecs.BOM_UTF8):
             encoding = "utf-8-sig"
         elif not encoding.startswith(ENCODINGS):
             raise LookupError(encoding)
         text = data.decode(encoding)
-    return DECLARED.sub(r'\1"UTF-8"', text, count=1)
+    # Only where it counts, at the start: a search of the whole text for leading spaces is quadratic.
+    return DECLARED.sub(r'\1"UTF-8"', text[:HEAD], count=1) + text[HEAD:]
 
 
 @dataclass(frozen=True)
@@ -149,7 +153,7 @@ def inspect_svg(text: str) -> Facts:
     return Facts(root, paths, nodes)
 
 
-TOKEN = re.compile(r"([MLHVCSQTAZmlhvcsqtaz])|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+TOKEN = re.compile(r"([MLHVCSQTAZmlhvcsqtaz])|[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 ARGUMENTS = {"m": 2, "l": 2, "t": 2, "h": 1, "v": 1, "s": 4, "q": 4, "c": 6, "a": 7, "z": 0}
 """Numbers that each node of a path command takes (SVG 1.1 section 8.3)."""
 COMPACT_FLAGS = re.compile(r"([\s,]*)([01])[\s,]*([01])")
@@ -189,7 +193,8 @@ PIXELS_PER_UNIT = {
 }
 """CSS absolute lengths, and those relative to the font: 16 px where nothing is said, as in resvg."""
 
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+# With ``\d+\.?\d*`` a long row of digits could be split in as many ways as it has digits.
+NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 SEPARATOR = r"(?:\s*,\s*|\s+|(?=[-+]))"
 VIEW_BOX = re.compile(rf"\s*({NUMBER.pattern})" + 3 * rf"{SEPARATOR}({NUMBER.pattern})" + r"(?=[\s,]|$)")
 LENGTH = re.compile(rf"({NUMBER.pattern})(px|in|cm|mm|pt|pc|em|ex|%|)")
