@@ -62,46 +62,6 @@ def composite_forward(
         image[tile, 2, x] = blue + background[2] * t
 
 
-@wp.func
-def law_slope(law: wp.int32, signed: column, covered: column) -> column:
-    """d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves."""
-    one = column(1.0)
-    slope = one - covered
-    if law == AREA:
-        slope = wp.min(STEEP * slope, one)
-        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
-    return slope
-
-
-@wp.func
-def lit(t: column) -> column:
-    """1 where light is left, else 0: there only rounding is, and Adam would make steps of it."""
-    one = column(1.0)
-    return wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), column(0.0)), one)
-
-
-@wp.func
-def add_columns(
-    slot_columns: wp.array2d[column],
-    slot: wp.int32,
-    x: wp.int32,
-    red: column,
-    green: column,
-    blue: column,
-    opacity: column,
-):
-    """Add the gradients of column ``x`` of a slot to those of the columns before it."""
-    if x > 0:
-        red = red + slot_columns[slot, 0]
-        green = green + slot_columns[slot, 1]
-        blue = blue + slot_columns[slot, 2]
-        opacity = opacity + slot_columns[slot, 3]
-    slot_columns[slot, 0] = red
-    slot_columns[slot, 1] = green
-    slot_columns[slot, 2] = blue
-    slot_columns[slot, 3] = opacity
-
-
 @wp.kernel
 def composite_backward(
     # In:
@@ -128,6 +88,7 @@ def composite_backward(
     start = tile_first[tile]
     stop = tile_stop[tile]
     one = column(1.0)
+    zero = column(0.0)
     least = column(TINY)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
         red = image_grad[tile, 0, x]
@@ -152,10 +113,17 @@ def composite_backward(
             share = wp.cw_mul(t, paint_against(paint, red, green, blue))
             seen = wp.cw_mul(t, alpha)
             behind = behind - wp.cw_mul(alpha, share)
-            alpha_grad = wp.cw_mul(lit(t), share - wp.cw_div(behind, wp.max(one - alpha, least)))
+            # Where no light is left, only rounding is; Adam would make steps of it.
+            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
+            alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
             t = t - seen
             if not full:
-                sum_grad[slot, x] = paint[3] * wp.cw_mul(law_slope(law, signed, covered), alpha_grad)
+                # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.
+                slope = one - covered
+                if law == AREA:
+                    slope = wp.min(STEEP * slope, one)
+                    slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
+                sum_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
             red_grad = wp.cw_mul(seen, red)
             green_grad = wp.cw_mul(seen, green)
             blue_grad = wp.cw_mul(seen, blue)
@@ -165,7 +133,15 @@ def composite_backward(
                     total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
                 )
             else:
-                add_columns(slot_columns, slot, x, red_grad, green_grad, blue_grad, opacity_grad)
+                if x > 0:
+                    red_grad = red_grad + slot_columns[slot, 0]
+                    green_grad = green_grad + slot_columns[slot, 1]
+                    blue_grad = blue_grad + slot_columns[slot, 2]
+                    opacity_grad = opacity_grad + slot_columns[slot, 3]
+                slot_columns[slot, 0] = red_grad
+                slot_columns[slot, 1] = green_grad
+                slot_columns[slot, 2] = blue_grad
+                slot_columns[slot, 3] = opacity_grad
 
 
 @wp.kernel
@@ -192,6 +168,7 @@ def removal_cost(
     i, lane = wp.tid()
     tile = offset + i
     one = column(1.0)
+    zero = column(0.0)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
         t = one
         red = image[tile, 0, x]
@@ -208,7 +185,7 @@ def removal_cost(
                 seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
             else:
                 slot = -1 - slot
-            light = lit(t)
+            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
             t = t - seen
             red = red - paint_times(paint, 0, seen)
             green = green - paint_times(paint, 1, seen)
@@ -220,5 +197,5 @@ def removal_cost(
             cost = cost + wp.cw_mul(d, d + green_error)
             d = wp.cw_mul(share, blue) - paint_times(paint, 2, seen)
             cost = cost + wp.cw_mul(d, d + blue_error)
-            cost = wp.cw_mul(cost, wp.cw_mul(light, inside[tile, x]))
+            cost = wp.cw_mul(cost, wp.cw_mul(lit, inside[tile, x]))
             slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)

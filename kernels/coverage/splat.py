@@ -8,7 +8,6 @@ the opacity taken out of the product: it multiplies the coverage once, as fill-o
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage.rows import tile_row
 from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
@@ -53,13 +52,6 @@ def gaussian_column(con: wp.vec3, dx: wp.float32, dy: column, c_dy: column, leas
     return wp.cw_mul(within, e)
 
 
-@wp.func
-def columns_within(mean: wp.float32, extent: wp.float32, first: wp.int32, last: wp.int32) -> wp.vec2i:
-    """Range of the pixel columns of [first, last) that a Gaussian reaches."""
-    start = wp.max(first, int(wp.ceil(wp.max(mean - extent, -1.0) - 0.5)))
-    return wp.vec2i(start, wp.min(last, int(wp.floor(wp.min(mean + extent, 1.0e8) + 0.5))))
-
-
 @wp.kernel
 def splat_forward(
     # In:
@@ -81,48 +73,47 @@ def splat_forward(
     """One thread a row of tiles of a shape (that of its leftmost slot) and lane."""
     i, lane = wp.tid()
     slot = offset + i
-    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
-    shape = row[0]
+    shape = slot_shape[slot]
     if shape < 0:
         return
-    left = TILE * row[1]
-    right = left + TILE * row[2]
-    top = float(TILE * row[3])
+    wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
+    local = slot - slot_first[shape]
+    if local % wide != 0:
+        return
+    left = TILE * shape_tiles[shape, 0]
+    right = left + TILE * wide
+    top = float(TILE * (shape_tiles[shape, 1] + local / wide))
     one = column(1.0)
     most = column(GAUSSIAN_MAX)
     rows = rows_of_tile()
-    for x in range(left + lane, right, lanes):
+    x = left + lane
+    while x < right:
         coverage[slot + (x - left) / TILE, (x - left) % TILE] = one
+        x += lanes
     for j in range(gaussian_first[shape], gaussian_last[shape]):
         m = mean[j]
         e = extent[j]
         if m[1] + e[1] >= top and m[1] - e[1] <= top + float(TILE):
-            xs = columns_within(m[0], e[0], left, right)
-            x = xs[0] + (lane + lanes - xs[0] % lanes) % lanes
-            if x < xs[1]:
+            x = wp.max(left, int(wp.ceil(wp.max(m[0] - e[0], -1.0) - 0.5)))
+            stop = wp.min(right, int(wp.floor(wp.min(m[0] + e[0], 1.0e8) + 0.5)))
+            x += (lane + lanes - x % lanes) % lanes
+            if x < stop:
                 con = EXPONENT * conic[j]
                 dy = rows + column(top - m[1])
                 c_dy = con[2] * dy
                 least = column(EXPONENT * cut[j])
-                while x < xs[1]:
+                while x < stop:
                     s = slot + (x - left) / TILE
                     slot_state[s] = PARTIAL
                     g = wp.min(gaussian_column(con, float(x) + 0.5 - m[0], dy, c_dy, least), most)
                     k = (x - left) % TILE
                     coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
                     x += lanes
-    for x in range(left + lane, right, lanes):
+    x = left + lane
+    while x < right:
         s = slot + (x - left) / TILE
         coverage[s, (x - left) % TILE] = one - coverage[s, (x - left) % TILE]
-
-
-@wp.func
-def gradient_of_q(g: column, sum_grad: column) -> column:
-    """-2 dL/dq of a column: the gradient of s times g / (1 - g), 0 where g is clamped."""
-    one = column(1.0)
-    most = column(GAUSSIAN_MAX)
-    below = wp.min(wp.max(STEEP * (most - g), column(0.0)), one)
-    return wp.cw_div(wp.cw_mul(sum_grad, wp.cw_mul(below, g)), one - wp.min(g, most))
+        x += lanes
 
 
 @wp.kernel
@@ -154,36 +145,43 @@ def splat_backward(
         return
     x_grad = wp.vec2(0.0, 0.0)
     con_grad = wp.vec3(0.0, 0.0, 0.0)
-    if slot_last[shape] > slot_first[shape]:
+    start = slot_first[shape]
+    if slot_last[shape] > start:
         m = mean[i]
         e = extent[i]
         con = conic[i]
-        y0 = shape_tiles[shape, 1]
         wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
         left = TILE * shape_tiles[shape, 0]
-        xs = columns_within(m[0], e[0], left, left + TILE * wide)
-        y_first = wp.max(y0, int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / TILE)
+        x_first = wp.max(left, int(wp.ceil(wp.max(m[0] - e[0], -1.0) - 0.5)))
+        x_last = wp.min(left + TILE * wide, int(wp.floor(wp.min(m[0] + e[0], 1.0e8) + 0.5)))
+        y_first = wp.max(shape_tiles[shape, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / TILE)
         y_last = wp.min(shape_tiles[shape, 3], int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / TILE + 1)
+        one = column(1.0)
+        zero = column(0.0)
+        most = column(GAUSSIAN_MAX)
         least = column(EXPONENT * cut[i])
         rows = rows_of_tile()
-        sum_x = column(0.0)
-        sum_y = column(0.0)
-        sum_xx = column(0.0)
-        sum_xy = column(0.0)
-        sum_yy = column(0.0)
+        sum_x = zero
+        sum_y = zero
+        sum_xx = zero
+        sum_xy = zero
+        sum_yy = zero
         for tile_y in range(y_first, y_last):
             dy = rows + column(float(TILE * tile_y) - m[1])
             c_dy = (EXPONENT * con[2]) * dy
+            slot_row = start + (tile_y - shape_tiles[shape, 1]) * wide
             # Moments by row of pixels: few enough to stay in registers.
-            moment0 = column(0.0)
-            moment1 = column(0.0)
-            moment2 = column(0.0)
-            for x in range(xs[0], xs[1]):
-                s = slot_first[shape] + (tile_y - y0) * wide + (x - left) / TILE
+            moment0 = zero
+            moment1 = zero
+            moment2 = zero
+            for x in range(x_first, x_last):
+                s = slot_row + (x - left) / TILE
                 if slot_state[s] == PARTIAL:
                     dx = float(x) + 0.5 - m[0]
                     g = gaussian_column(EXPONENT * con, dx, dy, c_dy, least)
-                    h = gradient_of_q(g, sum_grad[s, (x - left) % TILE])
+                    below = wp.min(wp.max(STEEP * (most - g), zero), one)
+                    h = wp.cw_mul(sum_grad[s, (x - left) % TILE], wp.cw_mul(below, g))
+                    h = wp.cw_div(h, one - wp.min(g, most))
                     moment0 = moment0 + h
                     moment1 = moment1 + dx * h
                     moment2 = moment2 + (dx * dx) * h
