@@ -39,6 +39,10 @@ SMOOTH = 8.0
 """Standard deviation of the blur of the random target image [px]."""
 
 
+WARM_UP = 3
+"""Steps that are not counted."""
+
+
 @dataclass(frozen=True)
 class Spread:
     """Of repeated timings [ms]."""
@@ -124,51 +128,72 @@ def bench(
     scene = bench_scene(KINDS[kind], curves, width, height, opacity, seed)
     target = Target(bench_target(width, height, seed), Phase(width, height))
     step = Step(FitState.start(scene, backend, np.random.default_rng(seed)), settings, target)
-    device, renderer_used = backend.device, step.renderer
-    steps: list[float] = []
-    both: list[float] = []
-    kernels: list[dict[tuple[str, str], float]] = []
-    for i in range(repeats + 3):
-        times = [_timed(device, step.advance)]
-        times.append(_timed(device, renderer_used.forward) + _timed(device, renderer_used.backward))
-        parts: dict[tuple[str, str], float] = {}
-        for program in step.programs:
-            for key, value in program.run_timed().items():
-                parts[key] = parts.get(key, 0.0) + value
-        if i >= 3:
-            steps.append(times[0])
-            both.append(times[1])
-            kernels.append(parts)
-    pairs = int(renderer_used.needed_slots.numpy()[0])
-    items = int(renderer_used.needed_samples.numpy()[0])
-    stages = {
-        s: Spread.of([sum(v for k, v in part.items() if k[0] == s) for part in kernels]) for s in STAGES
-    }
-    whole = Spread.of(steps)
+    times = time_steps(step, repeats)
+    whole = Spread.of(times.steps)
     return {
         "kind": kind,
         "renderer": renderer,
-        "device": str(device),
-        "device_name": device.name,
+        "device": str(backend.device),
+        "device_name": backend.device.name,
         "threads": backend.threads,
         "curves": curves,
         "width": width,
         "height": height,
         "opacity": opacity,
-        "pairs": pairs,
-        "samples": items,
-        "step": asdict(whole),
-        "forward_backward": asdict(Spread.of(both)),
-        "stages": {name: asdict(spread) for name, spread in stages.items()},
-        "kernels": {
-            f"{stage}/{name}": asdict(Spread.of([part[(stage, name)] for part in kernels]))
-            for stage, name in kernels[0]
-        },
+        "pairs": int(step.renderer.needed_slots.numpy()[0]),
+        "samples": int(step.renderer.needed_samples.numpy()[0]),
+        **times.as_dict(),
         "megapixels_per_s": round(width * height / 1e3 / whole.median, 3),
         "us_per_curve": round(1e3 * whole.median / curves, 3),
         "ns_per_pixel": round(1e6 * whole.median / (width * height), 3),
-        "peak_memory": peak_memory(device),
+        "peak_memory": peak_memory(backend.device),
     }
+
+
+@dataclass(frozen=True)
+class Times:
+    """What steps took [s], one entry a repeat."""
+
+    steps: list[float]
+    both: list[float]
+    """Forward and backward pass alone."""
+    kernels: list[dict[tuple[str, str], float]]
+    """By stage and name."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Medians, lows and highs [ms]."""
+        stages = {
+            stage: [sum(v for k, v in kernels.items() if k[0] == stage) for kernels in self.kernels]
+            for stage in STAGES
+        }
+        singles = {f"{stage}/{name}": (stage, name) for stage, name in self.kernels[0]}
+        return {
+            "step": asdict(Spread.of(self.steps)),
+            "forward_backward": asdict(Spread.of(self.both)),
+            "stages": {stage: asdict(Spread.of(seconds)) for stage, seconds in stages.items()},
+            "kernels": {
+                label: asdict(Spread.of([kernels[key] for kernels in self.kernels]))
+                for label, key in singles.items()
+            },
+        }
+
+
+def time_steps(step: Step, repeats: int) -> Times:
+    """Time ``repeats`` steps after a warm-up, whole, then in two halves, then launch by launch."""
+    device, renderer = step.renderer.backend.device, step.renderer
+    times = Times([], [], [])
+    for i in range(repeats + WARM_UP):
+        whole = _timed(device, step.advance)
+        both = _timed(device, renderer.forward) + _timed(device, renderer.backward)
+        kernels: dict[tuple[str, str], float] = {}
+        for program in step.programs:
+            for key, value in program.run_timed().items():
+                kernels[key] = kernels.get(key, 0.0) + value
+        if i >= WARM_UP:
+            times.steps.append(whole)
+            times.both.append(both)
+            times.kernels.append(kernels)
+    return times
 
 
 def _timed(device: wp.Device, function: Any) -> float:
