@@ -145,10 +145,12 @@ def kill_once(
     after = results(folder)
     faults = [f"{name} is not whole" for name in broken(folder)]
     faults += [f"{name} is gone" for name in before if name not in after]
+    # Python's own start can be interrupted before a line of this program runs, and says so its own way.
+    begun = "warpsplat" in said or "Traceback" not in said
     # 0: it was just done; minus the signal: Python had not begun, or was ending; a shell says 128 + it.
-    if code not in (0, 128 + number, -number):
+    if code not in (0, 128 + number, -number) and begun:
         faults.append(f"exit code {code}")
-    if "Traceback" in said:
+    if "Traceback" in said and begun:
         faults.append("traceback")
     if wait > (LATE + COMPILING if cold else LATE):
         faults.append("late")
