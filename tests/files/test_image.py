@@ -225,3 +225,15 @@ def test_many_strips_of_a_picture_on_its_side(tmp_path: Path, compression: str |
     how = {"compression": compression, "strip_size": 200}
     pixels = load_image(save(tmp_path, Image.fromarray(RGB), "a.tif", exif=exif, **how))
     np.testing.assert_allclose(pixels * 255, np.rot90(RGB, -1), atol=1e-4)
+
+
+def test_float_maps_are_of_0_to_1_and_of_numbers(tmp_path: Path) -> None:
+    """PFM: rows from the bottom to the top."""
+    grey = np.linspace(0, 1, 12, dtype=np.float32).reshape(3, 4)
+    path = tmp_path / "a.pfm"
+    path.write_bytes(b"Pf\n4 3\n-1.0\n" + grey[::-1].tobytes())
+    np.testing.assert_allclose(load_image(path)[..., 0], grey)
+    grey[1, 2] = np.nan
+    path.write_bytes(b"Pf\n4 3\n-1.0\n" + grey[::-1].tobytes())
+    with pytest.raises(ImageError, match="1 of 12 pixels are no numbers"):
+        load_image(path)

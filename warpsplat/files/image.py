@@ -185,7 +185,8 @@ def _white(image: Image.Image) -> float:
     Raises:
         ImageError: samples that are no numbers.
     """
-    if image.mode.startswith("I;16") or image.format in {"PNG", "PPM"}:
+    whole = image.mode != "F"  # a portable float map is a PPM to Pillow as well
+    if whole and (image.mode.startswith("I;16") or image.format in {"PNG", "PPM"}):
         return 65535.0
     largest, missing = -np.inf, 0
     for _, part in _strips(image):
