@@ -93,3 +93,13 @@ def test_whatever_an_image_throws_is_its_own_failure(
     assert words in values["results"][0]["error"]
     assert "a.png" in values["results"][0]["error"]
     assert words in captured.err
+
+
+def test_a_line_break_in_a_name_breaks_no_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, 'jobs: [{images: "in/\\nx.png", device: cpu}]\n')
+    assert run("batch", path) == 5
+    assert capsys.readouterr().err.splitlines() == [
+        "[1/1] failed: in/\\nx.png: no such file".replace("in/", f"{folder}/in/"),
+        "failed:",
+        f"  {folder}/in/\\nx.png: no such file",
+    ]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from warpsplat.errors import OutputError, explain
+from warpsplat.errors import OutputError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.jobs.plan import Job
 from warpsplat.jobs.vectorize import Result
@@ -57,8 +57,9 @@ def execute(job: Job, run: Callable[[Job, bytes], Result]) -> Outcome:
         raise
     except BaseException as error:  # a panic of Rust code derives from no Exception
         message, _ = explain(error)
-        named = str(job.image) in message or str(job.output) in message
-        return Outcome(job, "failed", error=message if named else f"{job.image}: {message}")
+        image = printable(str(job.image))
+        named = image in message or printable(str(job.output)) in message
+        return Outcome(job, "failed", error=message if named else f"{image}: {message}")
     return Outcome(job, "stopped" if result.stopped else "made", result)
 
 
