@@ -43,3 +43,9 @@ def test_refused(text: str) -> None:
     with pytest.raises(ImageError, match=REFUSED[text]) as caught:
         load_scene(text, 40, 30, "a.svg")
     assert str(caught.value).startswith("a.svg: ")
+
+
+def test_a_view_box_beyond_all_numbers() -> None:
+    text = f'{HEAD}width="32" height="24" viewBox="1e308 0 1 5"><path d="M1 1h9v9z"/></svg>'
+    with pytest.raises(ImageError, match="viewBox lies farther"):
+        load_scene(text, 32, 24, "a.svg")

@@ -104,8 +104,11 @@ def _canvas(root: dict[str, str], width: int, height: int) -> tuple[Matrix, tupl
         part = np.array([{"Min": 0.0, "Mid": 0.5, "Max": 1.0}[word] for word in found.groups()])
         shift = part * (np.array(size) - fit * (box_width, box_height))
     view = np.diag([*fit, 1.0])
-    view[:2, 2] = shift - fit * (x, y)
-    return scale @ view, (box_width, box_height)
+    with np.errstate(all="ignore"):  # what overflows is found where it is used
+        view[:2, 2] = shift - fit * (x, y)
+        if not np.isfinite(view).all():
+            raise ImageError("its viewBox lies farther than can be drawn")
+        return scale @ view, (box_width, box_height)
 
 
 def _css(root: ElementTree.Element) -> str:
