@@ -98,11 +98,6 @@ class Interrupt:
         _state.patient = True
         return _state.received is not None
 
-    @property
-    def requested(self) -> bool:
-        """Whether a signal came."""
-        return _state.received is not None
-
     @contextlib.contextmanager
     def watching(self) -> Iterator[None]:
         """One run; it is patient from its first question to the end of the block."""
