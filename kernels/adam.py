@@ -46,6 +46,7 @@ def adam_update(
     offset: wp.int32,
     grad: wp.array2d[wp.float32],  # [row_count, size]
     owner: wp.array[wp.int32],  # [row_count] the shape of each row
+    held: wp.array[wp.int32],  # [row_count] 1: stays as it is
     kind: wp.array[wp.int32],  # [shape_count]
     kinds: wp.int32,  # the kinds that have the attribute, a bit each
     bias1: wp.array[wp.float32],  # [shape_count]
@@ -63,7 +64,7 @@ def adam_update(
     i, j = wp.tid()
     row = offset + i
     shape = owner[row]
-    if (kinds >> kind[shape]) & 1 == 0:
+    if (kinds >> kind[shape]) & 1 == 0 or held[row] != 0:
         return
     current = rate * decay[0]
     g = grad[row, j]

@@ -1,10 +1,18 @@
 """Cubic Béziers and index arithmetic: ``@wp.func`` only, callable from plain Python for tests."""
 
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
+
+FILL = wp.constant(constants.FILL)
+CUBIC = wp.constant(constants.CUBIC)
+
+control_points: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float32)
+"""The control points of a cubic, a row each."""
 
 
 @wp.func
@@ -32,12 +40,94 @@ def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
 
 
 @wp.func
-def cubic_end(start: wp.int32, point_first: wp.array[wp.int32], shape: wp.int32) -> wp.int32:
-    """Last control point of the cubic from ``start``: the last one of a ring ends where its shape begins."""
-    end = start + 3
-    if end == point_first[shape + 1]:
-        return point_first[shape]
-    return end
+def chain_end(at_end: wp.bool) -> wp.float32:
+    """Share of the outer point in an end of a spline's quadratic: half, or all of it at a stroke's end."""
+    if at_end:
+        return 1.0
+    return 0.5
+
+
+@wp.func
+def bezier_points(
+    points: wp.array[wp.vec2],
+    kind: wp.int32,
+    basis: wp.int32,
+    first: wp.int32,
+    count: wp.int32,
+    local: wp.int32,
+) -> control_points:
+    """Bézier ``local`` of a shape with ``count`` points from ``first`` on, as a cubic: a quadratic of a spline
+    with its degree elevated.
+    """
+    if basis == CUBIC:
+        i = first + 3 * local
+        last = i + 3
+        if 3 * local + 3 == count:
+            last = first
+        a = points[i]
+        b = points[i + 1]
+        c = points[i + 2]
+        d = points[last]
+        return control_points(a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1])
+    before = local - 1
+    if kind != FILL:
+        before = local
+    middle = points[first + (before + 1) % count]
+    share = chain_end(kind != FILL and local == 0)
+    start = share * points[first + (before + count) % count] + (1.0 - share) * middle
+    share = chain_end(kind != FILL and local == count - 3)
+    end = share * points[first + (before + 2) % count] + (1.0 - share) * middle
+    b = (start + 2.0 * middle) / 3.0
+    c = (end + 2.0 * middle) / 3.0
+    return control_points(start[0], start[1], b[0], b[1], c[0], c[1], end[0], end[1])
+
+
+@wp.func
+def add_bezier_grad(
+    grad: control_points,
+    kind: wp.int32,
+    basis: wp.int32,
+    first: wp.int32,
+    count: wp.int32,
+    local: wp.int32,
+    points_grad: wp.array[wp.vec2],
+):
+    """Adjoint of ``bezier_points``: add ``grad`` to the shape's control points."""
+    if basis == CUBIC:
+        for j in range(4):
+            i = first + (3 * local + j) % count
+            points_grad[i] = points_grad[i] + grad[j]
+        return
+    before = local - 1
+    if kind != FILL:
+        before = local
+    start = chain_end(kind != FILL and local == 0) * (grad[0] + grad[1] / 3.0)
+    end = chain_end(kind != FILL and local == count - 3) * (grad[3] + grad[2] / 3.0)
+    i = first + (before + count) % count
+    points_grad[i] = points_grad[i] + start
+    i = first + (before + 1) % count
+    points_grad[i] = points_grad[i] + (grad[0] + grad[1] + grad[2] + grad[3] - start - end)
+    i = first + (before + 2) % count
+    points_grad[i] = points_grad[i] + end
+
+
+@wp.func
+def point_weight(
+    kind: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, t: wp.float32
+) -> wp.float32:
+    """Weight of control point ``j`` of Bézier ``local`` at ``t`` in [0, 1]: the adjoint of ``bezier_points``
+    and of the cubic's weights together.
+    """
+    w = cubic_weights(t)
+    if basis == CUBIC:
+        return w[j]
+    before = chain_end(kind != FILL and local == 0) * (w[0] + w[1] / 3.0)
+    after = chain_end(kind != FILL and local == count - 3) * (w[3] + w[2] / 3.0)
+    if j == 0:
+        return before
+    if j == 2:
+        return after
+    return 1.0 - before - after
 
 
 @wp.func

@@ -6,6 +6,12 @@ FILL = 0
 STROKE = 1
 """Kinds of shapes: a closed ring of cubics that is painted inside, a chain of cubics painted along."""
 
+CUBIC = 0
+SPLINE = 1
+"""Bases of a shape's control points: a chain of cubic Béziers (points 0, 3, 6 ... lie on the outline), or a
+uniform quadratic B-spline (each point is the control point of one quadratic Bézier, whose ends lie midway to
+the neighbouring points)."""
+
 TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
 
@@ -79,6 +85,9 @@ FLATNESS_STROKE = 0.08
 PIECES_MIN = 3
 PIECES_MAX = 64
 """Bounds of the straight pieces of one cubic; 64 are enough for one as large as 8,000 px."""
+
+PIECES_MIN_SPLINE = 2
+"""The same for a quadratic: with one piece its control point would not move what lies between the ends."""
 
 REACH_MAX = 1.0e7
 """Largest distance [px] from the origin, and largest width of a stroke; what is beyond is moved there."""

@@ -1,14 +1,14 @@
 """Shapes -> polylines, and the adjoint.
 
-A cubic split into n equal steps of t leaves its curve by at most max |B''| / (8 n^2), and |B''| is at most 6
-times the larger second difference of its control points (Sederberg, Computer Aided Geometric Design, 10.6).
-The n is taken as a constant by the adjoint.
+Béziers are drawn as cubics, whatever the basis. A cubic split into n equal steps of t leaves its curve by at
+most max |B''| / (8 n^2), and |B''| is at most 6 times the larger second difference of its control points
+(Sederberg, Computer Aided Geometric Design, 10.6). The n is taken as a constant by the adjoint.
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import cubic_end, cubic_weights
+from warpsplat.kernels.bezier import bezier_points, cubic_weights, point_weight
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -16,6 +16,8 @@ FILL = wp.constant(constants.FILL)
 REACH_MAX = wp.constant(constants.REACH_MAX)
 FLATNESS = wp.constant(constants.FLATNESS)
 FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
+CUBIC = wp.constant(constants.CUBIC)
+PIECES_MIN_SPLINE = wp.constant(constants.PIECES_MIN_SPLINE)
 PIECES_MIN = wp.constant(constants.PIECES_MIN)
 PIECES_MAX = wp.constant(constants.PIECES_MAX)
 
@@ -26,31 +28,33 @@ def plan_outline(
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
     kind: wp.array[wp.int32],  # [shape_count] FILL or STROKE
+    basis: wp.array[wp.int32],  # [shape_count] CUBIC or SPLINE
     point_first: wp.array[wp.int32],  # [shape_count + 1] first control point
-    cubic_first: wp.array[wp.int32],  # [shape_count + 1] first cubic
+    bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier
     scale: wp.float32,  # render pixels per canvas unit
     # Out:
-    cubic_vertex: wp.array[wp.int32],  # [cubic_count] first vertex of each cubic, counted in its shape
-    cubic_pieces: wp.array[wp.int32],  # [cubic_count] straight pieces
+    bezier_vertex: wp.array[wp.int32],  # [bezier_count] first vertex of each Bézier, counted in its shape
+    bezier_pieces: wp.array[wp.int32],  # [bezier_count] straight pieces
     vertex_count: wp.array[wp.int32],  # [shape_count] a stroke has one more than pieces
 ):
-    """Pieces of each cubic, one thread a shape: the polyline is FLATNESS px from the curve at most."""
+    """Pieces of each Bézier, one thread a shape: the polyline is FLATNESS px from the curve at most."""
     shape = offset + wp.tid()
     flatness = FLATNESS
     if kind[shape] != FILL:
         flatness = FLATNESS_STROKE
+    least = PIECES_MIN
+    if basis[shape] != CUBIC:
+        least = PIECES_MIN_SPLINE
+    first = point_first[shape]
+    count = point_first[shape + 1] - first
     vertices = int(0)
-    for cubic in range(cubic_first[shape], cubic_first[shape + 1]):
-        start = point_first[shape] + 3 * (cubic - cubic_first[shape])
-        p0 = points[start]
-        p1 = points[start + 1]
-        p2 = points[start + 2]
-        p3 = points[cubic_end(start, point_first, shape)]
-        worst = wp.max(wp.length(p0 - 2.0 * p1 + p2), wp.length(p1 - 2.0 * p2 + p3))
+    for bezier in range(bezier_first[shape], bezier_first[shape + 1]):
+        p = bezier_points(points, kind[shape], basis[shape], first, count, bezier - bezier_first[shape])
+        worst = wp.max(wp.length(p[0] - 2.0 * p[1] + p[2]), wp.length(p[1] - 2.0 * p[2] + p[3]))
         wanted = wp.ceil(wp.sqrt(0.75 * scale * worst / flatness))
-        pieces = wp.clamp(int(wp.min(wanted, 1.0e6)), PIECES_MIN, PIECES_MAX)
-        cubic_vertex[cubic] = vertices
-        cubic_pieces[cubic] = pieces
+        pieces = wp.clamp(int(wp.min(wanted, 1.0e6)), least, PIECES_MAX)
+        bezier_vertex[bezier] = vertices
+        bezier_pieces[bezier] = pieces
         vertices += pieces
     if kind[shape] != FILL:
         vertices += 1
@@ -72,41 +76,40 @@ def outline_forward(
     points: wp.array[wp.vec2],  # [point_count] canvas units
     widths: wp.array[wp.float32],  # [shape_count] canvas units; of fills not read
     kind: wp.array[wp.int32],  # [shape_count]
+    basis: wp.array[wp.int32],  # [shape_count]
     point_first: wp.array[wp.int32],  # [shape_count + 1]
-    cubic_first: wp.array[wp.int32],  # [shape_count + 1]
-    cubic_shape: wp.array[wp.int32],  # [cubic_count]
+    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
+    bezier_shape: wp.array[wp.int32],  # [bezier_count]
     scale: wp.float32,
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
-    cubic_vertex: wp.array[wp.int32],  # [cubic_count]
-    cubic_pieces: wp.array[wp.int32],  # [cubic_count]
+    bezier_vertex: wp.array[wp.int32],  # [bezier_count]
+    bezier_pieces: wp.array[wp.int32],  # [bezier_count]
     # Out:
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity] those beyond the last shape's are left as they are
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     extent: wp.array[wp.vec2],  # [vertex_capacity] px; how far the shape may reach beyond the vertex
 ):
-    """B(k / n), one thread a cubic."""
-    cubic = offset + wp.tid()
-    shape = cubic_shape[cubic]
+    """B(k / n), one thread a Bézier."""
+    bezier = offset + wp.tid()
+    shape = bezier_shape[bezier]
     if vertex_last[shape] == vertex_first[shape]:
         return
-    start = point_first[shape] + 3 * (cubic - cubic_first[shape])
-    p0 = scale * points[start]
-    p1 = scale * points[start + 1]
-    p2 = scale * points[start + 2]
-    p3 = scale * points[cubic_end(start, point_first, shape)]
-    base = vertex_first[shape] + cubic_vertex[cubic]
-    pieces = cubic_pieces[cubic]
+    first = point_first[shape]
+    local = bezier - bezier_first[shape]
+    p = scale * bezier_points(points, kind[shape], basis[shape], first, point_first[shape + 1] - first, local)
+    base = vertex_first[shape] + bezier_vertex[bezier]
+    pieces = bezier_pieces[bezier]
     count = pieces
     reach = float(0.0)
     if kind[shape] != FILL:
         reach = wp.min(0.5 * scale * widths[shape], REACH_MAX) + 1.0
-        if cubic + 1 == cubic_first[shape + 1]:
+        if bezier + 1 == bezier_first[shape + 1]:
             count += 1
     for k in range(count):
         weights = cubic_weights(float(k) / float(pieces))
         vertex_shape[base + k] = shape
-        position = weights[0] * p0 + weights[1] * p1 + weights[2] * p2 + weights[3] * p3
+        position = weights[0] * p[0] + weights[1] * p[1] + weights[2] * p[2] + weights[3] * p[3]
         vertex[base + k] = wp.vec2(within_reach(position[0]), within_reach(position[1]))
         extent[base + k] = wp.vec2(reach, reach)
 
@@ -116,14 +119,15 @@ def outline_backward(
     # In:
     offset: wp.int32,
     kind: wp.array[wp.int32],  # [shape_count]
+    basis: wp.array[wp.int32],  # [shape_count]
     point_first: wp.array[wp.int32],  # [shape_count + 1]
     point_shape: wp.array[wp.int32],  # [point_count]
-    cubic_first: wp.array[wp.int32],  # [shape_count + 1]
+    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
     scale: wp.float32,
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
-    cubic_vertex: wp.array[wp.int32],  # [cubic_count]
-    cubic_pieces: wp.array[wp.int32],  # [cubic_count]
+    bezier_vertex: wp.array[wp.int32],  # [bezier_count]
+    bezier_pieces: wp.array[wp.int32],  # [bezier_count]
     start_grad: wp.array[
         wp.vec2
     ],  # [vertex_capacity] of the first vertex of the edge that starts at a vertex
@@ -131,27 +135,42 @@ def outline_backward(
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] written
 ):
-    """A gather, one thread a control point: Bernstein weights times the gradients of its cubics' vertices."""
+    """A gather, one thread a control point: its weights in its Béziers x the gradients of their vertices."""
     point = offset + wp.tid()
     shape = point_shape[point]
     total = wp.vec2(0.0, 0.0)
     if vertex_last[shape] > vertex_first[shape]:
-        index = point - point_first[shape]
-        cubics = cubic_first[shape + 1] - cubic_first[shape]
-        for side in range(2):
-            # The cubic in which the point is number 0 to 2, and the one before it, which it may end.
-            local = (index + 3 * cubics) / 3 - cubics - side
-            j = index - 3 * local
-            if kind[shape] == FILL:
-                local = (local + cubics) % cubics
-            if local >= 0 and local < cubics and j <= 3:
-                cubic = cubic_first[shape] + local
-                base = vertex_first[shape] + cubic_vertex[cubic]
-                pieces = cubic_pieces[cubic]
-                # An edge belongs to the cubic in which it lies; its two ends are weighed there.
-                before = cubic_weights(0.0)[j]
+        ring = kind[shape] == FILL
+        first = point_first[shape]
+        index = point - first
+        count = point_first[shape + 1] - first
+        beziers = bezier_first[shape + 1] - bezier_first[shape]
+        # The last Bézier that the point belongs to, which number it has there, and how those change for the
+        # Béziers before: the point may end a cubic, and belongs to three quadratics.
+        latest = index / 3
+        j = index % 3
+        step = int(3)
+        if basis[shape] != CUBIC:
+            latest = index
+            j = int(0)
+            step = 1
+            if ring:
+                latest = index + 1
+        while j <= 3 and (step == 3 or j <= 2):
+            local = latest
+            if ring:
+                local = (latest + beziers) % beziers
+            if local >= 0 and local < beziers:
+                bezier = bezier_first[shape] + local
+                base = vertex_first[shape] + bezier_vertex[bezier]
+                pieces = bezier_pieces[bezier]
+                # An edge belongs to the Bézier in which it lies; its two ends are weighed there.
+                before = point_weight(kind[shape], basis[shape], count, local, j, 0.0)
                 for k in range(pieces):
-                    after = cubic_weights(float(k + 1) / float(pieces))[j]
+                    t = float(k + 1) / float(pieces)
+                    after = point_weight(kind[shape], basis[shape], count, local, j, t)
                     total += before * start_grad[base + k] + after * end_grad[base + k]
                     before = after
+            latest -= 1
+            j += step
     points_grad[point] = scale * total

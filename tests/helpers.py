@@ -62,9 +62,9 @@ def plans_of(renderer: Renderer) -> list[Plan]:
 
 
 def pieces_of(renderer: Renderer) -> list[list[int]]:
-    """Of each shape's cubics."""
-    pieces = outline_of(renderer).cubic_pieces.numpy().tolist()
-    first = renderer.parameters.arrays["cubic_first"].numpy()
+    """Of each shape's Béziers."""
+    pieces = outline_of(renderer).bezier_pieces.numpy().tolist()
+    first = renderer.parameters.arrays["bezier_first"].numpy()
     return [pieces[a:b] for a, b in itertools.pairwise(first)]
 
 

@@ -3,7 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import cross, cubic_end
+from warpsplat.kernels.bezier import add_bezier_grad, bezier_points, control_points, cross
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -21,27 +21,30 @@ def xing_backward(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
+    kind: wp.array[wp.int32],  # [shape_count]
+    basis: wp.array[wp.int32],  # [shape_count]
     point_first: wp.array[wp.int32],  # [shape_count + 1]
-    cubic_first: wp.array[wp.int32],  # [shape_count + 1]
+    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
     weight: wp.float32,
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] added to
-    shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's segments, before weight and mean
+    shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's Béziers, before weight and mean
 ):
-    """Xing loss of LIVE (Ma et al. 2022, eq. 5) of each cubic's control polygon edges v1, v2, v3:
-    relu(-sin(v1, v3)) where sin(v1, v2) >= 0, else relu(sin(v1, v3)); the mean over all segments.
+    """Xing loss of LIVE (Ma et al. 2022, eq. 5) of each Bézier's edges v1, v2, v3 (as a cubic):
+    relu(-sin(v1, v3)) where sin(v1, v2) >= 0, else relu(sin(v1, v3)); the mean over all Béziers.
 
     One thread a shape. d sin(a, b) / da = (perp(b) - sin a |b| / |a|) / (|a| |b|), perp(b) = (b_y, -b_x).
     """
     shape = offset + wp.tid()
-    factor = weight / float(cubic_first[cubic_first.shape[0] - 1])
+    first = point_first[shape]
+    count = point_first[shape + 1] - first
+    factor = weight / float(bezier_first[bezier_first.shape[0] - 1])
     total = float(0.0)
-    for cubic in range(cubic_first[shape + 1] - cubic_first[shape]):
-        i0 = point_first[shape] + 3 * cubic
-        i3 = cubic_end(i0, point_first, shape)
-        a = points[i0 + 1] - points[i0]
-        middle = points[i0 + 2] - points[i0 + 1]
-        b = points[i3] - points[i0 + 2]
+    for local in range(bezier_first[shape + 1] - bezier_first[shape]):
+        p = bezier_points(points, kind[shape], basis[shape], first, count, local)
+        a = p[1] - p[0]
+        middle = p[2] - p[1]
+        b = p[3] - p[2]
         s = sine(a, b)
         sign = float(0.0)  # d loss / d s
         if cross(a, middle) >= 0.0:
@@ -57,10 +60,10 @@ def xing_backward(
             k = factor * sign
             a_grad = k * (wp.vec2(b[1], -b[0]) / product - s * a / (length_a * length_a))
             b_grad = k * (wp.vec2(-a[1], a[0]) / product - s * b / (length_b * length_b))
-            points_grad[i0] = points_grad[i0] - a_grad
-            points_grad[i0 + 1] = points_grad[i0 + 1] + a_grad
-            points_grad[i0 + 2] = points_grad[i0 + 2] - b_grad
-            points_grad[i3] = points_grad[i3] + b_grad
+            grad = control_points(
+                -a_grad[0], -a_grad[1], a_grad[0], a_grad[1], -b_grad[0], -b_grad[1], b_grad[0], b_grad[1]
+            )
+            add_bezier_grad(grad, kind[shape], basis[shape], first, count, local, points_grad)
     shape_loss[shape] = total
 
 
@@ -69,29 +72,28 @@ def bending_backward(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
+    kind: wp.array[wp.int32],  # [shape_count]
+    basis: wp.array[wp.int32],  # [shape_count]
     point_first: wp.array[wp.int32],  # [shape_count + 1]
-    cubic_first: wp.array[wp.int32],  # [shape_count + 1]
+    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
     weight: wp.float32,
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] added to
-    shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's cubics, before weight
+    shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's Béziers, before weight
 ):
-    """Bending of each cubic: (|a|^2 + |b|^2) / (1 + c), a and b the second differences of its control points
-    and c the distance of its ends. A unit of length, as a hundredth of the outline of a circle is; but large
+    """Bending of each Bézier, as a cubic: (|a|^2 + |b|^2) / (1 + c), a and b the second differences of its
+    control points and c the distance of its ends. A unit of length, as a hundredth of the outline of a circle is; but large
     where handles are long for the way that they go, as in burrs and loops. One thread a shape.
     """
     shape = offset + wp.tid()
+    first = point_first[shape]
+    count = point_first[shape + 1] - first
     total = float(0.0)
-    for cubic in range(cubic_first[shape + 1] - cubic_first[shape]):
-        i0 = point_first[shape] + 3 * cubic
-        i3 = cubic_end(i0, point_first, shape)
-        p0 = points[i0]
-        p1 = points[i0 + 1]
-        p2 = points[i0 + 2]
-        p3 = points[i3]
-        a = p0 - 2.0 * p1 + p2
-        b = p1 - 2.0 * p2 + p3
-        chord = p3 - p0
+    for local in range(bezier_first[shape + 1] - bezier_first[shape]):
+        p = bezier_points(points, kind[shape], basis[shape], first, count, local)
+        a = p[0] - 2.0 * p[1] + p[2]
+        b = p[1] - 2.0 * p[2] + p[3]
+        chord = p[3] - p[0]
         c = wp.length(chord)
         squares = wp.dot(a, a) + wp.dot(b, b)
         energy = squares / (1.0 + c)
@@ -100,8 +102,10 @@ def bending_backward(
         stretch = wp.vec2(0.0, 0.0)
         if c > EPSILON:
             stretch = (weight * energy / ((1.0 + c) * c)) * chord
-        points_grad[i0] = points_grad[i0] + k * a + stretch
-        points_grad[i0 + 1] = points_grad[i0 + 1] + k * (b - 2.0 * a)
-        points_grad[i0 + 2] = points_grad[i0 + 2] + k * (a - 2.0 * b)
-        points_grad[i3] = points_grad[i3] + k * b - stretch
+        g0 = k * a + stretch
+        g1 = k * (b - 2.0 * a)
+        g2 = k * (a - 2.0 * b)
+        g3 = k * b - stretch
+        grad = control_points(g0[0], g0[1], g1[0], g1[1], g2[0], g2[1], g3[0], g3[1])
+        add_bezier_grad(grad, kind[shape], basis[shape], first, count, local, points_grad)
     shape_loss[shape] = total

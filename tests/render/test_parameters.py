@@ -48,10 +48,10 @@ def test_layout(device: str) -> None:
     for shape in range(len(scene)):
         own = np.flatnonzero(arrays["point_shape"] == shape)
         np.testing.assert_array_equal(own, np.arange(*arrays["point_first"][shape : shape + 2]))
-        cubics = np.flatnonzero(arrays["cubic_shape"] == shape)
-        np.testing.assert_array_equal(cubics, np.arange(*arrays["cubic_first"][shape : shape + 2]))
+        cubics = np.flatnonzero(arrays["bezier_shape"] == shape)
+        np.testing.assert_array_equal(cubics, np.arange(*arrays["bezier_first"][shape : shape + 2]))
         assert len(own) == 3 * len(cubics) + (scene.kind[shape] == Kind.STROKE)
-    assert parameters.cubic_count == len(arrays["cubic_shape"])
+    assert parameters.bezier_count == len(arrays["bezier_shape"])
     assert parameters.kinds == {Kind.FILL, Kind.STROKE}
 
 

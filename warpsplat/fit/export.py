@@ -8,7 +8,7 @@ from warpsplat.scene import Scene
 from warpsplat.svg.write import write_svg
 
 
-def export(scene: Scene, settings: Settings, metadata: str = "") -> str:
-    """The file that ``settings`` ask for."""
+def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
+    """The file that ``settings`` ask for, with ``per_pixel`` units of its view box a pixel."""
     plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
-    return write_svg(scene, precision=settings.precision, metadata=metadata, opacity_scale=plateau)
+    return write_svg(scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau)

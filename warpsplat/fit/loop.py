@@ -10,6 +10,7 @@ import numpy as np
 
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.place import grid_scene
+from warpsplat.fit.rounding import choose_grid, hold_stage, stage_at
 from warpsplat.fit.schedule import CHECK_INTERVAL, LOOK_INTERVAL, phase_at, phases, shapes_at, work_done
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
@@ -46,6 +47,8 @@ class Fit:
     """What a run made."""
 
     scene: Scene
+    per_pixel: float
+    """Units of the view box a pixel that the scene is rounded to, or may be."""
     render_psnr: float
     """Of the last training render, at its size [dB]."""
     estimated_psnr: float
@@ -88,6 +91,7 @@ def fit(
     step: Step | None = None
     phase = None
     interrupted = False
+    rounding = False
     while True:
         entered = phase_at(settings, plan, state.step)
         if step is None or entered is not phase:
@@ -107,16 +111,24 @@ def fit(
             break
         if done >= settings.iterations or (budget and budget.over()):
             break
+        stage = stage_at(settings, done)
+        if stage is not None:
+            if stage == 0:
+                state.per_pixel = choose_grid(step, staged=True)
+            rounding = True
+            hold_stage(step, stage)
         density = settings.density
         surgical = done < density.stop * settings.iterations
-        if settings.viewer and finest and not surgical and done % LOOK_INTERVAL == 0:
+        if settings.viewer and finest and not surgical and not rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
         due = density.interval > 0 and done % density.interval == 0
         if due and budget and phase is plan[0]:
             slowness = (time.monotonic() - started) / (done * budget.costs[0])
             settings = budget.fit(settings, done, slowness)
             step.configure(settings)
-        missing = grows and state.parameters.shape_count < settings.curves
+        missing = grows and state.parameters.shape_count != settings.curves
         if due and done < settings.iterations and (missing or done < density.stop * settings.iterations):
             step = operate(step, grows=grows)
-    return Fit(state.scene(), step.render_psnr(), step.psnr(), state.step, interrupted)
+    if not rounding:
+        state.per_pixel = choose_grid(step, staged=False)
+    return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), state.step, interrupted)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.settings import Settings
-from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 
 OPACITY = 0.98
 """Opacity of a new shape: it hides what it should replace, and may still become translucent."""
@@ -110,9 +110,19 @@ def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatA
     return np.asarray(centres[:, None] + radii[:, None, None] * ring[None], np.float32)
 
 
-def stroke_outlines(centres: Floats, lengths: Floats, angles: Floats) -> FloatArray:
-    """Straight strokes of three cubics, shape (shape, 10, 2)."""
-    t = np.linspace(-0.5, 0.5, 3 * STROKE_CUBICS + 1)
+def circle_splines(centres: Floats, radii: Floats, count: int) -> FloatArray:
+    """Circles as splines of ``count`` points, shape (shape, count, 2)."""
+    angle = 2 * np.pi * np.arange(count) / count
+    on = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    # Where quadratics meet and in the middle of each, the outline lies this much nearer than the points.
+    nearer = (np.cos(np.pi / count) + (3 + np.cos(2 * np.pi / count)) / 4) / 2
+    reach = 1 / nearer
+    return np.asarray(centres[:, None] + radii[:, None, None] * reach * on, np.float32)
+
+
+def stroke_outlines(centres: Floats, lengths: Floats, angles: Floats, count: int) -> FloatArray:
+    """Straight strokes of ``count`` points, shape (shape, count, 2)."""
+    t = np.linspace(-0.5, 0.5, count)
     direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     along = lengths[:, None] * t[None, :]
     return np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
@@ -129,15 +139,24 @@ def place(
     """New shapes of the settings' kind: ``areas`` in px squared, ``angles`` (strokes) in rad."""
     count = len(centres)
     if settings.kind == Kind.FILL:
-        points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
+        if settings.basis == Basis.CUBIC:
+            points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
+        else:
+            points = circle_splines(centres, np.sqrt(areas / np.pi), settings.spline_points)
         widths = np.zeros(count)
     else:
         widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
-        points = stroke_outlines(centres, np.maximum(areas / widths, 2.0), angles)
+        points = stroke_outlines(
+            centres,
+            np.maximum(areas / widths, 2.0),
+            angles,
+            3 * STROKE_CUBICS + 1 if settings.basis == Basis.CUBIC else settings.spline_points,
+        )
     return Scene.uniform(
         settings.kind,
         canvas,
         points,
+        settings.basis,
         colors=np.asarray(colors, np.float32).reshape(count, 3),
         opacities=np.full(count, OPACITY, np.float32),
         widths=np.asarray(widths, np.float32),

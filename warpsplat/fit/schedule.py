@@ -77,5 +77,20 @@ def shapes_at(settings: Settings, step: int) -> int:
     density, steps = settings.density, settings.iterations
     if density.interval <= 0 or step + density.interval >= min(density.stop, 1.0) * steps:
         return settings.curves
+    most = density.surplus * settings.curves
+    if step > density.thin * steps:
+        done = (step - density.thin * steps) / ((density.stop - density.thin) * steps - density.interval)
+        return round(most * density.surplus ** -min(done, 1.0))
     missing = 1.0 - step / (density.grown * steps) if density.grown > 0 else 0.0
-    return max(1, round(settings.curves * density.start ** max(missing, 0.0)))
+    return max(1, round(most * (density.start / density.surplus) ** max(missing, 0.0)))
+
+
+def mean_points_at(settings: Settings, step: int) -> float:
+    """Points that splines should have in the mean after the turn at ``step``: those of a new one until all shapes
+    are there, then fewer, down to ``density.mean_points`` at the last turn.
+    """
+    density, steps = settings.density, settings.iterations
+    last = min(density.stop, 1.0) * steps - density.interval
+    first = density.grown * steps
+    done = min(max((step - first) / max(last - first, 1.0), 0.0), 1.0)
+    return settings.spline_points + done * (density.mean_points - settings.spline_points)

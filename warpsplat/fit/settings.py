@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal
 
 from warpsplat.errors import UsageError
-from warpsplat.scene import ATTRIBUTES, Kind
+from warpsplat.scene import ATTRIBUTES, Basis, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
@@ -30,6 +30,12 @@ class Density:
     """Fraction of the curves at the start: the first ones settle as large shapes."""
     grown: float = 0.5
     """Fraction of the run at which all curves are there; until then their number grows geometrically."""
+    surplus: float = 1.5
+    """Shapes at the most, over those that are left in the end."""
+    thin: float = 0.6
+    """Fraction of the run from which on the surplus is removed, until ``stop``."""
+    mean_points: float = 10.0
+    """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
     stop: float = 0.75
@@ -53,6 +59,10 @@ class Settings:
 
     kind: Kind = Kind.FILL
     """Of new shapes."""
+    basis: Basis = Basis.SPLINE
+    """Of new shapes; splats need cubics."""
+    spline_points: int = 12
+    """Control points of a new spline."""
     curves: int = 512
     simplify: bool = False
     """Whether an image that is simple gets fewer curves (``place.simple_curves``)."""
@@ -85,8 +95,9 @@ class Settings:
     """Whether gradients flow through the Gaussians' scales and angles."""
     viewer: bool = True
     """Whether the last steps take what a viewer shows, its rounding included, for the render."""
-    precision: int = 1
-    """Decimals of coordinates in the file."""
+    precision: int | None = None
+    """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
+    (``fit.rounding``)."""
     target_psnr: float | None = None
     """Stop once the render has this PSNR at the finest size [dB]."""
     time_budget: float | None = None
@@ -108,7 +119,7 @@ class Settings:
         checks = (
             ("curves", self.curves, 1, 100_000),
             ("iterations", self.iterations, 1, 1_000_000),
-            ("precision", self.precision, 0, 6),
+            ("precision", 0 if self.precision is None else self.precision, 0, 6),
             ("seed", self.seed, 0, 2**32 - 1),
             ("chain-cubics", self.chain_cubics, 1, 8),
         )
@@ -212,5 +223,5 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         given["max_bytes"] = parse_bytes(given["max_bytes"])
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     if given.get("renderer") == "splat":
-        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations))
+        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
     return replace(preset, **given)

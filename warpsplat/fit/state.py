@@ -10,6 +10,7 @@ import warp as wp
 from warpsplat.render.backend import Backend
 from warpsplat.render.parameters import Parameters
 from warpsplat.scene import Scene
+from warpsplat.svg.write import GRIDS
 
 
 @dataclass
@@ -23,6 +24,8 @@ class FitState:
     rng: np.random.Generator
     step: int = 0
     """Steps done."""
+    per_pixel: float = GRIDS[-1]
+    """Units of the file's view box a pixel."""
 
     @staticmethod
     def start(scene: Scene, backend: Backend, rng: np.random.Generator) -> FitState:

@@ -125,6 +125,12 @@ class Step:
         """A step for the state's new arrays, at the same size."""
         return Step(self.state, self.settings, self.target, capacity=self.renderer.capacity, aim=self.aim)
 
+    def square_error(self) -> float:
+        """Mean squared error of the last render against what it is compared with. Reads the render back."""
+        difference = self.renderer.film.buffers.image.numpy() - self.aim.target.numpy()
+        squares = difference**2 * self.renderer.film.buffers.inside.numpy()[:, None]
+        return float(squares.sum(dtype="float64")) / self.aim.value_count
+
     def psnr(self) -> float:
         """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
         look at the file on, an estimate of the file's. Reads a number a tile back from the device.

@@ -1,34 +1,58 @@
-"""A turn of surgery: shapes that show little go, new ones come where the error is."""
+"""A turn of surgery: shapes and points that show little go, new shapes come where the error is."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from warpsplat.fit.density import densify, least_seen, prune_mask
-from warpsplat.fit.schedule import shapes_at
+from warpsplat.fit.schedule import mean_points_at, shapes_at
+from warpsplat.fit.simplify import simplify
 from warpsplat.fit.step import Step
+from warpsplat.scene import Basis, FloatArray
 from warpsplat.scene.geometry import areas
 
 
 def operate(step: Step, *, grows: bool) -> Step:
     """Replace the shapes without which the error grows least; the step to go on with.
 
-    ``grows``: whether the number of shapes follows the schedule; else it stays.
+    ``grows``: whether the number of shapes and points follows the schedule; else it stays.
     """
     settings, state = step.settings, step.state
     step.renderer.forward_complete()
     scene = state.scene()
     doomed = prune_mask(scene, settings.density, state.step / settings.iterations)
     seen = step.renderer.removal_costs(step.aim.target)
-    gone = least_seen(doomed, round(settings.density.replace * len(scene)), seen)
+    wanted = shapes_at(settings, state.step) if grows else len(scene)
+    replaced = 0 if wanted < len(scene) else round(settings.density.replace * len(scene))
+    gone = least_seen(doomed, max(replaced, len(scene) - wanted), seen)
     keep = np.setdiff1d(np.arange(len(scene)), gone)
-    count = max(len(scene), shapes_at(settings, state.step) if grows else 0) - len(keep)
-    if count:
+    added = scene.take(np.arange(0))
+    if wanted > len(keep):
         image = step.renderer.read_image()
-        added = densify(settings, scene, step.target.image, image, count, state.rng)
-        state.parameters.rearrange(keep, added)
+        added = densify(settings, scene, step.target.image, image, wanted - len(keep), state.rng)
+    state.parameters.rearrange(keep, added)
+    if grows:
+        _thin_outlines(step, seen[keep])
     if settings.order == "area":
         scene = state.scene()
         order = np.argsort(-areas(scene), kind="stable")
         state.parameters.rearrange(order, scene.take(np.arange(0)))
     return step.after_surgery()
+
+
+def _thin_outlines(step: Step, seen: FloatArray) -> None:
+    """Remove points of splines until they have as many in the mean as the schedule says.
+
+    ``seen``: what the error would grow by without each shape, the first ones; newer ones keep their points.
+    """
+    state = step.state
+    scene = state.scene()
+    splines = scene.basis == Basis.SPLINE
+    mean = mean_points_at(step.settings, state.step)
+    excess = int(scene.point_counts()[splines].sum() - round(mean * int(splines.sum())))
+    if excess <= 0:
+        return
+    # An outline is worth what its shape is worth by area.
+    worth = np.full(len(scene), np.inf, np.float32)
+    worth[: len(seen)] = np.maximum(seen, 0) / np.maximum(areas(scene)[: len(seen)], 1.0)
+    state.parameters.reshape(*simplify(scene, worth, excess))

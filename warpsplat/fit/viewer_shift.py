@@ -19,6 +19,11 @@ def look_at_file(step: Step) -> None:
     """
     step.render()
     viewport, image = step.target.viewport, step.target.image
-    text = resized(export(step.state.scene(), step.settings), viewport.width, viewport.height, viewport.scale)
+    text = resized(
+        export(step.state.scene(), step.settings, step.state.per_pixel),
+        viewport.width,
+        viewport.height,
+        viewport.scale,
+    )
     shown = on_white(render_own(text)) / 255
     step.aim.at(np.asarray(image - (shown - step.renderer.read_image()), np.float32))

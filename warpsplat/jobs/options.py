@@ -55,7 +55,7 @@ OPTIONS = (
     Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
     Option("max-bytes", str, "Largest file, 100KB ...; fewer curves if need be.", metavar="SIZE"),
     Option("seed", int, "Random seed.", str(_defaults.seed), "N"),
-    Option("precision", int, "Decimals of coordinates.", str(_defaults.precision), "N"),
+    Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
 
 BY_NAME: Mapping[str, Option] = {option.name: option for option in OPTIONS}

@@ -60,7 +60,7 @@ def refine(
     )
     seconds = training_seconds(settings, target, started)
     made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
-    svg = write_svg(made.scene, precision=settings.precision, background=has_background)
+    svg = write_svg(made.scene, per_pixel=made.per_pixel, background=has_background)
     score = score_svg(svg, target, own=True)
     better = score.psnr > before.psnr
     seconds = time.monotonic() - started
@@ -85,7 +85,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
         ImageError: they differ.
     """
     given = render_svg(text, width=scene.canvas.width, height=scene.canvas.height)
-    read = render_own(write_svg(scene, precision=3, background=has_background))
+    read = render_own(write_svg(scene, background=has_background))
     if given.size != read.size:
         raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")
     alike = psnr(on_white(given), on_white(read))

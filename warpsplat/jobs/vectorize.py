@@ -101,7 +101,9 @@ def vectorize(
     seconds = training_seconds(settings, target, started)
     made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
     # A file that was cut short must not pass for a finished one.
-    svg, scene = export_within(made.scene, settings, "stopped" if made.interrupted else metadata)
+    svg, scene = export_within(
+        made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
+    )
     if write:
         write(svg)
     score = _score(svg, target, stop, interrupted=made.interrupted)
@@ -127,15 +129,15 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
     return settings.time_budget - tail - (time.monotonic() - started)
 
 
-def export_within(scene: Scene, settings: Settings, metadata: str) -> tuple[str, Scene]:
+def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
-    svg = export(scene, settings, metadata)
+    svg = export(scene, settings, per_pixel, metadata)
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = areas(scene) * scene.opacities
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene, settings, metadata)
+        svg = export(scene, settings, per_pixel, metadata)
     return svg, scene
 
 
@@ -177,8 +179,8 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
     Coordinates are relative: each has as many digits before the point as the distance of two curves.
     """
     assert settings.max_bytes
-    numbers = 2 + (24 * settings.chain_cubics // 2 if settings.kind == Kind.FILL else 18)
-    separators = 2.0 + settings.precision if settings.precision else 1.3
+    numbers = 4 + 2 * settings.density.mean_points
+    separators = 1.6
     room = settings.max_bytes - HEAD_BYTES
     count = float(settings.curves)
     for _ in range(8):  # settles within a curve

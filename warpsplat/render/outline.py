@@ -17,10 +17,10 @@ from warpsplat.render.ranges import record_ranges
 class OutlineBuffers:
     """What the stage owns."""
 
-    cubic_vertex: wp.array = buffer(wp.int32, "cubics")
-    """First vertex of each cubic, counted in its shape."""
-    cubic_pieces: wp.array = buffer(wp.int32, "cubics")
-    """Straight pieces of each cubic."""
+    bezier_vertex: wp.array = buffer(wp.int32, "beziers")
+    """First vertex of each Bézier, counted in its shape."""
+    bezier_pieces: wp.array = buffer(wp.int32, "beziers")
+    """Straight pieces of each Bézier."""
     vertex_count: wp.array = buffer(wp.int32, "shapes")
     vertex_ends: wp.array = buffer(wp.int32, "shapes")
     vertex_first: wp.array = buffer(wp.int32, "shapes")
@@ -48,7 +48,7 @@ class Outline:
         self._capacity, self._needed = capacity, needed
         self.buffers = backend.allocate(
             OutlineBuffers,
-            {"cubics": parameters.cubic_count, "shapes": parameters.shape_count, "vertices": capacity},
+            {"beziers": parameters.bezier_count, "shapes": parameters.shape_count, "vertices": capacity},
         )
 
     def samples(self) -> dict[str, wp.array]:
@@ -75,7 +75,7 @@ class Outline:
             self._needed,
             capacity=self._capacity,
         )
-        program.launch(outline.outline_forward, p.cubic_count, *sources, split=True)
+        program.launch(outline.outline_forward, p.bezier_count, *sources, split=True)
 
     def backward(self, program: Program) -> None:
         """Record gradients of the edges' ends -> gradients of the points."""

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import warp as wp
 
 from warpsplat.render.backend import Backend, view
-from warpsplat.scene import ATTRIBUTES, Attribute, Canvas, FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Scene
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3}
 """What kernels read a row of so many numbers as."""
@@ -26,6 +27,8 @@ class Group:
     moment2: wp.array
     owner: wp.array
     """[row] the shape of each row."""
+    held: wp.array
+    """[row] 1 where the value is not updated any more."""
 
 
 class Parameters:
@@ -43,16 +46,17 @@ class Parameters:
     ) -> None:
         self._scene = scene
         counts = scene.point_counts()
-        cubics = counts // 3
+        beziers = scene.bezier_counts()
         shapes = np.arange(len(scene))
         self.shape_count, self.point_count = len(scene), len(scene.points)
-        self.cubic_count = int(cubics.sum())
+        self.bezier_count = int(beziers.sum())
         self.arrays: dict[str, wp.array] = {
             "kind": self._ints(scene.kind),
+            "basis": self._ints(scene.basis),
             "point_first": self._ints(scene.first),
             "point_shape": self._ints(np.repeat(shapes, counts)),
-            "cubic_first": self._ints(np.concatenate([[0], np.cumsum(cubics)])),
-            "cubic_shape": self._ints(np.repeat(shapes, cubics)),
+            "bezier_first": self._ints(np.concatenate([[0], np.cumsum(beziers)])),
+            "bezier_shape": self._ints(np.repeat(shapes, beziers)),
             "ages": self._ints(ages),
         }
         """What kernels bind by name: the layout of the shapes, and each attribute with its gradient."""
@@ -62,7 +66,8 @@ class Parameters:
             value, m1, m2 = (
                 self._floats(x, a) for x in (getattr(scene, a.name), moments[0][a.name], moments[1][a.name])
             )
-            group = Group(a, value, wp.zeros_like(value), m1, m2, owners[a.per])
+            held = self.backend.array(wp.int32, value.shape[0])
+            group = Group(a, value, wp.zeros_like(value), m1, m2, owners[a.per], held)
             self.groups[a.name] = group
             rows = (value.shape[0],)
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
@@ -86,11 +91,14 @@ class Parameters:
         return self._scene.canvas
 
     def check_chains(self) -> None:
-        """Whether each fill can be halved into two chains of cubics.
+        """Whether all shapes are cubics and each fill can be halved into two chains of them.
 
         Raises:
-            ValueError: one has an odd number of cubics.
+            ValueError: one is a spline, or has an odd number of cubics.
         """
+        splines = self._scene.basis != Basis.CUBIC
+        if splines.any():
+            raise ValueError(f"shape {int(np.flatnonzero(splines)[0])} is a spline, not cubics")
         odd = (self._scene.kind == Kind.FILL) & (self._scene.point_counts() % 6 != 0)
         if odd.any():
             raise ValueError(f"fill {int(np.flatnonzero(odd)[0])} has an odd number of cubics")
@@ -108,6 +116,27 @@ class Parameters:
             name: getattr(group, field).numpy().reshape(self._scene.shape_of(group.attribute)).copy()
             for name, group in self.groups.items()
         }
+
+    def reshape(self, scene: Scene, keep: IndexArray) -> None:
+        """Take the points of ``scene``, the same shapes with only the rows ``keep`` of their points; those
+        keep their moments. As after ``rearrange``, launches must be recorded again.
+        """
+
+        def kept(field: str) -> dict[str, FloatArray]:
+            old = self._download(field)
+            return {a.name: old[a.name][keep] if a.per == "point" else old[a.name] for a in ATTRIBUTES}
+
+        self._upload(scene, (kept("moment1"), kept("moment2")), self.arrays["ages"].numpy())
+        self.revision += 1
+
+    def assign(self, scene: Scene) -> None:
+        """Take the values of ``scene``, which has the same shapes."""
+        for name, group in self.groups.items():
+            group.value.assign(getattr(scene, name).reshape(group.value.shape))
+
+    def hold(self, name: str, rows: npt.NDArray[np.bool_]) -> None:
+        """From now on only the other rows of attribute ``name`` are updated; until the next ``rearrange``."""
+        self.groups[name].held.assign(rows.astype(np.int32))
 
     def rearrange(self, keep: IndexArray, added: Scene) -> None:
         """Keep the shapes ``keep`` (in that order) with their moments and ages, put ``added`` in front.

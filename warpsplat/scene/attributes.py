@@ -22,6 +22,16 @@ class Kind(IntEnum):
     """A chain of cubics, painted along its course, with round caps and joins."""
 
 
+class Basis(IntEnum):
+    """What the control points of an outline are."""
+
+    CUBIC = constants.CUBIC
+    """A chain of cubic Béziers: points 0, 3, 6 ... lie on the outline, the others are handles."""
+    SPLINE = constants.SPLINE
+    """A uniform quadratic B-spline: each point is the control point of one quadratic Bézier, which begins and
+    ends midway to the neighbouring points. A stroke begins and ends at its first and last point."""
+
+
 class Unit(Enum):
     """What a number of the table is counted in."""
 

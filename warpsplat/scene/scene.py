@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene.attributes import ATTRIBUTES, Attribute, Kind
+from warpsplat.scene.attributes import ATTRIBUTES, Attribute, Basis, Kind
 
 FloatArray = npt.NDArray[np.float32]
 IndexArray = npt.NDArray[np.intp]
@@ -28,19 +28,32 @@ class Canvas:
     """sRGB in [0, 1], shape (3,)."""
 
 
+class Alike(NamedTuple):
+    """Shapes of one kind and basis with equally many points."""
+
+    kind: Kind
+    basis: Basis
+    index: IndexArray
+    """Which they are, shape (shape,)."""
+    points: FloatArray
+    """Shape (shape, point, 2)."""
+
+
 @dataclass(frozen=True)
 class Scene:
     """Bézier shapes on a canvas; row 0 is painted first (furthest back).
 
-    Shapes have as many cubics as they need: the control points of all lie in one array, those of shape ``i``
-    from ``first[i]`` to ``first[i + 1]``. Of a fill they are a ring of cubics: points 0, 3, 6 ... lie on the
-    outline, the others are control points, and the last cubic ends at point 0. Of a stroke they are a chain
-    of cubics, with one point more.
+    Shapes have as many Béziers as they need: the control points of all lie in one array, those of shape ``i``
+    from ``first[i]`` to ``first[i + 1]``. The shape's ``basis`` says what they are. Of a fill they are a
+    ring: the last cubic ends at point 0, a spline has a quadratic for each point. Of a stroke they are a chain:
+    cubics have one point more, a spline has two points more than quadratics.
     """
 
     canvas: Canvas
     kind: IntArray
     """``Kind`` of each shape, shape (shape,)."""
+    basis: IntArray
+    """``Basis`` of each shape, shape (shape,)."""
     first: IntArray
     """First control point of each shape and, last, the number of points, shape (shape + 1,)."""
     points: FloatArray
@@ -67,10 +80,11 @@ class Scene:
             wanted = self.shape_of(attribute)
             if shape != wanted:
                 raise ValueError(f"{attribute.name} has shape {shape}, not {wanted}")
+        if self.basis.shape != self.kind.shape:
+            raise ValueError(f"basis has shape {self.basis.shape}, not {self.kind.shape}")
         counts = self.point_counts()
-        wrong = np.where(
-            self.kind == Kind.FILL, (counts < 3) | (counts % 3 != 0), (counts < 4) | (counts % 3 != 1)
-        )
+        odd = counts % 3 != np.where(self.kind == Kind.FILL, 0, 1)
+        wrong = (counts < 3) | ((self.basis == Basis.CUBIC) & odd)
         if wrong.any():
             bad = int(np.flatnonzero(wrong)[0])
             raise ValueError(
@@ -81,29 +95,45 @@ class Scene:
         return len(self.kind)
 
     @staticmethod
-    def of(canvas: Canvas, kind: IntArray, first: IntArray, **attributes: FloatArray) -> Scene:
+    def of(
+        canvas: Canvas,
+        kind: IntArray,
+        first: IntArray,
+        basis: IntArray | None = None,
+        **attributes: FloatArray,
+    ) -> Scene:
         """Shapes with the ``attributes`` that are known.
 
         Args:
             canvas: what they lie on.
             kind: shape (shape,).
             first: shape (shape + 1,).
+            basis: shape (shape,); default: cubics.
             attributes: of the table, ``points`` among them; those left out are 0.
         """
         rows: dict[str, Any] = {}
         for a in ATTRIBUTES:
             if a.per == "shape":
                 rows[a.name] = np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
-        return Scene(canvas, kind, first, **(rows | attributes))
+        if basis is None:
+            basis = np.full(len(kind), Basis.CUBIC, np.int32)
+        return Scene(canvas, kind, basis, first, **(rows | attributes))
 
     @staticmethod
-    def uniform(kind: Kind, canvas: Canvas, points: FloatArray, **attributes: FloatArray) -> Scene:
-        """Shapes of one kind with equally many control points.
+    def uniform(
+        kind: Kind,
+        canvas: Canvas,
+        points: FloatArray,
+        basis: Basis = Basis.CUBIC,
+        **attributes: FloatArray,
+    ) -> Scene:
+        """Shapes of one kind and basis with equally many control points.
 
         Args:
             kind: of all shapes.
             canvas: what they lie on.
             points: shape (shape, point, 2).
+            basis: of all shapes.
             attributes: the others of the table; those left out are 0.
         """
         count, each = points.shape[:2]
@@ -111,6 +141,7 @@ class Scene:
             canvas,
             np.full(count, kind, np.int32),
             each * np.arange(count + 1, dtype=np.int32),
+            np.full(count, basis, np.int32),
             points=np.ascontiguousarray(points, np.float32).reshape(-1, 2),
             **{name: np.asarray(values, np.float32) for name, values in attributes.items()},
         )
@@ -124,18 +155,24 @@ class Scene:
         """Control points of each shape, shape (shape,)."""
         return np.diff(self.first)
 
+    def bezier_counts(self) -> IntArray:
+        """Béziers of each shape, shape (shape,)."""
+        counts = self.point_counts()
+        spline = np.where(self.kind == Kind.FILL, counts, counts - 2)
+        return np.where(self.basis == Basis.CUBIC, counts // 3, spline).astype(np.int32)
+
     def points_of(self, shape: int) -> FloatArray:
         """Control points of one shape, shape (point, 2)."""
         return self.points[self.first[shape] : self.first[shape + 1]]
 
-    def alike(self) -> Iterator[tuple[Kind, IndexArray, FloatArray]]:
-        """Groups of shapes of one kind with equally many points: their indices, and their points as one
-        array of shape (shape, point, 2).
-        """
+    def alike(self) -> Iterator[Alike]:
+        """Groups of shapes of one kind and basis with equally many points."""
         counts = self.point_counts()
-        for kind, count in sorted(set(zip(self.kind.tolist(), counts.tolist(), strict=True))):
-            index = np.flatnonzero((self.kind == kind) & (counts == count))
-            yield Kind(kind), index, self.points[self.first[index][:, None] + np.arange(count)]
+        keys = np.stack([self.kind, self.basis, counts], axis=1)
+        for kind, basis, count in sorted(set(map(tuple, keys.tolist()))):
+            index = np.flatnonzero((keys == (kind, basis, count)).all(axis=1))
+            points = self.points[self.first[index][:, None] + np.arange(count)]
+            yield Alike(Kind(kind), Basis(basis), index, points)
 
     def rows(self, attribute: Attribute, index: IndexArray) -> IndexArray:
         """Rows of ``attribute``'s array that belong to the shapes ``index``, in that order."""
@@ -149,7 +186,8 @@ class Scene:
         """The shapes ``index``, in that order."""
         index = np.asarray(index, np.intp)
         values: dict[str, Any] = {a.name: getattr(self, a.name)[self.rows(a, index)] for a in ATTRIBUTES}
-        return replace(self, kind=self.kind[index], first=starts_of(self.point_counts()[index]), **values)
+        first = starts_of(self.point_counts()[index])
+        return replace(self, kind=self.kind[index], basis=self.basis[index], first=first, **values)
 
     def append(self, other: Scene) -> Scene:
         """This scene with the shapes of ``other`` in front."""
@@ -159,6 +197,7 @@ class Scene:
         return replace(
             self,
             kind=np.concatenate([self.kind, other.kind]),
+            basis=np.concatenate([self.basis, other.basis]),
             first=starts_of(np.concatenate([self.point_counts(), other.point_counts()])),
             **values,
         )

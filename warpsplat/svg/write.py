@@ -9,19 +9,27 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat import __version__
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import Basis, FloatArray, Kind, Scene
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
-OPACITY_DECIMALS = 3
+OPACITY_DECIMALS = 2
 """An 8-bit colour moves by less than an eighth of a level for half a unit of the third decimal."""
+
+WIDTH_DECIMALS = 1
+"""Of a stroke's width, which has no separators to save."""
 
 OPAQUE = 1 - 0.5 / 255
 """From here on an opacity is left out: opaque paths are smaller and quicker to draw."""
+
+GRIDS = tuple(map(float, ".125 .25 .5 1 2 3 4 5 6 8 10 12 16 20 25 32 50 100".split()))
+"""Units of the view box a pixel of the picture: sizes of the view box have few decimals with each."""
 
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
 
@@ -36,33 +44,58 @@ def number(value: float, decimals: int) -> str:
     return re.sub(r"^(-?)0\.", r"\1.", text)
 
 
-def join_numbers(values: list[str]) -> str:
-    """Numbers in a row with the fewest separators: a sign, or a point after a point, separates itself."""
-    out: list[str] = []
-    for i, text in enumerate(values):
-        tight = i == 0 or text[0] == "-" or (text[0] == "." and "." in values[i - 1])
-        out.append(text if tight else " " + text)
-    return "".join(out)
+def rounded(scene: Scene, per_pixel: float) -> Scene:
+    """What a file with ``per_pixel`` units a pixel holds of ``scene``."""
+    spline = scene.basis[np.repeat(np.arange(len(scene)), scene.point_counts())] == Basis.SPLINE
+    unit = np.where(spline, 2 / per_pixel, 1 / per_pixel)[:, None]
+    shown = np.round(scene.opacities.astype(np.float64), OPACITY_DECIMALS)
+    return replace(
+        scene,
+        points=(np.round(scene.points / unit) * unit).astype(np.float32),
+        colors=(np.round(scene.colors * 255.0) / 255).astype(np.float32),
+        opacities=np.where(scene.opacities < OPAQUE, shown, 1).astype(np.float32),
+        widths=(np.round(scene.widths * per_pixel, WIDTH_DECIMALS) / per_pixel).astype(np.float32),
+    )
 
 
-def path_data(points: FloatArray, kind: Kind, precision: int) -> str:
-    """``d`` of one shape, points of shape (point, 2) as in ``Scene``."""
+def integers(values: npt.NDArray[np.int64]) -> str:
+    """Whole numbers in a row with the fewest separators: a sign separates itself."""
+    return " ".join(map(str, values.ravel().tolist())).replace(" -", "-")
+
+
+def path_data(points: FloatArray, kind: Kind, basis: Basis, per_pixel: float) -> str:
+    """``d`` of one shape, points of shape (point, 2) as in ``Scene``, in whole numbers of the view box."""
     closed = kind == Kind.FILL
-    unit = 10**precision
-    grid = np.round(points.astype(np.float64) * unit).astype(np.int64)
+    if basis == Basis.SPLINE:
+        return spline_data(points, closed, per_pixel)
+    grid = np.round(points.astype(np.float64) * per_pixel).astype(np.int64)
     if closed:
         grid = np.concatenate([grid, grid[:1]])
-    start = join_numbers([number(x / unit, precision) for x in grid[0]])
-    relative: list[str] = []
-    for i in range(1, len(grid), 3):
-        origin = grid[i - 1]
-        steps = grid[i : i + 3] - origin
+    count = (len(grid) - 1) // 3
+    steps = grid[1:].reshape(count, 3, 2) - grid[:-1:3, None]
+    if closed:
         # A cubic without extent draws nothing in a fill; in a stroke it may be the dot that is all there is.
-        if steps.any() or not closed:
-            relative += [number(x / unit, precision) for x in steps.ravel()]
-    if not relative:
-        return f"M{start}z"
-    return f"M{start}c{join_numbers(relative)}{'z' if closed else ''}"
+        steps = steps[steps.any(axis=(1, 2))]
+    text = f"M{integers(grid[0])}"
+    return f"{text}c{integers(steps)}" if len(steps) else f"{text}z"
+
+
+def spline_data(points: FloatArray, closed: bool, per_pixel: float) -> str:
+    """``d`` of a spline: one quadratic, and smooth ones, whose control points follow (SVG 1.1, 8.3.7).
+
+    The points lie on even numbers, so that the quadratics meet on whole ones.
+    """
+    half = np.round(points.astype(np.float64) * (per_pixel / 2)).astype(np.int64)
+    joints = half + np.roll(half, -1, axis=0)
+    if closed:
+        joints = np.concatenate([joints[-1:], joints])
+        control = 2 * half[0]
+    else:
+        joints = np.concatenate([2 * half[:1], joints[1:-2], 2 * half[-1:]])
+        control = 2 * half[1]
+    steps = np.diff(joints, axis=0)
+    text = f"M{integers(joints[0])}q{integers(np.stack([control - joints[0], steps[0]]))}"
+    return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text
 
 
 def hex_color(color: FloatArray) -> str:
@@ -77,31 +110,31 @@ PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
 
-def _element(scene: Scene, shape: int, precision: int, opacity_scale: float) -> str:
+def _element(scene: Scene, shape: int, per_pixel: float, opacity_scale: float) -> str:
     """The path of one shape."""
     kind = Kind(int(scene.kind[shape]))
     attribute = PAINTED[kind]
     style = f'{attribute}="{hex_color(scene.colors[shape])}"'
     if kind == Kind.STROKE:
-        style += f' stroke-width="{number(float(scene.widths[shape]), 2)}"'
+        style += f' stroke-width="{number(float(scene.widths[shape] * per_pixel), WIDTH_DECIMALS)}"'
     shown = min(float(scene.opacities[shape]) * opacity_scale, 1.0)
     if shown < OPAQUE:
         style += f' {attribute}-opacity="{number(shown, OPACITY_DECIMALS)}"'
-    return f'<path d="{path_data(scene.points_of(shape), kind, precision)}" {style}/>'
+    return f'<path d="{path_data(scene.points_of(shape), kind, Basis(int(scene.basis[shape])), per_pixel)}" {style}/>'
 
 
-def _groups(scene: Scene, precision: int, opacity_scale: float) -> Iterator[str]:
+def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
     """Neighbours of one kind share a group, and what it says of them."""
     for kind, shapes in itertools.groupby(range(len(scene)), lambda i: Kind(int(scene.kind[i]))):
         yield f"<g {STROKE_ATTRIBUTES}>" if kind == Kind.STROKE else "<g>"
-        yield from (_element(scene, i, precision, opacity_scale) for i in shapes)
+        yield from (_element(scene, i, per_pixel, opacity_scale) for i in shapes)
         yield "</g>"
 
 
 def write_svg(
     scene: Scene,
     *,
-    precision: int = 1,
+    per_pixel: float = GRIDS[-1],
     metadata: str = "",
     opacity_scale: float = 1.0,
     background: bool = True,
@@ -110,7 +143,8 @@ def write_svg(
 
     Args:
         scene: what to write; canvas units become user units.
-        precision: decimals of coordinates.
+        per_pixel: units of the view box a pixel; coordinates are whole numbers of units, points of splines
+            even ones.
         metadata: text for the ``metadata`` element, besides the program's name and version.
         opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
             below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
@@ -118,21 +152,27 @@ def write_svg(
     """
     canvas = scene.canvas
     fill = hex_color(canvas.background)
-    behind = f'<rect width="{canvas.width}" height="{canvas.height}" fill="{fill}"/>\n' if background else ""
-    shapes = "\n".join(_groups(scene, precision, opacity_scale))
+    width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
+    behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n' if background else ""
+    shapes = "\n".join(_groups(scene, per_pixel, opacity_scale))
     note = f"warpsplat {__version__} {metadata}".strip()
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
-        f'viewBox="0 0 {canvas.width} {canvas.height}">\n'
+        f'viewBox="0 0 {width} {height}">\n'
         f"<metadata>{note}</metadata>\n"
         f"{behind}{shapes}\n</svg>\n"
     )
 
 
 def resized(text: str, width: int, height: int, scale: float) -> str:
-    """A file written here, to be shown on ``width`` x ``height`` px at ``scale`` px a unit, not stretched."""
-    view = f'width="{width}" height="{height}" viewBox="0 0 {width / scale:.9g} {height / scale:.9g}"'
-    return re.sub(r'width="\d+" height="\d+" viewBox="[^"]*"', view, text, count=1)
+    """A file written here, to be shown on ``width`` x ``height`` px at ``scale`` px a pixel of its own, not
+    stretched.
+    """
+    found = re.search(r'width="(\d+)" height="(\d+)" viewBox="0 0 ([^" ]*) [^"]*"', text)
+    assert found
+    unit = float(found[3]) / float(found[1]) / scale
+    view = f'width="{width}" height="{height}" viewBox="0 0 {width * unit:.9g} {height * unit:.9g}"'
+    return text[: found.start()] + view + text[found.end() :]
 
 
 def read_metadata(text: str) -> str:

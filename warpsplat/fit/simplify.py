@@ -1,0 +1,104 @@
+"""Splines with fewer points: those are removed whose place the outline needs least."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene.scene import starts_of
+
+SAMPLES = 4
+"""Of each quadratic, for the area between two outlines."""
+
+LEAST_POINTS = 4
+"""Of a spline."""
+
+APART = 2
+"""Points removed in one turn have more than so many others between them: each moves its neighbours."""
+
+
+def _quadratics(points: FloatArray, t: npt.NDArray[np.float64]) -> FloatArray:
+    """Open uniform quadratic B-spline of points [..., n, 2] at ``t`` in [0, n - 2], [..., m, 2]."""
+    k = np.minimum(t.astype(np.intp), points.shape[-2] - 3)
+    s = (t - k)[:, None]
+    a, b, c = points[..., k, :], points[..., k + 1, :], points[..., k + 2, :]
+    return 0.5 * (1 - s) ** 2 * a + (0.5 + s * (1 - s)) * b + 0.5 * s * s * c
+
+
+def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rings without one of their points each.
+
+    Args:
+        points: shape (shape, point, 2).
+
+    Returns:
+        for every point of every ring, where its two neighbours go if it is removed, shape (shape, point, 2, 2),
+        and the area that the outline then sweeps, shape (shape, point).
+    """
+    count = points.shape[1]
+    window = points[:, (np.arange(count)[:, None] + np.arange(-3, 4)) % count]  # [shape, point, 7, 2]
+    t = (np.arange(5 * SAMPLES) + 0.5) / SAMPLES
+    old = _quadratics(window, t)
+    kept = window[..., [0, 1, 2, 4, 5, 6], :]
+    plain = _quadratics(kept, t * 4 / 5)
+    # Both neighbours move by w times the bulge that the point made.
+    bulge = window[..., 3, :] - 0.5 * (window[..., 2, :] + window[..., 4, :])
+    unit = np.zeros((6, 1))
+    unit[2:4] = 1
+    share = _quadratics(unit, t * 4 / 5)  # [sample, 1]
+    missing = old - plain
+    along = (missing * bulge[..., None, :]).sum(axis=-1) @ share[:, 0]
+    w = along / np.maximum((bulge**2).sum(axis=-1) * (share**2).sum(), 1e-12)
+    shift = w[..., None] * bulge
+    apart = missing - share * shift[..., None, :]
+    direction = np.diff(old, axis=-2)
+    middle = 0.5 * (apart[..., 1:, :] + apart[..., :-1, :])
+    area = np.abs(direction[..., 0] * middle[..., 1] - direction[..., 1] * middle[..., 0]).sum(axis=-1)
+    return window[..., [2, 4], :] + shift[..., None, :], area
+
+
+def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexArray]:
+    """Remove the points of splined fills that cost least, no two of them near each other.
+
+    Args:
+        scene: any shapes; others stay as they are.
+        worth: of a unit of each shape's area, shape (shape,); infinite: all its points stay.
+        count: points to remove, at the most.
+
+    Returns:
+        the scene, and the rows of its points that stay.
+    """
+    found: list[tuple[float, int, int, int, FloatArray]] = []
+    for group in scene.alike():
+        number = group.points.shape[1]
+        if group.basis != Basis.SPLINE or group.kind != Kind.FILL or number <= LEAST_POINTS:
+            continue
+        moved, area = without(group.points)
+        cost = area * worth[group.index][:, None]
+        for i in np.flatnonzero(np.isfinite(cost).all(axis=1)).tolist():
+            first = int(scene.first[group.index[i]])
+            chosen = _apart(cost[i], (number - LEAST_POINTS + 1) // 2)
+            found += [(float(cost[i, k]), first, k, number, moved[i, k]) for k in chosen]
+    found.sort(key=lambda entry: entry[:3])
+    points = scene.points.copy()
+    keep = np.ones(len(points), np.bool_)
+    for _, first, k, number, neighbours in found[:count]:
+        points[[first + (k - 1) % number, first + (k + 1) % number]] = neighbours
+        keep[first + k] = False
+    counts = np.add.reduceat(keep, scene.first[:-1]) if len(scene) else np.zeros(0, np.intp)
+    return replace(scene, first=starts_of(counts), points=points[keep]), np.flatnonzero(keep)
+
+
+def _apart(cost: FloatArray, most: int) -> list[int]:
+    """The cheapest places of a ring, ``most`` at the most, with ``APART`` others between any two."""
+    number = len(cost)
+    chosen: list[int] = []
+    for k in np.argsort(cost, kind="stable").tolist():
+        if len(chosen) == most:
+            break
+        if all(min((k - i) % number, (i - k) % number) > APART for i in chosen):
+            chosen.append(k)
+    return chosen
