@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, random_scene, with_points
-from warpsplat.fit.density import densify, duplicates, least_seen, prune_mask
+from warpsplat.fit import density
+from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
 from warpsplat.fit.place import canvas_for, circle_outlines
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.scene import FloatArray, Kind, Scene
@@ -62,7 +63,9 @@ def test_duplicates_of_similar_colour_go_one_of_two() -> None:
     assert duplicates(scene, DENSITY).tolist() == [True, False, False, False]
 
 
-def test_duplicates_match_brute_force() -> None:
+@pytest.mark.parametrize("at_once", [7, PAIRS_AT_ONCE])
+def test_duplicates_match_brute_force(at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(density, "PAIRS_AT_ONCE", at_once)
     rng = np.random.default_rng(1)
     scene = circles([tuple(x) for x in rng.uniform(50, 60, (60, 2))], list(rng.uniform(18, 22, 60)))
     scene.colors[:] = 0.5 + 0.01 * rng.normal(size=scene.colors.shape)
@@ -77,6 +80,10 @@ def test_duplicates_match_brute_force() -> None:
                 wanted[min(i, j)] = True
     assert wanted.any()
     np.testing.assert_array_equal(duplicates(scene, DENSITY), wanted)
+
+
+def test_an_empty_scene_has_no_duplicates() -> None:
+    assert len(duplicates(empty_scene(make_settings(), np.zeros((8, 8, 3), np.float32)), DENSITY)) == 0
 
 
 def test_least_seen_takes_the_doomed_first() -> None:
