@@ -145,9 +145,7 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
 
 
 def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:
-    """A recorded launch of which the index of the first thread is ``start``. Recording it anew takes ten times
-    as long.
-    """
+    """A recorded launch whose threads start at ``start``, for a part of what recording it anew would take."""
     command = copy.copy(whole)
     command.params, command.fwd_args = list(whole.params), list(whole.fwd_args or ())
     command.set_dim(shape)
@@ -162,7 +160,8 @@ QUICK_VERSIONS = ("1.19.",)
 def quick(command: wp.Launch) -> Callable[[], None]:
     """What launches ``command`` on a CPU, without packing its arguments each time.
 
-    Packing takes 7 us a piece and holds the interpreter lock, for which other threads wait: a tenth of a step.
+    Packing takes 7 us a piece, in which it holds the interpreter lock that other threads wait for: up to a
+    tenth of a step.
     """
     if not wp.__version__.startswith(QUICK_VERSIONS):
         return command.launch
