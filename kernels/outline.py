@@ -29,16 +29,18 @@ def plan_outline(
     point_first: wp.array[wp.int32],  # [shape_count + 1] first control point
     cubic_first: wp.array[wp.int32],  # [shape_count + 1] first cubic
     scale: wp.float32,  # render pixels per canvas unit
+    slack: wp.float32,  # over FLATNESS
     # Out:
     cubic_vertex: wp.array[wp.int32],  # [cubic_count] first vertex of each cubic, counted in its shape
     cubic_pieces: wp.array[wp.int32],  # [cubic_count] straight pieces
     vertex_count: wp.array[wp.int32],  # [shape_count] a stroke has one more than pieces
 ):
-    """Pieces of each cubic, one thread a shape: the polyline is FLATNESS px from the curve at most."""
+    """Pieces of each cubic, one thread a shape: the polyline is slack x FLATNESS px off the curve at most."""
     shape = offset + wp.tid()
     flatness = FLATNESS
     if kind[shape] != FILL:
         flatness = FLATNESS_STROKE
+    flatness *= slack
     vertices = int(0)
     for cubic in range(cubic_first[shape], cubic_first[shape + 1]):
         start = point_first[shape] + 3 * (cubic - cubic_first[shape])
