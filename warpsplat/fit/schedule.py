@@ -10,7 +10,7 @@ from warpsplat.fit.settings import Density, Settings
 SIZE_CHOICES = 12
 """How many lengths of the shorter side are tried for a reduced image."""
 
-COARSE_SLACK = 4.0
+COARSE_SLACK = 2.0
 """``Phase.slack`` of the coarse phase: what it fits to corners of polylines, the fine one mends."""
 
 CHECK_INTERVAL = 10
