@@ -32,16 +32,18 @@ def plan_outline(
     point_first: wp.array[wp.int32],  # [shape_count + 1] first control point
     bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier
     scale: wp.float32,  # render pixels per canvas unit
+    slack: wp.float32,  # over FLATNESS
     # Out:
     bezier_vertex: wp.array[wp.int32],  # [bezier_count] first vertex of each Bézier, counted in its shape
     bezier_pieces: wp.array[wp.int32],  # [bezier_count] straight pieces
     vertex_count: wp.array[wp.int32],  # [shape_count] a stroke has one more than pieces
 ):
-    """Pieces of each Bézier, one thread a shape: the polyline is FLATNESS px from the curve at most."""
+    """Pieces of each Bézier, one thread a shape: the polyline is slack x FLATNESS px off the curve at most."""
     shape = offset + wp.tid()
     flatness = FLATNESS
     if kind[shape] != FILL:
         flatness = FLATNESS_STROKE
+    flatness *= slack
     least = PIECES_MIN
     if basis[shape] != CUBIC:
         least = PIECES_MIN_SPLINE

@@ -2,11 +2,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, random_scene, with_points
-from warpsplat.fit.density import densify, duplicates, least_seen, prune_mask
+from warpsplat.fit import density
+from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
 from warpsplat.fit.place import canvas_for, circle_outlines
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.scene import FloatArray, Kind, Scene
@@ -62,7 +64,9 @@ def test_duplicates_of_similar_colour_go_one_of_two() -> None:
     assert duplicates(scene, DENSITY).tolist() == [True, False, False, False]
 
 
-def test_duplicates_match_brute_force() -> None:
+@pytest.mark.parametrize("at_once", [7, PAIRS_AT_ONCE])
+def test_duplicates_match_brute_force(at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(density, "PAIRS_AT_ONCE", at_once)
     rng = np.random.default_rng(1)
     scene = circles([tuple(x) for x in rng.uniform(50, 60, (60, 2))], list(rng.uniform(18, 22, 60)))
     scene.colors[:] = 0.5 + 0.01 * rng.normal(size=scene.colors.shape)
@@ -77,6 +81,10 @@ def test_duplicates_match_brute_force() -> None:
                 wanted[min(i, j)] = True
     assert wanted.any()
     np.testing.assert_array_equal(duplicates(scene, DENSITY), wanted)
+
+
+def test_an_empty_scene_has_no_duplicates() -> None:
+    assert len(duplicates(empty_scene(make_settings(), np.zeros((8, 8, 3), np.float32)), DENSITY)) == 0
 
 
 def test_least_seen_takes_the_doomed_first() -> None:
@@ -99,6 +107,25 @@ def test_new_curves_come_where_the_error_is(kind: Kind) -> None:
     np.testing.assert_allclose(added.points.mean(axis=0), [112, 32], atol=5)
     assert 200 < areas(added)[0] < 1000, "the square has 24 x 24 canvas units"
     np.testing.assert_allclose(added.colors[0], [1, 0, 0], atol=0.05)
+
+
+def test_a_candidate_is_the_deepest_pixel_of_its_component() -> None:
+    error = cv2.GaussianBlur(np.random.default_rng(2).random((40, 60), np.float32), (0, 0), 1.0)
+    top = float(np.quantile(error, 0.995))
+    wanted = []
+    for level in range(1, density.ERROR_LEVELS):
+        mask = (error >= top * level / density.ERROR_LEVELS).astype(np.uint8)
+        depth = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 3)[1:-1, 1:-1]
+        count, labels = cv2.connectedComponents(mask, connectivity=4)
+        for label in range(1, count):
+            row, column = np.argwhere((labels == label) & (depth == depth[labels == label].max()))[-1]
+            wanted.append((column + 0.5, row + 0.5, depth[row, column], error[labels == label].sum()))
+    centres, radii, masses = density._candidates(error)
+    assert len(wanted) > 20
+    np.testing.assert_array_equal(
+        np.column_stack([centres, radii]), np.array(wanted)[:, :3].astype(np.float32)
+    )
+    assert (masses <= 1.001 * np.array(wanted)[:, 3]).all()
 
 
 def test_densify_always_gives_the_count_asked_for() -> None:

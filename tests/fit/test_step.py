@@ -10,7 +10,7 @@ from tests.kernels.modules import kernel_modules, kernels_of
 from tests.scenes import mixed_scene
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
-from warpsplat.fit.schedule import phases
+from warpsplat.fit.schedule import Phase, phases
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
@@ -40,6 +40,17 @@ def step_for(
     state = FitState.start(scene, Backend.on(device, threads), rng)
     target = Target(image, phases(settings, image.shape[1], image.shape[0])[-1])
     return Step(state, settings, target, capacity=capacity)
+
+
+def test_a_coarse_step_has_fewer_vertices(device: str) -> None:
+    settings, image = make_settings(curves=10), picture()
+    counts = []
+    for slack in (1.0, 4.0):
+        rng = np.random.default_rng(0)
+        state = FitState.start(grid_scene(settings, image, 10, rng), Backend.on(device), rng)
+        step = Step(state, settings, Target(image, Phase(64, 48, slack)))
+        counts.append(int(step.renderer.needed_samples.numpy()[0]))
+    assert 0.4 < counts[1] / counts[0] < 0.7, "half as many pieces, each rounded up"
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])

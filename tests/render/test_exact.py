@@ -8,13 +8,15 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.helpers import compare, reference_image, renderer_for
+from tests.helpers import compare, outline_of, reference_image, renderer_for
 from tests.scenes import disc, points_by_shape, random_scene, with_points
 from warpsplat.kernels import constants
 from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
+from warpsplat.render.models import ExactModel
 from warpsplat.render.renderer import Capacity, render
 from warpsplat.scene import Kind
+from warpsplat.scene.geometry import flatten
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
@@ -195,3 +197,20 @@ def test_full_tiles_take_the_short_path(device: str) -> None:
     renderer = renderer_for(disc(60, 120, 60), device)
     states = renderer.bins.buffers.slot_state.numpy()[renderer.bins.buffers.slot_shape.numpy() >= 0]
     assert set(np.unique(states)) == {constants.FULL, constants.UNCOVERED, constants.PARTIAL}
+
+
+@pytest.mark.parametrize("slack", [1.0, 4.0])
+def test_polylines_are_as_near_to_the_curves_as_they_should(device: str, slack: float) -> None:
+    scene = random_scene(Kind.FILL, count=6, width=90, height=70)
+    renderer = renderer_for(scene, device, model=ExactModel(slack=slack))
+    b = outline_of(renderer)
+    worst = 0.0
+    for shape in range(len(scene)):
+        ring = b.vertex.numpy()[b.vertex_first.numpy()[shape] : b.vertex_last.numpy()[shape]]
+        start, way = ring, np.roll(ring, -1, axis=0) - ring
+        curve = flatten(scene.points_of(shape)[None], Kind.FILL, 200)[0]
+        along = ((curve[:, None] - start) * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-12)
+        foot = start + np.clip(along, 0, 1)[..., None] * way
+        worst = max(worst, np.linalg.norm(curve[:, None] - foot, axis=2).min(axis=1).max())
+    bound = slack * constants.FLATNESS
+    assert 0.2 * bound < worst < 1.01 * bound

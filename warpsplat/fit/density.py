@@ -20,31 +20,41 @@ ERROR_LEVELS = 8
 NEW_RADIUS = 1.2
 """Radius of a new shape over that of the circle inscribed in its component of the error."""
 
+PAIRS_AT_ONCE = 1 << 18
+"""Pairs of shapes that ``duplicates`` compares in one go: bounds its memory."""
+
 
 def duplicates(scene: Scene, density: Density) -> BoolArray:
     """Shapes with a neighbour further in front of nearly their colour and box."""
     boxes = bounds(scene)
-    sizes = np.maximum(1e-6, (boxes[:, 2:] - boxes[:, :2]).prod(axis=1))
-    found = np.zeros(len(scene), np.bool_)
     # Boxes that overlap so much have nearly the same left edge: a window over the sorted edges is enough.
     order = np.argsort(boxes[:, 0], kind="stable")
     left = boxes[order, 0]
     slack = (1 - density.duplicate_overlap) * (boxes[:, 2] - boxes[:, 0])
-    for i in order:
-        window = order[
-            np.searchsorted(left, boxes[i, 0]) : np.searchsorted(left, boxes[i, 0] + slack[i], "right")
-        ]
-        window = window[window != i]
-        if len(window) == 0:
-            continue
-        low, high = np.maximum(boxes[i, :2], boxes[window, :2]), np.minimum(boxes[i, 2:], boxes[window, 2:])
-        common = np.clip(high - low, 0, None).prod(axis=1)
-        overlap = common / (sizes[i] + sizes[window] - common)
-        apart = np.linalg.norm(scene.colors[window] - scene.colors[i], axis=1)
-        alike = window[(overlap > density.duplicate_overlap) & (apart < density.duplicate_color)]
-        for j in alike:
-            found[min(i, j)] = True
+    first = np.searchsorted(left, boxes[:, 0])
+    counts = np.searchsorted(left, boxes[:, 0] + slack, "right") - first
+    ends = np.cumsum(counts)
+    found = np.zeros(len(scene), np.bool_)
+    total = int(counts.sum())
+    for start in range(0, total, PAIRS_AT_ONCE):
+        pair = np.arange(start, min(start + PAIRS_AT_ONCE, total))
+        i = np.searchsorted(ends, pair, "right")
+        j = order[first[i] + pair - (ends - counts)[i]]
+        alike = (i != j) & _alike(boxes, scene.colors, density, i, j)
+        found[np.minimum(i, j)[alike]] = True
     return found
+
+
+def _alike(
+    boxes: FloatArray, colors: FloatArray, density: Density, i: IndexArray, j: IndexArray
+) -> BoolArray:
+    """Of pairs of shapes, whether they have nearly the same box and colour."""
+    sizes = np.maximum(1e-6, (boxes[:, 2:] - boxes[:, :2]).prod(axis=1))
+    low, high = np.maximum(boxes[i, :2], boxes[j, :2]), np.minimum(boxes[i, 2:], boxes[j, 2:])
+    common = np.clip(high - low, 0, None).prod(axis=1)
+    overlap = common / (sizes[i] + sizes[j] - common)
+    apart = np.linalg.norm(colors[j] - colors[i], axis=1)
+    return np.asarray((overlap > density.duplicate_overlap) & (apart < density.duplicate_color))
 
 
 def prune_mask(scene: Scene, density: Density, progress: float) -> BoolArray:
@@ -74,16 +84,21 @@ def _candidates(error: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     top = max(float(np.quantile(error, 0.995)), 1e-12)
     centres, radii, masses = [], [], []
     for level in range(1, ERROR_LEVELS):
-        mask = (error >= top * level / ERROR_LEVELS).astype(np.uint8)
+        inside = error >= top * level / ERROR_LEVELS
+        mask = inside.view(np.uint8)
         number, labels = cv2.connectedComponents(mask, connectivity=4)
         # Padded, so that the border of the image bounds a circle as well.
         depth = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 3)[1:-1, 1:-1]
-        by_depth = np.argsort(depth, axis=None, kind="stable")
+        # The deepest pixel of a component has no deeper neighbour; of several the last is taken.
+        peak = np.flatnonzero(inside & (depth >= cv2.dilate(depth, np.ones((3, 3)))))
+        peak = peak[np.argsort(depth.ravel()[peak], kind="stable")]
         deepest = np.zeros(number, np.intp)
-        deepest[labels.ravel()[by_depth]] = by_depth
+        deepest[labels.ravel()[peak]] = peak
         row, column = np.divmod(deepest[1:], error.shape[1])
-        size = np.bincount(labels.ravel(), minlength=number)[1:]
-        mass = np.bincount(labels.ravel(), weights=error.ravel(), minlength=number)[1:]
+        pixel = np.flatnonzero(inside)
+        label = labels.ravel()[pixel]
+        size = np.bincount(label, minlength=number)[1:]
+        mass = np.bincount(label, weights=error.ravel()[pixel], minlength=number)[1:]
         radius = depth[row, column]
         centres.append(np.stack([column + 0.5, row + 0.5], axis=1))
         radii.append(radius)
@@ -104,7 +119,9 @@ def densify(
     ``target`` and ``image`` are (height, width, 3) at any one size; the result is in canvas units.
     """
     unit = scene.canvas.width / target.shape[1]
-    error = cv2.GaussianBlur(((image - target) ** 2).sum(axis=2), (0, 0), 1.0)
+    squares = (image - target) ** 2
+    # The same bits as a sum along the last axis, which takes many times as long.
+    error = cv2.GaussianBlur(squares[..., 0] + squares[..., 1] + squares[..., 2], (0, 0), 1.0)
     centres, radii, masses = _candidates(error)
     chosen: list[int] = []
     taken = np.zeros(error.shape, np.uint8)

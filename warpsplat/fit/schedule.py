@@ -10,6 +10,9 @@ from warpsplat.fit.settings import Density, Settings
 SIZE_CHOICES = 12
 """How many lengths of the shorter side are tried for a reduced image."""
 
+COARSE_SLACK = 2.0
+"""``Phase.slack`` of the coarse phase: what it fits to corners of polylines, the fine one mends."""
+
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
 
@@ -23,6 +26,8 @@ class Phase:
 
     width: int
     height: int
+    slack: float = 1.0
+    """How much further from the curves their polylines may be than in the file."""
 
 
 def phases(settings: Settings, width: int, height: int) -> list[Phase]:
@@ -40,8 +45,8 @@ def phases(settings: Settings, width: int, height: int) -> list[Phase]:
         other = round(long * best / short)
         return (best, other) if width <= height else (other, best)
 
-    coarse, fine = Phase(*fit(settings.coarse_pixels)), Phase(*fit(settings.fine_pixels))
-    return [fine] if coarse == fine else [coarse, fine]
+    coarse, fine = fit(settings.coarse_pixels), fit(settings.fine_pixels)
+    return [Phase(*fine)] if coarse == fine else [Phase(*coarse, COARSE_SLACK), Phase(*fine)]
 
 
 def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:

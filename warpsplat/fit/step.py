@@ -17,7 +17,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
 from warpsplat.metrics import psnr
 from warpsplat.render.backend import Viewport
-from warpsplat.render.models import EXACT, Model, SplatModel
+from warpsplat.render.models import ExactModel, Model, SplatModel
 from warpsplat.render.program import Program, capture
 from warpsplat.render.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
@@ -33,13 +33,14 @@ class Target:
         reduced = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
         self.image = np.ascontiguousarray(reduced, np.float32)
         self.viewport = Viewport(*size, phase.width / width)
+        self.slack = phase.slack
 
 
-def model_for(settings: Settings, step: int) -> Model:
-    """The settings' model of coverage, as it is after ``step`` steps."""
+def model_for(settings: Settings, step: int, slack: float = 1.0) -> Model:
+    """The settings' model of coverage, as it is after ``step`` steps, with a phase's ``slack``."""
     if settings.renderer == "splat":
         return SplatModel(settings.through_scales, fold_weight(settings, step))
-    return EXACT
+    return ExactModel(slack=slack)
 
 
 class Step:
@@ -60,7 +61,10 @@ class Step:
         """Without ``capacity``, the need is found by rendering."""
         self.state, self.settings, self.target = state, settings, target
         self.renderer = Renderer(
-            state.parameters, target.viewport, model=model_for(settings, state.step), capacity=capacity
+            state.parameters,
+            target.viewport,
+            model=model_for(settings, state.step, target.slack),
+            capacity=capacity,
         )
         self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport)
         if capacity is None:

@@ -14,25 +14,34 @@ class Request:
     """Work for one helper, and what became of it."""
 
     def __init__(self, work: Callable[[], None]) -> None:
-        self.work = work
-        self.error: BaseException | None = None
-        self.busy = threading.Lock()
-        self.busy.acquire()
+        self._work = work
+        self._error: BaseException | None = None
+        self._claim = threading.Lock()
+        """Taken by who decides: the helper that begins, or the caller that withdraws."""
+        self._done = threading.Lock()
+        self._done.acquire()
 
     def serve(self) -> None:
-        """Do the work, in a helper."""
+        """Do the work, in a helper, unless it was withdrawn."""
+        if not self._claim.acquire(blocking=False):
+            return
         try:
-            self.work()
+            self._work()
         except BaseException as error:  # raised again where it is waited for
-            self.error = error
+            self._error = error
         finally:
-            self.busy.release()
+            self._done.release()
 
-    def wait(self) -> None:
-        """Until the work is done; raises what it raised."""
-        self.busy.acquire()
-        if self.error:
-            raise self.error
+    def settle(self) -> None:
+        """Withdraw what no helper has begun; wait for what one has, and raise what it raised.
+
+        Afterwards no helper does any of the work.
+        """
+        if self._claim.acquire(blocking=False):
+            return
+        self._done.acquire()
+        if self._error:
+            raise self._error
 
 
 class Helpers:

@@ -58,10 +58,14 @@ class ExactModel:
     """The area that a viewer computes for the paths."""
 
     samples_per_shape: int = 48
+    slack: float = 1.0
+    """How much further from the curves the polylines may be than ``constants.FLATNESS``."""
 
     def stages(self, job: Job) -> tuple[Geometry, Coverage]:
         """See ``Model``."""
-        outline = Outline(job.backend, job.parameters, job.viewport, job.samples, job.needed)
+        outline = Outline(
+            job.backend, job.parameters, job.viewport, job.samples, job.needed, slack=self.slack
+        )
         coverage = ExactCoverage(job.backend, job.parameters, job.viewport, outline, job.bins, job.slots)
         return outline, coverage
 

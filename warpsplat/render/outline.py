@@ -42,10 +42,18 @@ class Outline:
     """Flattens curves as finely as their size in pixels asks for."""
 
     def __init__(
-        self, backend: Backend, parameters: Parameters, viewport: Viewport, capacity: int, needed: wp.array
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        capacity: int,
+        needed: wp.array,
+        *,
+        slack: float = 1.0,
     ) -> None:
+        """``slack``: how much further from the curves the polylines may be than ``constants.FLATNESS``."""
         self._parameters, self._viewport = parameters, viewport
-        self._capacity, self._needed = capacity, needed
+        self._capacity, self._needed, self._slack = capacity, needed, slack
         self.buffers = backend.allocate(
             OutlineBuffers,
             {"beziers": parameters.bezier_count, "shapes": parameters.shape_count, "vertices": capacity},
@@ -65,7 +73,7 @@ class Outline:
         """Record points, widths -> vertices."""
         b, p = self.buffers, self._parameters
         sources = (b, p.arrays, self._viewport)
-        program.launch(outline.plan_outline, p.shape_count, *sources)
+        program.launch(outline.plan_outline, p.shape_count, *sources, slack=self._slack)
         record_ranges(
             program,
             b.vertex_count,

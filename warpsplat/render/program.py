@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import ctypes
+import functools
 import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -70,22 +73,19 @@ class Program:
             return
         load(kernel, self.device)
         arguments = bind(kernel, sources, values)
-        count = self.threads * PIECES_PER_THREAD if split and self.threads > 1 else 1
-        count = min(count, shape[0])
-        borders = [shape[0] * i // count for i in range(count + 1)]
         self._arrays.append(arguments)
-        pieces: list[Callable[[], None]] = []
-        for start, stop in itertools.pairwise(borders):
-            command = wp.launch(
-                kernel,
-                dim=(stop - start, *shape[1:]),
-                inputs=[start, *arguments],
-                device=self.device,
-                record_cmd=True,
+        whole = wp.launch(kernel, dim=shape, inputs=[0, *arguments], device=self.device, record_cmd=True)
+        assert whole is not None
+        count = min(self.threads * PIECES_PER_THREAD, shape[0]) if split and self.threads > 1 else 1
+        if count == 1:
+            pieces: tuple[Callable[[], None], ...] = (whole.launch,)
+        else:
+            borders = [shape[0] * i // count for i in range(count + 1)]
+            pieces = tuple(
+                quick(part(whole, start, (stop - start, *shape[1:])))
+                for start, stop in itertools.pairwise(borders)
             )
-            assert command is not None
-            pieces.append(command.launch)
-        self.launches.append(Launch(self.stage, kernel.key, tuple(pieces)))
+        self.launches.append(Launch(self.stage, kernel.key, pieces))
 
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
         """Append a host function that launches device work (a scan, a sort)."""
@@ -107,7 +107,7 @@ class Program:
             work()
         finally:  # an interruption must not free arrays that helpers still write
             for request in requests:
-                request.wait()
+                request.settle()  # on a busy machine many a helper comes too late
 
     def run(self) -> None:
         """Replay all launches."""
@@ -142,6 +142,38 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
         for program in programs:
             program.run()
     return captured.graph
+
+
+def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:
+    """A recorded launch whose threads start at ``start``, for a part of what recording it anew would take."""
+    command = copy.copy(whole)
+    command.params, command.fwd_args = list(whole.params), list(whole.fwd_args or ())
+    command.set_dim(shape)
+    command.set_param_at_index(0, start)
+    return command
+
+
+QUICK_VERSIONS = ("1.19.",)
+"""Of Warp, in which CPU kernels are known to be called as ``quick`` does."""
+
+
+def quick(command: wp.Launch) -> Callable[[], None]:
+    """What launches ``command`` on a CPU, without packing its arguments each time.
+
+    Packing takes 7 us a piece, in which it holds the interpreter lock that other threads wait for: up to a
+    tenth of a step.
+    """
+    if not wp.__version__.startswith(QUICK_VERSIONS):
+        return command.launch
+    labels = (argument.label for argument in command.kernel.adj.args)
+    arguments = _layout(tuple(zip(labels, map(type, command.params[1:]), strict=True)))(*command.params[1:])
+    return functools.partial(command.hooks.forward, ctypes.byref(command.params[0]), ctypes.byref(arguments))
+
+
+@functools.cache
+def _layout(fields: tuple[tuple[str, Any], ...]) -> type[ctypes.Structure]:
+    """The C structure of a kernel's arguments."""
+    return type("Arguments", (ctypes.Structure,), {"_fields_": list(fields)})
 
 
 def bind(kernel: wp.Kernel, sources: Sequence[object], values: Mapping[str, Any]) -> list[Any]:
