@@ -61,6 +61,7 @@ def fit(
     backend: Backend,
     *,
     scene: Scene | None = None,
+    importance: FloatArray | None = None,
     seconds: float | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -72,6 +73,7 @@ def fit(
         settings: all that decides the result.
         backend: where to compute.
         scene: shapes to start from, whose number stays; without, new ones.
+        importance: how much the error of a pixel counts: grey mask in [0, 1], of any size.
         seconds: time that the run should take, in place of the settings' iterations.
         report: called every few steps.
         stop: asked after every step; once true, the run ends. So does reaching ``target_psnr``.
@@ -92,7 +94,7 @@ def fit(
         entered = phase_at(settings, plan, state.step)
         if step is None or entered is not phase:
             phase = entered
-            step = Step(state, settings, Target(image, phase))
+            step = Step(state, settings, Target(image, phase, importance))
         step.advance()
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:

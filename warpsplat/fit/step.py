@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from warpsplat.fit import losses
+from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.losses import Aim, LossInputs
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.schedule import Phase, fold_weight
@@ -24,14 +25,23 @@ from warpsplat.scene import FloatArray
 
 
 class Target:
-    """The image at the size of a phase."""
+    """The image at the size of a phase, and what the error of its pixels counts."""
 
-    def __init__(self, image: FloatArray, phase: Phase) -> None:
-        """``image``: sRGB in [0, 1], shape (height, width, 3); reduced by area to the phase's size."""
+    def __init__(self, image: FloatArray, phase: Phase, importance: FloatArray | None = None) -> None:
+        """Both are reduced by area to the phase's size.
+
+        Args:
+            image: sRGB in [0, 1], shape (height, width, 3).
+            phase: the size.
+            importance: grey mask in [0, 1] of any size (``importance.pixel_weights``); without, all pixels
+                count alike.
+        """
         height, width = image.shape[:2]
         size = (phase.width, phase.height)
         reduced = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
         self.image = np.ascontiguousarray(reduced, np.float32)
+        self.weights = None if importance is None else pixel_weights(importance, *size)
+        """Shape (height, width), mean 1."""
         self.viewport = Viewport(*size, phase.width / width)
 
 
@@ -62,7 +72,7 @@ class Step:
         self.renderer = Renderer(
             state.parameters, target.viewport, model=model_for(settings, state.step), capacity=capacity
         )
-        self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport)
+        self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport, target.weights)
         if capacity is None:
             self.renderer.forward_complete()
         self.record()

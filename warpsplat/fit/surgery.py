@@ -19,13 +19,13 @@ def operate(step: Step, *, grows: bool) -> Step:
     step.renderer.forward_complete()
     scene = state.scene()
     doomed = prune_mask(scene, settings.density, state.step / settings.iterations)
-    seen = step.renderer.removal_costs(step.aim.target)
+    seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
     gone = least_seen(doomed, round(settings.density.replace * len(scene)), seen)
     keep = np.setdiff1d(np.arange(len(scene)), gone)
     count = max(len(scene), shapes_at(settings, state.step) if grows else 0) - len(keep)
     if count:
         image = step.renderer.read_image()
-        added = densify(settings, scene, step.target.image, image, count, state.rng)
+        added = densify(settings, scene, step.target.image, image, count, state.rng, step.target.weights)
         state.parameters.rearrange(keep, added)
     if settings.order == "area":
         scene = state.scene()

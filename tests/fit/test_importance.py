@@ -1,0 +1,63 @@
+"""Errors that count more: what a mask becomes, and what it changes in a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import empty_scene, picture
+from warpsplat.fit.density import densify
+from warpsplat.fit.importance import LEAST, pixel_weights
+from warpsplat.fit.loop import fit
+from warpsplat.fit.settings import make_settings
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+
+
+@pytest.mark.parametrize("size", [(12, 8), (6, 4), (24, 16), (18, 12), (7, 5)])
+def test_weights_are_linear_in_the_grey_of_any_size_and_of_mean_1(size: tuple[int, int]) -> None:
+    mask = np.zeros((8, 12), np.float32)
+    mask[:4] = 1
+    weights = pixel_weights(mask, *size)
+    assert weights.shape == size[::-1]
+    assert weights.mean() == pytest.approx(1, abs=1e-6)
+    assert weights[-1, 0] == pytest.approx(LEAST * weights[0, 0], rel=1e-5)
+
+
+def test_a_mask_of_one_grey_weighs_nothing_more() -> None:
+    for grey in (0.0, 0.5, 1.0):
+        assert (pixel_weights(np.full((4, 6), grey, np.float32), 6, 4) == 1).all()
+
+
+def test_new_curves_come_where_the_error_counts() -> None:
+    target = np.full((60, 80, 3), 0.5, np.float32)
+    image = target.copy()
+    target[10:22, 50:62] = [1, 0, 0]
+    target[40:50, 10:20] = [0.8, 0.2, 0.2]
+    settings = make_settings()
+    for weights, centre in ((None, [56, 16]), (pixel_weights(mask_of_the_lower_half(), 80, 60), [15, 45])):
+        added = densify(
+            settings, empty_scene(settings, target), target, image, 1, np.random.default_rng(0), weights
+        )
+        np.testing.assert_allclose(added.points.mean(axis=0), centre, atol=3)
+
+
+def mask_of_the_lower_half() -> np.ndarray:
+    mask = np.zeros((60, 80), np.float32)
+    mask[30:] = 1
+    return mask
+
+
+def test_a_run_comes_nearer_where_the_mask_is_white(device: str) -> None:
+    target = picture()
+    height, width = target.shape[:2]
+    mask = np.zeros((height, width), np.float32)
+    mask[:, : width // 2] = 1
+    settings = make_settings(curves=12, iterations=60, coarse_pixels=1000)
+    errors = []
+    for importance in (None, mask):
+        scene = fit(target, settings, Backend.on(device), importance=importance).scene
+        squares = (render(scene, backend=Backend.on(device)) - target) ** 2
+        errors.append([squares[mask == white].mean() for white in (0, 1)])
+    assert errors[1][1] < 0.8 * errors[0][1]
+    assert errors[1][0] > errors[0][0]
