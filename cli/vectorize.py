@@ -29,6 +29,7 @@ def summary(output: Path, values: dict[str, Any]) -> str:
         return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
     ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
+    ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "

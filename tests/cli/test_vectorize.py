@@ -34,7 +34,9 @@ def test_summary_and_default_output(
     assert run("vectorize", image, *QUICK) == 0
     assert (tmp_path / "photo.svg").exists()
     captured = capsys.readouterr()
-    assert re.fullmatch(r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}, 8 paths, .* s\n", captured.out)
+    assert re.fullmatch(
+        r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}(, SSIMULACRA2 -?[\d.]+)?, 8 paths, .* s\n", captured.out
+    )
     assert captured.err == "", "no progress bar where stderr is no terminal"
 
 

@@ -118,7 +118,7 @@ def vectorize(
     svg, scene = export_within(made.scene, settings, "stopped" if made.interrupted else metadata)
     if write:
         write(svg)
-    score = _score(svg, target, stop, interrupted=made.interrupted)
+    score = _score(svg, target, settings, stop, interrupted=made.interrupted)
     seconds = time.monotonic() - started
     return Result(
         svg=svg,
@@ -158,15 +158,28 @@ QUICK_PIXELS = 1_000_000
 takes about a second."""
 
 
+def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
+    """Whether a run's report has SSIMULACRA2: up to ``QUICK_PIXELS`` it takes a twentieth of a run of the
+    default effort; within a time budget other things are worth more.
+    """
+    return target.shape[0] * target.shape[1] <= QUICK_PIXELS and settings.time_budget is None
+
+
 def _score(
-    svg: str, target: FloatArray, stop: Callable[[], bool] | None, *, interrupted: bool
+    svg: str,
+    target: FloatArray,
+    settings: Settings,
+    stop: Callable[[], bool] | None,
+    *,
+    interrupted: bool,
 ) -> Score | None:
     """The score of a file, or None where there is no time for it."""
     quick = target.shape[0] * target.shape[1] <= QUICK_PIXELS
+    eyes = has_time_for_eyes(settings, target) and not interrupted
     if (interrupted and not quick) or (not interrupted and stop and stop()):
         return None
     try:
-        return score_svg(svg, target, own=True, stop=None if quick else stop)
+        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
     except Stopped:
         return None
 
