@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.fit.budget import Budget
+from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import CHECK_INTERVAL, LOOK_INTERVAL, phase_at, phases, shapes_at, work_done
 from warpsplat.fit.settings import Settings
@@ -87,6 +88,7 @@ def fit(
         settings = budget.measure(state, settings, image)
     started = time.monotonic()
     plan = phases(settings, image.shape[1], image.shape[0])
+    weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
     step: Step | None = None
     phase = None
     interrupted = False
@@ -94,7 +96,7 @@ def fit(
         entered = phase_at(settings, plan, state.step)
         if step is None or entered is not phase:
             phase = entered
-            step = Step(state, settings, Target(image, phase, importance))
+            step = Step(state, settings, Target(image, phase, weights))
         step.advance()
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:
