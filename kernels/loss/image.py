@@ -41,7 +41,9 @@ def image_loss(
     # Out:
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted
-    similarity: wp.array2d[wp.float32],  # [tile_count, 3] sums over windows of SSIM x weight
+    similarity: wp.array2d[
+        wp.float32
+    ],  # [tile_count, 3] sums over windows of SSIM x weight; 0 without weight
 ):
     """Mean over pixels and channels of w e^2 (paper eq. 12, first term), and ``similarity_weight`` x the mean
     of w (1 - SSIM); w is the ``importance``, e the error. One thread a tile and channel.
@@ -78,70 +80,74 @@ def image_loss(
     x0 = int(0)
     while x0 < columns:
         x1 = wp.min((x0 + shift_x) / WINDOW * WINDOW + WINDOW - shift_x, columns)
-        sum_u = column(0.0)
-        sum_v = column(0.0)
-        sum_squares = column(0.0)
-        sum_uv = column(0.0)
-        weight = float(x1 - x0) * inside
-        for x in range(x0, x1):
-            u = image[tile, channel, x]
-            v = target[tile, channel, x]
-            sum_u = sum_u + u
-            sum_v = sum_v + v
-            sum_squares = sum_squares + (wp.cw_mul(u, u) + wp.cw_mul(v, v))
-            sum_uv = sum_uv + wp.cw_mul(u, v)
-        if weighted != 0:
-            weight = zero
+        a = column(0.0)
+        b = column(0.0)
+        c = column(0.0)
+        if similarity_weight > 0.0:
+            sum_u = column(0.0)
+            sum_v = column(0.0)
+            sum_squares = column(0.0)
+            sum_uv = column(0.0)
+            weight = float(x1 - x0) * inside
             for x in range(x0, x1):
-                weight = weight + importance[tile, x]
-        mean_u = column(0.0)
-        mean_v = column(0.0)
-        squared = column(0.0)
-        product = column(0.0)
-        total_weight = column(0.0)
-        y0 = int(0)
-        y1 = border1
-        window = first
-        for k in range(3):
-            window_u = float(0.0)
-            window_v = float(0.0)
-            window_squares = float(0.0)
-            window_uv = float(0.0)
-            window_weight = float(0.0)
-            for y in range(y0, y1):
-                window_u += sum_u[y]
-                window_v += sum_v[y]
-                window_squares += sum_squares[y]
-                window_uv += sum_uv[y]
-                window_weight += weight[y]
-            mean_u = mean_u + window_u * window
-            mean_v = mean_v + window_v * window
-            squared = squared + window_squares * window
-            product = product + window_uv * window
-            total_weight = total_weight + window_weight * window
-            y0 = y1
-            y1 = border2
-            window = second
-            if k == 1:
-                y1 = rows
-                window = third
-        inverse = wp.cw_div(one, wp.max(float(x1 - x0) * heights, one))
-        mean_u = wp.cw_mul(inverse, mean_u)
-        mean_v = wp.cw_mul(inverse, mean_v)
-        means = wp.cw_mul(mean_u, mean_v)
-        squared_means = wp.cw_mul(mean_u, mean_u) + wp.cw_mul(mean_v, mean_v)
-        a1 = 2.0 * means + c1
-        a2 = 2.0 * (wp.cw_mul(inverse, product) - means) + c2
-        b1 = wp.cw_div(one, squared_means + c1)
-        b2 = wp.cw_div(one, wp.cw_mul(inverse, squared) - squared_means + c2)
-        b12 = wp.cw_mul(b1, b2)
-        s = wp.cw_mul(wp.cw_mul(a1, a2), b12)
-        similar = similar + wp.cw_mul(weight, s)
-        shares = share * wp.cw_mul(inverse, total_weight)
-        b = wp.cw_mul(shares, wp.cw_mul(s, b2))
-        c = wp.cw_mul(shares, wp.cw_mul(a1, b12))
-        a = wp.cw_mul(mean_v, wp.cw_mul(a2, b2)) - wp.cw_mul(mean_u, s)
-        a = wp.cw_mul(wp.cw_mul(shares, b1), a) + wp.cw_mul(b, mean_u) - wp.cw_mul(c, mean_v)
+                u = image[tile, channel, x]
+                v = target[tile, channel, x]
+                sum_u = sum_u + u
+                sum_v = sum_v + v
+                sum_squares = sum_squares + (wp.cw_mul(u, u) + wp.cw_mul(v, v))
+                sum_uv = sum_uv + wp.cw_mul(u, v)
+            if weighted != 0:
+                weight = zero
+                for x in range(x0, x1):
+                    weight = weight + importance[tile, x]
+            mean_u = column(0.0)
+            mean_v = column(0.0)
+            squared = column(0.0)
+            product = column(0.0)
+            total_weight = column(0.0)
+            y0 = int(0)
+            y1 = border1
+            window = first
+            for k in range(3):
+                window_u = float(0.0)
+                window_v = float(0.0)
+                window_squares = float(0.0)
+                window_uv = float(0.0)
+                window_weight = float(0.0)
+                for y in range(y0, y1):
+                    window_u += sum_u[y]
+                    window_v += sum_v[y]
+                    window_squares += sum_squares[y]
+                    window_uv += sum_uv[y]
+                    window_weight += weight[y]
+                mean_u = mean_u + window_u * window
+                mean_v = mean_v + window_v * window
+                squared = squared + window_squares * window
+                product = product + window_uv * window
+                total_weight = total_weight + window_weight * window
+                y0 = y1
+                y1 = border2
+                window = second
+                if k == 1:
+                    y1 = rows
+                    window = third
+            inverse = wp.cw_div(one, wp.max(float(x1 - x0) * heights, one))
+            mean_u = wp.cw_mul(inverse, mean_u)
+            mean_v = wp.cw_mul(inverse, mean_v)
+            means = wp.cw_mul(mean_u, mean_v)
+            squared_means = wp.cw_mul(mean_u, mean_u) + wp.cw_mul(mean_v, mean_v)
+            a1 = 2.0 * means + c1
+            a2 = 2.0 * (wp.cw_mul(inverse, product) - means) + c2
+            b1 = wp.cw_div(one, squared_means + c1)
+            b2 = wp.cw_div(one, wp.cw_mul(inverse, squared) - squared_means + c2)
+            b12 = wp.cw_mul(b1, b2)
+            s = wp.cw_mul(wp.cw_mul(a1, a2), b12)
+            similar = similar + wp.cw_mul(weight, s)
+            shares = share * wp.cw_mul(inverse, total_weight)
+            b = wp.cw_mul(shares, wp.cw_mul(s, b2))
+            c = wp.cw_mul(shares, wp.cw_mul(a1, b12))
+            a = wp.cw_mul(mean_v, wp.cw_mul(a2, b2)) - wp.cw_mul(mean_u, s)
+            a = wp.cw_mul(wp.cw_mul(shares, b1), a) + wp.cw_mul(b, mean_u) - wp.cw_mul(c, mean_v)
         for x in range(x0, x1):
             u = image[tile, channel, x]
             v = target[tile, channel, x]
