@@ -104,7 +104,16 @@ def command(
 
     def run(job: Job, data: bytes) -> Result:
         backend = backends[device or job.device]
-        return run_file(job.image, job.output, job.settings, backend, data=data, quiet=quiet, verbose=verbose)
+        return run_file(
+            job.image,
+            job.output,
+            job.settings,
+            backend,
+            data=data,
+            importance=job.importance,
+            quiet=quiet,
+            verbose=verbose,
+        )
 
     for i, job in enumerate(todo):
         try:

@@ -20,7 +20,9 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
 
     The SVG is rendered at the image's size; transparency is on white.
-    One of the two may be - for the standard input.
+    SSIMULACRA2 is given where its package is installed (the extra "eyes"),
+    for images of up to 4 million pixels. One of the two may be - for the
+    standard input.
     """
     from warpsplat.files.image import load_image
     from warpsplat.files.inputs import STANDARD, input_name
@@ -38,7 +40,8 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     if as_json:
         say(json.dumps({"image": str(image), "svg": str(svg), **values}))
         return
-    for name, unit in (("psnr", " dB"), ("ssim", ""), ("ms_ssim", ""), ("paths", ""), ("nodes", "")):
+    for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):
+        unit = " dB" if name == "psnr" else ""
         shown = "-" if values[name] is None else values[name]
         say(f"{name:12}{shown}{unit if values[name] is not None else ''}")
     say(f"{'bytes':12}{values['bytes']}")

@@ -27,6 +27,13 @@ threads_option = click.option(
     help="CPU threads, 8 a core at most; the result is the same for any number.  [default: all cores]",
 )
 
+importance_option = click.option(
+    "--importance",
+    type=FILE,
+    metavar="MASK",
+    help="Image of the same proportions: errors count most where it is white, least where it is black.",
+)
+
 overwrite_option = click.option(
     "--overwrite", is_flag=True, help="Replace files that warpsplat did not write as well."
 )

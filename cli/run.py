@@ -84,10 +84,14 @@ def run_file(
     backend: Backend,
     *,
     data: bytes,
+    importance: Path | None = None,
     verbose: int = 0,
     quiet: bool = False,
 ) -> Result:
-    """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
+    """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
+
+    ``importance``: file of a mask.
+    """
     if verbose:
         most = "at most " if settings.simplify or settings.max_bytes else ""
         say(f"{source}: {most}{settings.curves} {PLURALS[settings.kind]} on {backend.device}", err=True)
@@ -99,6 +103,7 @@ def run_file(
             settings,
             backend,
             name=input_name(source),
+            importance=importance,
             report=report,
             stop=interrupt,
         )

@@ -8,7 +8,13 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import FILE, overwrite_option, quality_options, run_options
+from warpsplat.cli.options import (
+    FILE,
+    importance_option,
+    overwrite_option,
+    quality_options,
+    run_options,
+)
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
@@ -23,6 +29,7 @@ def summary(output: Path, values: dict[str, Any]) -> str:
         return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
     ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
+    ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
@@ -41,12 +48,14 @@ def summary(output: Path, values: dict[str, Any]) -> str:
 )
 @overwrite_option
 @quality_options
+@importance_option
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
     image: Path,
     output: Path | None,
     overwrite: bool,
+    importance: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -66,9 +75,12 @@ def command(
 
     if output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
+    if image == importance == STANDARD:
+        raise UsageError("only one of image and mask can come from the standard input")
     data = read_input(image)
     output = output or Path(image.name).with_suffix(".svg")
-    check_output(output, image, ending=".svg", overwrite=overwrite)
+    inputs = (image,) if importance is None else (image, importance)
+    check_output(output, *inputs, ending=".svg", overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
     from warpsplat.render.backend import Backend
     from warpsplat.render.device import choose_device, start_warp
@@ -80,6 +92,7 @@ def command(
         settings,
         Backend.on(choose_device(device), threads),
         data=data,
+        importance=importance,
         verbose=verbose,
         quiet=quiet,
     )

@@ -156,11 +156,11 @@ def removal_cost(
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
     image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
     target: wp.array3d[column],  # [tile_count, 3, TILE]
-    inside: wp.array2d[column],  # [tile_count, TILE] 1 for pixels of the image
+    importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
     # Out:
     slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
 ):
-    """What the squared error would grow by if a shape alone were taken away.
+    """What the weighted squared error would grow by if a shape alone were taken away.
 
     Behind a shape lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
     squared error by 2 d . (image - target) + d . d.
@@ -197,5 +197,5 @@ def removal_cost(
             cost = cost + wp.cw_mul(d, d + green_error)
             d = wp.cw_mul(share, blue) - paint_times(paint, 2, seen)
             cost = cost + wp.cw_mul(d, d + blue_error)
-            cost = wp.cw_mul(cost, wp.cw_mul(lit, inside[tile, x]))
+            cost = wp.cw_mul(cost, wp.cw_mul(lit, importance[tile, x]))
             slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)

@@ -1,7 +1,11 @@
 from __future__ import annotations
 
+import sys
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,7 +14,7 @@ from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import ImageError, Stopped
-from warpsplat.metrics import ms_ssim, psnr, score_svg, ssim
+from warpsplat.metrics import EYES_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
 from warpsplat.scene import Kind
 from warpsplat.svg import strips
 from warpsplat.svg.inspect import inspect_svg
@@ -131,7 +135,7 @@ def test_score_in_strips_is_that_of_whole_images(monkeypatch: pytest.MonkeyPatch
     for strip, whole, tolerance in cases:
         monkeypatch.setattr(strips, "STRIP_PIXELS", strip)
         monkeypatch.setattr(strips, "WHOLE_PIXELS", whole)
-        score = score_svg(text, target)
+        score = score_svg(text, target, eyes=False)
         np.testing.assert_allclose([score.psnr, score.ssim, score.ms_ssim], want, atol=tolerance)
 
 
@@ -166,21 +170,21 @@ def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
         asked += 1
         return False
 
-    score_svg(text, target, stop=count)
+    score_svg(text, target, eyes=False, stop=count)
     assert asked > 12
     for last in range(1, asked, 5):
         left = iter(range(last))
         with pytest.raises(Stopped):
-            score_svg(text, target, stop=lambda left=left: next(left, None) is None)  # type: ignore[misc]
+            score_svg(text, target, eyes=False, stop=lambda left=left: next(left, None) is None)  # type: ignore[misc]
 
 
 def test_memory_of_a_score_is_bounded() -> None:
-    """Beside the image less than 30 bytes a pixel; drawing is not seen by ``tracemalloc``."""
+    """Beside the image less than 30 bytes a pixel without SSIMULACRA2; ``tracemalloc`` sees no drawing."""
     text = write_svg(random_scene(Kind.FILL, width=2000, height=1500))
     target = np.zeros((1500, 2000, 3), np.float32)
     tracemalloc.start()
     try:
-        score_svg(text, target)
+        score_svg(text, target, eyes=False)
         assert tracemalloc.get_traced_memory()[1] < 30 * 2000 * 1500
     finally:
         tracemalloc.stop()
@@ -189,3 +193,47 @@ def test_memory_of_a_score_is_bounded() -> None:
 def test_not_svg() -> None:
     with pytest.raises(ImageError, match="cannot be rendered"):
         render_svg("hello")
+
+
+def test_ssimulacra2_is_that_of_the_package(tmp_path: Path) -> None:
+    """Of files, as its own command takes them: the SVG drawn by resvg on white, and the image."""
+    package = pytest.importorskip("ssimulacra2")
+    shape = '<circle cx="40" cy="30" r="25" fill="#c52" fill-opacity=".7"/>'
+    text = f'<svg xmlns="http://www.w3.org/2000/svg" width="80" height="60">{shape}</svg>'
+    image = np.round(on_white(render_svg(text))).astype(np.uint8)
+    noisy = np.clip(image + np.random.default_rng(0).normal(0, 12, image.shape), 0, 255).astype(np.uint8)
+    for name, pixels in (("image", noisy), ("shown", image)):
+        Image.fromarray(pixels).save(tmp_path / f"{name}.png")
+    wanted = package.compute_ssimulacra2(str(tmp_path / "image.png"), str(tmp_path / "shown.png"))
+    score = score_svg(text, (noisy / 255).astype(np.float32))
+    assert score.ssimulacra2 == pytest.approx(wanted, abs=1e-9)
+    assert score.as_dict()["ssimulacra2"] == round(wanted, 2)
+    assert wanted < 90
+    assert ssimulacra2(image, image) == 100
+
+
+def test_ssimulacra2_has_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package of our own: it is asked for images of neither too few nor too many pixels, image first."""
+    asked: list[list[Any]] = []
+
+    def compute(*files: Any) -> float:
+        asked.append([np.asarray(Image.open(file)) for file in files])
+        return -7.123
+
+    monkeypatch.setitem(sys.modules, "ssimulacra2", SimpleNamespace(compute_ssimulacra2=compute))
+    wide = EYES_PIXELS // 8 + 1
+    for shape in ((7, 20, 3), (20, 7, 3), (8, wide, 3)):
+        assert ssimulacra2(np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)) is None
+    assert not asked
+    a, b = np.random.default_rng(0).integers(0, 256, (2, 8, 9, 3), np.uint8)
+    assert ssimulacra2(a, b) == -7.123
+    np.testing.assert_array_equal(asked[0], [a, b])
+
+
+def test_without_the_package_ssimulacra2_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ssimulacra2", None)  # makes importing it fail
+    text = write_svg(random_scene(Kind.FILL, count=5))
+    score = score_svg(text, (on_white(render_svg(text)) / 255).astype(np.float32))
+    assert score.ssimulacra2 is None
+    assert score.as_dict()["ssimulacra2"] is None
+    assert score.psnr > 60

@@ -6,6 +6,7 @@ All figures are taken in 8-bit sRGB from a render by resvg, an independent rende
 from __future__ import annotations
 
 import gzip
+import io
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from warpsplat.svg.inspect import inspect_svg
 from warpsplat.svg.strips import Bytes, Stop, check, draw, rows_of
@@ -28,6 +30,12 @@ MIDDLE = np.float32(128)
 
 MS_SSIM_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Of the five scales (Wang et al. 2003, section 3.2)."""
+
+EYES_LEAST = 8
+"""Smallest side of an image that SSIMULACRA2 is defined for [px]."""
+
+EYES_PIXELS = 4_000_000
+"""Largest image that it is measured for [pixels]: its package takes 500 bytes and 3 microseconds a pixel."""
 
 
 def psnr(a: Floats, b: Floats) -> float:
@@ -128,6 +136,31 @@ def _similarity_sums(a: Floats, b: Floats) -> tuple[float, float]:
     return float((luminance * contrast).sum(dtype=np.float64)), float(contrast.sum(dtype=np.float64))
 
 
+def ssimulacra2(a: Bytes, b: Bytes) -> float | None:
+    """SSIMULACRA2 (Sneyers, Cloudinary 2022) of ``b`` against ``a``, 8-bit sRGB of shape (height, width, 3).
+
+    100 for equal images, 90 where no eye sees a difference, 50 for one that is plain to see, below 0 for a
+    caricature. None where its package (the extra ``eyes``) is not installed, or the image is too small or
+    large.
+    """
+    height, width = a.shape[:2]
+    if min(height, width) < EYES_LEAST or height * width > EYES_PIXELS:
+        return None
+    try:
+        from ssimulacra2 import compute_ssimulacra2  # takes half a second
+    except ImportError:
+        return None
+    return float(compute_ssimulacra2(_as_file(a), _as_file(b)))
+
+
+def _as_file(pixels: Bytes) -> io.BytesIO:
+    """8-bit sRGB as what Pillow opens."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "PPM")
+    file.seek(0)
+    return file
+
+
 @dataclass(frozen=True)
 class Score:
     """Figures of one file against its image."""
@@ -136,6 +169,8 @@ class Score:
     """[dB]"""
     ssim: float | None
     ms_ssim: float | None
+    ssimulacra2: float | None
+    """None where it was not measured."""
     paths: int
     nodes: int
     """Points that the paths pass through, with those of basic shapes counted as one each."""
@@ -148,6 +183,7 @@ class Score:
         values["psnr"] = round(self.psnr, 3) if np.isfinite(self.psnr) else None
         for name in ("ssim", "ms_ssim"):
             values[name] = None if values[name] is None else round(values[name], 4)
+        values["ssimulacra2"] = None if self.ssimulacra2 is None else round(self.ssimulacra2, 2)
         return values
 
 
@@ -156,16 +192,18 @@ def score_svg(
     target: npt.NDArray[np.floating],
     *,
     own: bool = False,
+    eyes: bool = True,
     stop: Callable[[], bool] | None = None,
 ) -> Score:
     """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare.
 
-    Besides ``target`` this takes about 15 bytes a pixel.
+    Besides ``target`` this takes about 15 bytes a pixel, with SSIMULACRA2 500.
 
     Args:
         text: the SVG.
         target: the image.
         own: this program wrote the text just now: it is drawn without precautions.
+        eyes: measure SSIMULACRA2 where that can be done.
         stop: asked every few tenths of a second; once true, the work is given up.
 
     Raises:
@@ -175,12 +213,15 @@ def score_svg(
     height, width = target.shape[:2]
     shown = draw(text, width, height, stop, own=own)
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target), stop)
+    check(stop)
+    seen = ssimulacra2(*_in_8_bits(shown, target)) if eyes else None
     data = text.encode()
     facts = inspect_svg(text)
     return Score(
         psnr=fidelity,
         ssim=single,
         ms_ssim=multiple,
+        ssimulacra2=seen,
         paths=facts.paths,
         nodes=facts.nodes,
         bytes=len(data),
@@ -198,3 +239,11 @@ def _shown_and_wanted(shown: Bytes, target: Floats) -> Iterator[tuple[Floats, Fl
             a[rows] = shown[rows, :, channel] * alpha + np.float32(255) * (1 - alpha)
             b[rows] = np.round(target[rows, :, channel] * np.float32(255))
         yield a, b
+
+
+def _in_8_bits(shown: Bytes, target: Floats) -> tuple[Bytes, Bytes]:
+    """``target`` and ``shown`` on white, of shape (height, width, 3)."""
+    a, b = np.empty(target.shape, np.uint8), np.empty(target.shape, np.uint8)
+    for channel, (flat, wanted) in enumerate(_shown_and_wanted(shown, target)):
+        a[..., channel], b[..., channel] = wanted, np.round(flat)
+    return a, b

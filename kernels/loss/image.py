@@ -1,4 +1,4 @@
-"""Losses of the image with their gradients: L2 and SSIM."""
+"""Loss of the image with its gradient: squared error and SSIM."""
 
 import warp as wp
 
@@ -13,134 +13,153 @@ C1 = wp.constant(0.01 * 0.01)
 C2 = wp.constant(0.03 * 0.03)
 
 
+@wp.func
+def rows_between(y0: wp.int32, y1: wp.int32) -> column:
+    """1 in the rows from ``y0`` to ``y1``, 0 in the others."""
+    rows = column(0.0)
+    y = int(0)
+    while y < TILE:  # a range of constants would be unrolled, and take seconds to compile
+        rows[y] = wp.where(y >= y0, 1.0, 0.0) * wp.where(y < y1, 1.0, 0.0)
+        y += 1
+    return rows
+
+
 @wp.kernel
-def l2_loss(
+def image_loss(
     # In:
     offset: wp.int32,
-    lane_columns: wp.int32,
     image: wp.array3d[column],  # [tile_count, 3, TILE]
     target: wp.array3d[column],  # [tile_count, 3, TILE]
-    inside: wp.array2d[column],  # [tile_count, TILE] 1 for pixels of the image
+    importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
+    weighted: wp.int32,  # whether that is anything but 1 in the image; if not, it is not read
+    width: wp.int32,  # [px]
+    height: wp.int32,  # [px]
+    tiles_x: wp.int32,
+    clock: wp.array[wp.int32],  # [1] steps so far
+    similarity_weight: wp.float32,
     value_count: wp.int32,  # pixels x channels
     # Out:
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
-    loss: wp.array2d[wp.float32],  # [tile_count, lanes] sums of squares
+    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted
+    similarity: wp.array2d[
+        wp.float32
+    ],  # [tile_count, 3] sums over windows of SSIM x weight; 0 without weight
 ):
-    """Mean squared error over pixels and channels (paper eq. 12, first term) and its gradient."""
-    i, lane = wp.tid()
-    tile = offset + i
-    factor = 2.0 / float(value_count)
-    squares = column(0.0)
-    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        for channel in range(3):
-            difference = wp.cw_mul(inside[tile, x], image[tile, channel, x] - target[tile, channel, x])
-            image_grad[tile, channel, x] = factor * difference
-            squares = squares + wp.cw_mul(difference, difference)
-    loss[tile, lane] = total(squares)
+    """Mean over pixels and channels of w e^2 (paper eq. 12, first term), and ``similarity_weight`` x the mean
+    of w (1 - SSIM); w is the ``importance``, e the error. One thread a tile and channel.
 
-
-@wp.func
-def window_end(start: wp.int32, shift: wp.int32) -> wp.int32:
-    """End of the window that starts at ``start``: their grid is shifted, and cut where the tile ends."""
-    return wp.min((start + shift) / WINDOW * WINDOW + WINDOW - shift, TILE)
-
-
-@wp.func
-def ssim_slopes(
-    n: wp.float32, x: wp.float32, y: wp.float32, xx: wp.float32, yy: wp.float32, xy: wp.float32
-) -> wp.vec4:
-    """SSIM of a window with ``n`` pixels from its sums (Wang et al. 2004, eq. 13), and its gradient by the
-    first image: constant, factor of x, factor of y.
-    """
-    mx = x / n
-    my = y / n
-    a1 = 2.0 * mx * my + C1
-    a2 = 2.0 * (xy / n - mx * my) + C2
-    b1 = mx * mx + my * my + C1
-    b2 = xx / n - mx * mx + yy / n - my * my + C2
-    s = a1 * a2 / (b1 * b2)
-    slope_x = -2.0 * s / b2
-    slope_y = 2.0 * a1 / (b1 * b2)
-    constant = 2.0 * (my * a2 / b2 - mx * s) / b1 - slope_x * mx - slope_y * my
-    return wp.vec4(s, constant, slope_x, slope_y)
-
-
-@wp.kernel
-def ssim_backward(
-    # In:
-    offset: wp.int32,
-    image: wp.array3d[column],  # [tile_count, 3, TILE]
-    target: wp.array3d[column],  # [tile_count, 3, TILE]
-    inside: wp.array2d[column],  # [tile_count, TILE] 1 for pixels of the image
-    clock: wp.array[wp.int32],  # [1] steps so far
-    weight: wp.float32,
-    value_count: wp.int32,  # pixels x channels
-    # Out:
-    image_grad: wp.array3d[column],  # [tile_count, 3, TILE] added to
-    similarity: wp.array2d[wp.float32],  # [tile_count, 3] sum over windows of SSIM x pixels
-):
-    """``weight`` x (1 - SSIM) with windows of 8x8 px that do not overlap.
-
-    Within such a window the gradient is a + b x + c y, x and y the pixel's values: a window costs no more
-    than its sums. The windows lie inside a tile and move by half their size from step to step, so that no
-    grid is left in the image. One thread a tile and channel.
+    SSIM (Wang et al. 2004, eq. 13) is that of windows of 8x8 px that do not overlap; of a window, w is the
+    sum over its pixels. Within one the gradient is a + b u + c v, u and v the values of a pixel in image and
+    target: it costs no more than the window's sums. The windows lie inside a tile and move by half their size
+    from step to step, so that no grid is left in the image: a tile has up to three from left to right, and
+    three from top to bottom. What belongs to one of the latter lies in each of its rows, so that all but the
+    sums over them is arithmetic with columns.
     """
     i, channel = wp.tid()
     tile = offset + i
+    columns = wp.min(width - tile % tiles_x * TILE, TILE)
+    rows = wp.min(height - tile / tiles_x * TILE, TILE)
     phase = clock[0] % 4
     shift_x = (phase % 2) * (WINDOW / 2)
     shift_y = (phase / 2) * (WINDOW / 2)
-    factor = weight / float(value_count)
-    sum_all = float(0.0)
+    border1 = wp.min(WINDOW - shift_y, rows)
+    border2 = wp.min(2 * WINDOW - shift_y, rows)
+    first = rows_between(0, border1)
+    second = rows_between(border1, border2)
+    third = rows_between(border2, rows)
+    heights = float(border1) * first + float(border2 - border1) * second + float(rows - border2) * third
+    inside = rows_between(0, rows)
+    zero = column(0.0)
+    one = column(1.0)
+    c1 = column(C1)
+    c2 = column(C2)
+    factor = 2.0 / float(value_count)
+    share = 2.0 * similarity_weight / float(value_count)
+    squares = column(0.0)
+    similar = column(0.0)
     x0 = int(0)
-    while x0 < TILE:
-        x1 = window_end(x0, shift_x)
-        n = column(0.0)
-        sx = column(0.0)
-        sy = column(0.0)
-        sxx = column(0.0)
-        syy = column(0.0)
-        sxy = column(0.0)
-        for x in range(x0, x1):
-            mask = inside[tile, x]
-            u = wp.cw_mul(mask, image[tile, channel, x])
-            v = wp.cw_mul(mask, target[tile, channel, x])
-            n = n + mask
-            sx = sx + u
-            sy = sy + v
-            sxx = sxx + wp.cw_mul(u, u)
-            syy = syy + wp.cw_mul(v, v)
-            sxy = sxy + wp.cw_mul(u, v)
+    while x0 < columns:
+        x1 = wp.min((x0 + shift_x) / WINDOW * WINDOW + WINDOW - shift_x, columns)
         a = column(0.0)
         b = column(0.0)
         c = column(0.0)
-        y0 = int(0)
-        while y0 < TILE:
-            y1 = window_end(y0, shift_y)
-            count = float(0.0)
-            mx = float(0.0)
-            my = float(0.0)
-            xx = float(0.0)
-            yy = float(0.0)
-            xy = float(0.0)
-            for y in range(y0, y1):
-                count += n[y]
-                mx += sx[y]
-                my += sy[y]
-                xx += sxx[y]
-                yy += syy[y]
-                xy += sxy[y]
-            if count > 0.0:
-                slopes = ssim_slopes(count, mx, my, xx, yy, xy)
-                sum_all += slopes[0] * count
+        if similarity_weight > 0.0:
+            sum_u = column(0.0)
+            sum_v = column(0.0)
+            sum_squares = column(0.0)
+            sum_uv = column(0.0)
+            weight = float(x1 - x0) * inside
+            for x in range(x0, x1):
+                u = image[tile, channel, x]
+                v = target[tile, channel, x]
+                sum_u = sum_u + u
+                sum_v = sum_v + v
+                sum_squares = sum_squares + (wp.cw_mul(u, u) + wp.cw_mul(v, v))
+                sum_uv = sum_uv + wp.cw_mul(u, v)
+            if weighted != 0:
+                weight = zero
+                for x in range(x0, x1):
+                    weight = weight + importance[tile, x]
+            mean_u = column(0.0)
+            mean_v = column(0.0)
+            squared = column(0.0)
+            product = column(0.0)
+            total_weight = column(0.0)
+            y0 = int(0)
+            y1 = border1
+            window = first
+            for k in range(3):
+                window_u = float(0.0)
+                window_v = float(0.0)
+                window_squares = float(0.0)
+                window_uv = float(0.0)
+                window_weight = float(0.0)
                 for y in range(y0, y1):
-                    a[y] = factor * slopes[1]
-                    b[y] = factor * slopes[2]
-                    c[y] = factor * slopes[3]
-            y0 = y1
+                    window_u += sum_u[y]
+                    window_v += sum_v[y]
+                    window_squares += sum_squares[y]
+                    window_uv += sum_uv[y]
+                    window_weight += weight[y]
+                mean_u = mean_u + window_u * window
+                mean_v = mean_v + window_v * window
+                squared = squared + window_squares * window
+                product = product + window_uv * window
+                total_weight = total_weight + window_weight * window
+                y0 = y1
+                y1 = border2
+                window = second
+                if k == 1:
+                    y1 = rows
+                    window = third
+            inverse = wp.cw_div(one, wp.max(float(x1 - x0) * heights, one))
+            mean_u = wp.cw_mul(inverse, mean_u)
+            mean_v = wp.cw_mul(inverse, mean_v)
+            means = wp.cw_mul(mean_u, mean_v)
+            squared_means = wp.cw_mul(mean_u, mean_u) + wp.cw_mul(mean_v, mean_v)
+            a1 = 2.0 * means + c1
+            a2 = 2.0 * (wp.cw_mul(inverse, product) - means) + c2
+            b1 = wp.cw_div(one, squared_means + c1)
+            b2 = wp.cw_div(one, wp.cw_mul(inverse, squared) - squared_means + c2)
+            b12 = wp.cw_mul(b1, b2)
+            s = wp.cw_mul(wp.cw_mul(a1, a2), b12)
+            similar = similar + wp.cw_mul(weight, s)
+            shares = share * wp.cw_mul(inverse, total_weight)
+            b = wp.cw_mul(shares, wp.cw_mul(s, b2))
+            c = wp.cw_mul(shares, wp.cw_mul(a1, b12))
+            a = wp.cw_mul(mean_v, wp.cw_mul(a2, b2)) - wp.cw_mul(mean_u, s)
+            a = wp.cw_mul(wp.cw_mul(shares, b1), a) + wp.cw_mul(b, mean_u) - wp.cw_mul(c, mean_v)
         for x in range(x0, x1):
-            gradient = a + wp.cw_mul(b, image[tile, channel, x]) + wp.cw_mul(c, target[tile, channel, x])
-            gradient = wp.cw_mul(inside[tile, x], gradient)
-            image_grad[tile, channel, x] = image_grad[tile, channel, x] - gradient
+            u = image[tile, channel, x]
+            v = target[tile, channel, x]
+            e = u - v
+            squares = squares + wp.cw_mul(e, e)
+            e_grad = factor * e
+            if weighted != 0:
+                e_grad = wp.cw_mul(importance[tile, x], e_grad)
+            s_grad = a - wp.cw_mul(b, u) + wp.cw_mul(c, v)
+            image_grad[tile, channel, x] = wp.cw_mul(inside, e_grad - s_grad)
         x0 = x1
-    similarity[tile, channel] = sum_all
+    for x in range(columns, TILE):
+        image_grad[tile, channel, x] = zero
+    loss[tile, channel] = total(wp.cw_mul(inside, squares))
+    similarity[tile, channel] = total(wp.cw_mul(inside, similar))

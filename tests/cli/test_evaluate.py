@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -24,3 +26,31 @@ def test_eval(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     for bad in (image, tmp_path / "none.svg"):
         assert run("eval", image, bad) == 3
         assert bad.name in one_line(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_ssimulacra2_where_it_is_installed(
+    image: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    installed: bool,
+) -> None:
+    """In every report; without its package nothing else changes."""
+    package = SimpleNamespace(compute_ssimulacra2=lambda a, b: 61.256) if installed else None
+    monkeypatch.setitem(sys.modules, "ssimulacra2", package)
+    figure, shown = (61.26, ", SSIMULACRA2 61.3") if installed else (None, "")
+    first, second = tmp_path / "a.svg", tmp_path / "b.svg"
+    runs = (
+        ("vectorize", image, "-o", first, *QUICK),
+        ("refine", first, image, "-o", second, "--iterations", "3", "--device", "cpu"),
+    )
+    for arguments in runs:
+        assert run(*arguments) == 0
+        line = one_line(capsys.readouterr().out)
+        assert ("SSIMULACRA2" in line) == installed
+        assert shown in line
+        assert run(*arguments, "--json") == 0
+        assert json.loads(capsys.readouterr().out)["ssimulacra2"] == figure
+    assert run("eval", image, first) == 0
+    assert f"ssimulacra2 {figure if installed else '-'}\n" in capsys.readouterr().out

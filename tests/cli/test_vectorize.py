@@ -34,7 +34,9 @@ def test_summary_and_default_output(
     assert run("vectorize", image, *QUICK) == 0
     assert (tmp_path / "photo.svg").exists()
     captured = capsys.readouterr()
-    assert re.fullmatch(r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}, 8 paths, .* s\n", captured.out)
+    assert re.fullmatch(
+        r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}(, SSIMULACRA2 -?[\d.]+)?, 8 paths, .* s\n", captured.out
+    )
     assert captured.err == "", "no progress bar where stderr is no terminal"
 
 
@@ -117,3 +119,29 @@ def test_a_limit_of_file_size_is_a_failure_to_write(image: Path) -> None:
     assert done.returncode == 4
     assert b"File too large" in done.stderr
     assert done.stderr.count(b"\n") == 1
+
+
+def test_importance(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = {}
+    for name, mask in (("plain", None), ("white", "white"), ("black", "black")):
+        output = tmp_path / f"{name}.svg"
+        given = []
+        if mask:
+            Image.new("L", (30, 20), mask).save(tmp_path / "mask.png")
+            given = ["--importance", tmp_path / "mask.png"]
+        assert run("vectorize", image, "-o", output, "-q", *QUICK, *given) == 0
+        files[name] = output.read_text().split("</metadata>")[1]
+    assert files["plain"] == files["white"] == files["black"], "one grey weighs nothing more"
+    half = Image.new("L", (30, 20), "white")
+    half.paste("black", (0, 0, 15, 20))
+    half.save(tmp_path / "mask.png")
+    output = tmp_path / "half.svg"
+    assert run("vectorize", image, "-o", output, "-q", *QUICK, "--importance", tmp_path / "mask.png") == 0
+    assert output.read_text().split("</metadata>")[1] != files["plain"]
+    half.resize((20, 30)).save(tmp_path / "mask.png")
+    assert run("vectorize", image, "-o", output, "-q", *QUICK, "--importance", tmp_path / "mask.png") == 3
+    assert "mask.png: 20x30 pixels; a mask must have the proportions of its 60x40 image" in one_line(
+        capsys.readouterr().err
+    )
+    assert run("vectorize", "-", "-o", output, "--importance", "-") == 2
+    assert "image and mask" in one_line(capsys.readouterr().err)

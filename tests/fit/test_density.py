@@ -6,20 +6,16 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.fit.pictures import empty_scene
 from tests.scenes import mixed_scene, random_scene, with_points
 from warpsplat.fit import density
 from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
-from warpsplat.fit.place import canvas_for, circle_outlines
-from warpsplat.fit.settings import Density, Settings, make_settings
+from warpsplat.fit.place import circle_outlines
+from warpsplat.fit.settings import Density, make_settings
 from warpsplat.scene import FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas, bounds
 
 DENSITY = Density()
-
-
-def empty_scene(settings: Settings, target: FloatArray) -> Scene:
-    points = np.zeros((0, 6 * settings.chain_cubics, 2), np.float32)
-    return Scene.uniform(Kind.FILL, canvas_for(target), points)
 
 
 def circles(centres: list[tuple[float, float]], radii: list[float]) -> Scene:

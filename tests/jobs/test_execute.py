@@ -103,3 +103,38 @@ def test_a_line_break_in_a_name_breaks_no_line(folder: Path, capsys: pytest.Capt
         "failed:",
         f"  {folder}/in/\\nx.png: no such file",
     ]
+
+
+def test_another_mask_makes_another_result(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By its content; one that is missing or of other proportions is the failure of its image."""
+    (folder / "masks").mkdir()
+    mask = folder / "masks" / "face.png"
+    Image.new("L", (64, 48), "white").save(mask)
+    text = "jobs: [{images: in/a.png, curves: 4, iterations: 6, device: cpu, importance: masks/face.png}]"
+    path = write(folder, text)
+    for made in (1, 0):
+        assert run("batch", path, "--json") == 0
+        assert json.loads(capsys.readouterr().out)["made"] == made
+    assert load_jobs(write(folder, text.replace(", importance: masks/face.png", "")))[0].output.exists()
+    assert run("batch", folder / "jobs.yaml", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 1, "without it"
+    write(folder, text)
+    half = Image.new("L", (64, 48), "white")
+    half.paste("black", (0, 0, 32, 48))
+    half.save(mask)
+    assert run("batch", path, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 1
+    for break_it, cause in (
+        (lambda: half.resize((48, 48)).save(mask), "48x48 pixels"),
+        (mask.unlink, "no such file"),
+    ):
+        break_it()
+        assert run("batch", path) == 5
+        message = capsys.readouterr().err
+        assert f"{folder / 'in' / 'a.png'}: {mask}: {cause}" in message
+
+
+def test_a_mask_is_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, "jobs:\n  - images: in/a.png\n    importance: 3\n")
+    assert run("batch", path) == 2
+    assert f"{path}:3: importance: must be text, not 3" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from tests.fit.pictures import picture
 from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
-from warpsplat.jobs.vectorize import vectorize
+from warpsplat.jobs.vectorize import has_time_for_eyes, vectorize
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Kind
 
@@ -112,6 +112,13 @@ def test_time_budget_sizes_the_run(device: str) -> None:
     assert result.iterations > 20
     assert result.seconds < 2.5, "a step past the deadline at the most"
     assert not result.stopped
+
+
+def test_eyes_have_to_wait_in_large_images_and_short_times() -> None:
+    small, large = np.zeros((1000, 1000, 3), np.float32), np.zeros((1000, 1001, 3), np.float32)
+    assert has_time_for_eyes(make_settings(), small)
+    assert not has_time_for_eyes(make_settings(), large)
+    assert not has_time_for_eyes(make_settings(time_budget="2m"), small)
 
 
 def test_target_psnr_ends_the_run(device: str) -> None:

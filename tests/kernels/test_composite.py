@@ -69,13 +69,20 @@ SCENES = {
 }
 
 
+@pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
-def test_removal_costs_match_brute_force(device: str, scene: Scene) -> None:
-    size = (scene.canvas.height, scene.canvas.width, 3)
-    target = np.random.default_rng(0).uniform(size=size).astype(np.float32)
+def test_removal_costs_match_brute_force(device: str, scene: Scene, weighted: bool) -> None:
+    size = (scene.canvas.height, scene.canvas.width)
+    rng = np.random.default_rng(0)
+    target = rng.uniform(size=(*size, 3)).astype(np.float32)
+    weights = (
+        rng.uniform(0, 2, (*size, 1)).astype(np.float32) if weighted else np.ones((*size, 1), np.float32)
+    )
     backend = Backend.on(device)
-    got = renderer_for(scene, device).removal_costs(wp.array(to_tiles(target), dtype=column, device=device))
-    whole = np.mean((render(scene, backend=backend) - target) ** 2)
+    aim = wp.array(to_tiles(target), dtype=column, device=device)
+    importance = wp.array(to_tiles(weights)[:, 0], dtype=column, device=device) if weighted else None
+    got = renderer_for(scene, device).removal_costs(aim, importance)
+    whole = np.mean(weights * (render(scene, backend=backend) - target) ** 2)
     for i in range(len(scene)):
         without = render(scene.take(np.delete(np.arange(len(scene)), i)), backend=backend)
-        assert got[i] == pytest.approx(np.mean((without - target) ** 2) - whole, abs=1e-6)
+        assert got[i] == pytest.approx(np.mean(weights * (without - target) ** 2) - whole, abs=1e-6)

@@ -39,12 +39,13 @@ LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 """What Pillow makes of a sample 1 in PNGs of fewer than 8 bits; their transparent grey it leaves as it is."""
 
 
-def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
+def load_image(source: Path | bytes, name: str | None = None, *, paper: float = 1.0) -> FloatArray:
     """Read an image: first frame, EXIF rotation applied, transparency composited on white.
 
     Args:
         source: a file, ``-`` for the standard input, or the bytes of an image.
         name: what messages call it; without, the path.
+        paper: grey level that transparency is composited on.
 
     Returns:
         sRGB in [0, 1], shape (height, width, 3), float32. Grey images of 16 bits keep their precision.
@@ -75,7 +76,7 @@ def load_image(source: Path | bytes, name: str | None = None) -> FloatArray:
                 opened.load()
                 _mend_transparency(opened, rawmode, source)
                 ImageOps.exif_transpose(opened, in_place=True)
-                return to_srgb(opened)
+                return to_srgb(opened, paper)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except MemoryError:
@@ -145,14 +146,14 @@ def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
         yield slice(top, bottom), image.crop((0, top, width, bottom))
 
 
-def to_srgb(image: Image.Image) -> FloatArray:
-    """A loaded Pillow image of any mode as sRGB in [0, 1] on white, shape (height, width, 3).
+def to_srgb(image: Image.Image, paper: float = 1.0) -> FloatArray:
+    """A loaded Pillow image of any mode as sRGB in [0, 1] on ``paper``, shape (height, width, 3).
 
     Raises:
         ImageError: pixels that are no numbers.
     """
     if image.mode == "F" or image.mode.startswith("I"):
-        return _grey_to_srgb(image)
+        return _grey_to_srgb(image, paper)
     transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
     out = np.empty((image.height, image.width, 3), np.float32)
     for rows, part in _strips(image):
@@ -161,11 +162,11 @@ def to_srgb(image: Image.Image) -> FloatArray:
             continue
         rgba = np.asarray(part.convert("RGBA"), np.float32) / np.float32(255)
         alpha = rgba[..., 3:]
-        out[rows] = rgba[..., :3] * alpha + (1 - alpha)
+        out[rows] = rgba[..., :3] * alpha + np.float32(paper) * (1 - alpha)
     return out
 
 
-def _grey_to_srgb(image: Image.Image) -> FloatArray:
+def _grey_to_srgb(image: Image.Image, paper: float) -> FloatArray:
     """One channel of 16 or 32 bits, integers or floats."""
     top = _white(image)
     transparent = image.info.get("transparency")
@@ -174,7 +175,7 @@ def _grey_to_srgb(image: Image.Image) -> FloatArray:
         samples = np.asarray(part)
         grey = np.clip(samples.astype(np.float32) / np.float32(top), 0, 1)
         if isinstance(transparent, int):
-            grey[samples == transparent] = 1
+            grey[samples == transparent] = paper
         out[rows] = grey[..., None]
     return out
 

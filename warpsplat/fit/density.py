@@ -113,15 +113,18 @@ def densify(
     image: FloatArray,
     count: int,
     rng: np.random.Generator,
+    weights: FloatArray | None = None,
 ) -> Scene:
     """``count`` new shapes on the components of the quantised error map, the largest error first.
 
-    ``target`` and ``image`` are (height, width, 3) at any one size; the result is in canvas units.
+    ``target`` and ``image`` are (height, width, 3) at any one size, ``weights`` of their pixels (height,
+    width), without all 1; the result is in canvas units.
     """
     unit = scene.canvas.width / target.shape[1]
     squares = (image - target) ** 2
     # The same bits as a sum along the last axis, which takes many times as long.
-    error = cv2.GaussianBlur(squares[..., 0] + squares[..., 1] + squares[..., 2], (0, 0), 1.0)
+    total = squares[..., 0] + squares[..., 1] + squares[..., 2]
+    error = cv2.GaussianBlur(total if weights is None else weights * total, (0, 0), 1.0)
     centres, radii, masses = _candidates(error)
     chosen: list[int] = []
     taken = np.zeros(error.shape, np.uint8)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.fit.budget import Budget
+from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_stage, stage_at
 from warpsplat.fit.schedule import CHECK_INTERVAL, LOOK_INTERVAL, phase_at, phases, shapes_at, work_done
@@ -64,6 +65,7 @@ def fit(
     backend: Backend,
     *,
     scene: Scene | None = None,
+    importance: FloatArray | None = None,
     seconds: float | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -75,6 +77,7 @@ def fit(
         settings: all that decides the result.
         backend: where to compute.
         scene: shapes to start from, whose number stays; without, new ones.
+        importance: how much the error of a pixel counts: grey mask in [0, 1], of any size.
         seconds: time that the run should take, in place of the settings' iterations.
         report: called every few steps.
         stop: asked after every step; once true, the run ends. So does reaching ``target_psnr``.
@@ -88,6 +91,7 @@ def fit(
         settings = budget.measure(state, settings, image)
     started = time.monotonic()
     plan = phases(settings, image.shape[1], image.shape[0])
+    weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
     step: Step | None = None
     phase = None
     interrupted = False
@@ -96,7 +100,7 @@ def fit(
         entered = phase_at(settings, plan, state.step)
         if step is None or entered is not phase:
             phase = entered
-            step = Step(state, settings, Target(image, phase))
+            step = Step(state, settings, Target(image, phase, weights))
         step.advance()
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:

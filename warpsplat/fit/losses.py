@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from warpsplat.fit.settings import Settings
@@ -23,22 +24,36 @@ from warpsplat.scene import FloatArray
 
 @dataclass
 class LossBuffers:
-    """Sums that the losses leave, by tile."""
+    """Sums that the losses leave, by tile and channel."""
 
-    loss: wp.array = buffer(wp.float32, "tiles", "lanes")
-    """Squared errors."""
+    loss: wp.array = buffer(wp.float32, "tiles", 3)
+    """Squared errors, each of the same weight."""
     similarity: wp.array = buffer(wp.float32, "tiles", 3)
-    """SSIM x pixels, by channel."""
+    """SSIM x weight."""
 
 
 class Aim:
     """What the image is compared with, and how far it is from that."""
 
-    def __init__(self, target: FloatArray, backend: Backend, viewport: Viewport) -> None:
-        """``target``: sRGB in [0, 1], shape (height, width, 3), of the viewport's size."""
+    def __init__(
+        self, target: FloatArray, backend: Backend, viewport: Viewport, importance: FloatArray | None = None
+    ) -> None:
+        """What a step is to come near to.
+
+        Args:
+            target: sRGB in [0, 1], shape (height, width, 3), of the viewport's size.
+            backend: where to compute.
+            viewport: of the render.
+            importance: how much the error of a pixel counts, shape (height, width), mean 1; without, all do
+                alike.
+        """
         self.target: wp.array = wp.array(to_tiles(target), dtype=column, device=backend.device)
-        sizes = {"tiles": viewport.tile_count, "lanes": backend.lanes}
-        self.buffers = backend.allocate(LossBuffers, sizes)
+        self.weighted = importance is not None
+        weights = np.ones(target.shape[:2], np.float32) if importance is None else importance
+        self.importance: wp.array = wp.array(
+            to_tiles(weights[..., None])[:, 0], dtype=column, device=backend.device
+        )
+        self.buffers = backend.allocate(LossBuffers, {"tiles": viewport.tile_count})
         self.value_count = 3 * viewport.pixel_count
 
     def at(self, target: FloatArray) -> None:
@@ -46,7 +61,7 @@ class Aim:
         self.target.assign(to_tiles(target))
 
     def mean_square(self) -> float:
-        """Mean squared error of the last step. Reads a number a tile back from the device."""
+        """Mean squared error of the last step, unweighted. Reads a number a tile back from the device."""
         return float(self.buffers.loss.numpy().sum(dtype="float64")) / self.value_count
 
 
@@ -61,33 +76,23 @@ class LossInputs:
     """Steps done, on the device, shape (1,)."""
 
 
-def record_l2(program: Program, inputs: LossInputs) -> None:
-    """Mean squared error (paper eq. 12, first term); the first loss, which writes the gradient."""
-    backend = inputs.renderer.backend
+def record_error(program: Program, inputs: LossInputs) -> None:
+    """Mean squared error (paper eq. 12, first term), and as the settings weigh it 1 - SSIM of small windows.
+
+    The first loss, which writes the gradient; both in one, since what they wait for is memory.
+    """
+    viewport = inputs.renderer.viewport
     program.launch(
-        image.l2_loss,
-        (inputs.renderer.viewport.tile_count, backend.lanes),
+        image.image_loss,
+        (viewport.tile_count, 3),
         inputs.renderer.film.buffers,
         inputs.aim,
         inputs.aim.buffers,
-        lane_columns=backend.lane_size,
+        viewport,
+        clock=inputs.clock,
+        similarity_weight=inputs.settings.ssim,
         split=True,
     )
-
-
-def record_ssim(program: Program, inputs: LossInputs) -> None:
-    """1 - SSIM of small windows, where the settings weigh it."""
-    if inputs.settings.ssim > 0:
-        program.launch(
-            image.ssim_backward,
-            (inputs.renderer.viewport.tile_count, 3),
-            inputs.renderer.film.buffers,
-            inputs.aim,
-            inputs.aim.buffers,
-            clock=inputs.clock,
-            weight=inputs.settings.ssim,
-            split=True,
-        )
 
 
 def record_xing(program: Program, parameters: Parameters, settings: Settings) -> None:
@@ -115,5 +120,5 @@ def record_bending(program: Program, parameters: Parameters, settings: Settings)
         )
 
 
-IMAGE_LOSSES: tuple[Callable[[Program, LossInputs], None], ...] = (record_l2, record_ssim)
+IMAGE_LOSSES: tuple[Callable[[Program, LossInputs], None], ...] = (record_error,)
 SHAPE_LOSSES: tuple[Callable[[Program, Parameters, Settings], None], ...] = (record_xing, record_bending)

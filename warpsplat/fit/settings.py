@@ -82,6 +82,8 @@ class Settings:
     """Newest in front, or smallest in front as in the paper."""
     ssim: float = 0.005
     """Weight of 1 - SSIM beside the mean squared error."""
+    texture: float = 0.0
+    """Power of the local variance by which the error of a pixel counts less: what is busy hides errors."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
     bending: float = 5e-4

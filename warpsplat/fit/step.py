@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from warpsplat.fit import losses
+from warpsplat.fit.importance import weights_at
 from warpsplat.fit.losses import Aim, LossInputs
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.schedule import Phase, fold_weight
@@ -24,14 +25,22 @@ from warpsplat.scene import FloatArray
 
 
 class Target:
-    """The image at the size of a phase."""
+    """The image at the size of a phase, and what the error of its pixels counts."""
 
-    def __init__(self, image: FloatArray, phase: Phase) -> None:
-        """``image``: sRGB in [0, 1], shape (height, width, 3); reduced by area to the phase's size."""
+    def __init__(self, image: FloatArray, phase: Phase, weights: FloatArray | None = None) -> None:
+        """Both are reduced by area to the phase's size.
+
+        Args:
+            image: sRGB in [0, 1], shape (height, width, 3).
+            phase: the size.
+            weights: of the pixels, shape (height, width) of any size and scale; without, all count alike.
+        """
         height, width = image.shape[:2]
         size = (phase.width, phase.height)
         reduced = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
         self.image = np.ascontiguousarray(reduced, np.float32)
+        self.weights = None if weights is None else weights_at(weights, *size)
+        """Shape (height, width), mean 1."""
         self.viewport = Viewport(*size, phase.width / width)
         self.slack = phase.slack
 
@@ -66,7 +75,7 @@ class Step:
             model=model_for(settings, state.step, target.slack),
             capacity=capacity,
         )
-        self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport)
+        self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport, target.weights)
         if capacity is None:
             self.renderer.forward_complete()
         self.record()

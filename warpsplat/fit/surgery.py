@@ -21,7 +21,7 @@ def operate(step: Step, *, grows: bool) -> Step:
     step.renderer.forward_complete()
     scene = state.scene()
     doomed = prune_mask(scene, settings.density, state.step / settings.iterations)
-    seen = step.renderer.removal_costs(step.aim.target)
+    seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
     wanted = shapes_at(settings, state.step) if grows else len(scene)
     replaced = 0 if wanted < len(scene) else round(settings.density.replace * len(scene))
     gone = least_seen(doomed, max(replaced, len(scene) - wanted), seen)
@@ -29,7 +29,8 @@ def operate(step: Step, *, grows: bool) -> Step:
     added = scene.take(np.arange(0))
     if wanted > len(keep):
         image = step.renderer.read_image()
-        added = densify(settings, scene, step.target.image, image, wanted - len(keep), state.rng)
+        weights = step.target.weights
+        added = densify(settings, scene, step.target.image, image, wanted - len(keep), state.rng, weights)
     state.parameters.rearrange(keep, added)
     if grows:
         _thin_outlines(step, seen[keep])

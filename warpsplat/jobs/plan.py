@@ -29,6 +29,7 @@ from typing import Any
 import yaml
 
 from warpsplat.errors import UsageError
+from warpsplat.files.inputs import read_input
 from warpsplat.files.output import HEAD, check_folder, check_target, may_replace
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.batch_file import BatchFile
@@ -36,7 +37,7 @@ from warpsplat.jobs.options import BY_NAME, KINDS, Option, settings_from
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.svg.write import read_metadata
 
-TEXT_KEYS = ("output", "device")
+TEXT_KEYS = ("output", "device", "importance")
 KEYS = (*BY_NAME, *TEXT_KEYS)
 
 
@@ -48,9 +49,16 @@ class Job:
     output: Path
     settings: Settings
     device: str
+    importance: Path | None = None
+    """Mask of how much the error of a pixel counts."""
 
     def done(self, data: bytes) -> bool:
-        """Whether ``output`` is there, whole, and was made from an image of the bytes ``data`` so."""
+        """Whether ``output`` is there, whole, and was made from an image of the bytes ``data`` so.
+
+        Raises:
+            ImageError: the mask cannot be read.
+        """
+        mask = read_input(self.importance) if self.importance else None
         try:
             if not stat.S_ISREG(os.stat(self.output).st_mode):
                 return False  # opening a pipe would wait for whoever fills it
@@ -58,7 +66,7 @@ class Job:
                 head = file.read(HEAD).decode("utf-8", "replace")
                 file.seek(max(0, file.seek(0, os.SEEK_END) - len(TAIL)))
                 whole = file.read() == TAIL
-            return whole and read_metadata(head).endswith(f"key={job_key(self.settings, data)}")
+            return whole and read_metadata(head).endswith(f"key={job_key(self.settings, data, mask)}")
         except OSError:
             return False
 
@@ -161,6 +169,14 @@ def _glob(folder: Path, pattern: str) -> Iterator[Path]:
     )
 
 
+def _path(file: BatchFile, line: int, key: str, value: str | None) -> Path | None:
+    """A path of a batch file, which is relative to that."""
+    try:
+        return None if value is None else file.path.parent / Path(value).expanduser()
+    except RuntimeError as error:
+        raise file.error(line, f"{key}: {value!r}: {error}") from error
+
+
 def load_jobs(path: Path) -> list[Job]:
     """Read and check a batch file.
 
@@ -185,16 +201,15 @@ def load_jobs(path: Path) -> list[Job]:
             raise file.error(start, "key 'images' is missing in a job")
         own = _options(file, entries)
         options = _merge(defaults, own)
-        output, device = options.pop("output", None), options.pop("device", "auto")
+        device = options.pop("device", "auto")
+        folder_given, mask = (
+            _path(file, start, key, options.pop(key, None)) for key in ("output", "importance")
+        )
         settings = settings_from(options)
-        try:
-            folder_given = None if output is None else path.parent / Path(output).expanduser()
-        except RuntimeError as error:
-            raise file.error(start, f"output: {output!r}: {error}") from error
         given = own.get("output") or defaults.get("output")
         at = given.line if given else entries["images"][0]
         for image in _images(file, *entries["images"]):
-            planned.append(_Planned(image, folder_given or image.parent, settings, device, at))
+            planned.append(_Planned(image, folder_given or image.parent, settings, device, mask, at))
     jobs = _named(file, line, planned)
     _check_outputs(file, [plan.line for plan in planned], jobs)
     return jobs
@@ -208,6 +223,7 @@ class _Planned:
     folder: Path
     settings: Settings
     device: str
+    importance: Path | None
     line: int
 
 
@@ -223,7 +239,7 @@ def _named(file: BatchFile, line: int, planned: list[_Planned]) -> list[Job]:
     for plan in planned:
         image, folder = plan.image, plan.folder
         name = image.stem if stems[folder, image.stem] == 1 else image.name
-        job = Job(image, folder / f"{name}.svg", plan.settings, plan.device)
+        job = Job(image, folder / f"{name}.svg", plan.settings, plan.device, plan.importance)
         if os.path.realpath(job.output) == os.path.realpath(image):
             raise file.error(line, f"jobs: {image} would be overwritten by its own result; give an output")
         jobs.append(job)

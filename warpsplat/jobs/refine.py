@@ -9,7 +9,7 @@ from dataclasses import replace
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.settings import Density, Settings
-from warpsplat.jobs.vectorize import Result, missed_goals, training_seconds
+from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, training_seconds
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray, Scene
@@ -47,7 +47,7 @@ def refine(
     scene, has_background = load_scene(text, width, height, name)
     try:
         _check_read(text, scene, has_background)
-        before = score_svg(text, target)
+        before = score_svg(text, target, eyes=False)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
     settings = replace(
@@ -61,8 +61,11 @@ def refine(
     seconds = training_seconds(settings, target, started)
     made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
     svg = write_svg(made.scene, per_pixel=made.per_pixel, background=has_background)
-    score = score_svg(svg, target, own=True)
+    eyes = has_time_for_eyes(settings, target) and not made.interrupted
+    score = score_svg(svg, target, own=True, eyes=eyes)
     better = score.psnr > before.psnr
+    if eyes and not better:
+        before = score_svg(text, target)
     seconds = time.monotonic() - started
     result = Result(
         svg=svg if better else text,

@@ -15,6 +15,7 @@ import numpy as np
 from warpsplat import __version__
 from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
+from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.output import write_result
 from warpsplat.fit.export import export
@@ -62,9 +63,10 @@ class Result:
         }
 
 
-def job_key(settings: Settings, source: bytes) -> str:
-    """Names a result: the same program version, settings and image bytes give the same key."""
-    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} ".encode() + source)
+def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:
+    """Names a result: the same program version, settings and bytes of image and mask give the same key."""
+    masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source)
     return digest.hexdigest()[:24]
 
 
@@ -75,6 +77,7 @@ def vectorize(
     *,
     metadata: str = "",
     scene: Scene | None = None,
+    importance: FloatArray | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
     write: Callable[[str], None] | None = None,
@@ -87,6 +90,8 @@ def vectorize(
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
         scene: curves to start from; without, new ones.
+        importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
+            those of the whole image all the same.
         report: called every few steps.
         stop: asked after every step; once true, the curves as they are make the file. True later, the score
             is given up.
@@ -99,14 +104,23 @@ def vectorize(
         height, width = target.shape[:2]
         settings = replace(settings, curves=affordable_curves(settings, width, height))
     seconds = training_seconds(settings, target, started)
-    made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
+    made = fit(
+        target,
+        settings,
+        backend,
+        scene=scene,
+        importance=importance,
+        seconds=seconds,
+        report=report,
+        stop=stop,
+    )
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
     )
     if write:
         write(svg)
-    score = _score(svg, target, stop, interrupted=made.interrupted)
+    score = _score(svg, target, settings, stop, interrupted=made.interrupted)
     seconds = time.monotonic() - started
     return Result(
         svg=svg,
@@ -146,15 +160,28 @@ QUICK_PIXELS = 1_000_000
 takes about a second."""
 
 
+def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
+    """Whether a run's report has SSIMULACRA2: up to ``QUICK_PIXELS`` it takes a twentieth of a run of the
+    default effort; within a time budget other things are worth more.
+    """
+    return target.shape[0] * target.shape[1] <= QUICK_PIXELS and settings.time_budget is None
+
+
 def _score(
-    svg: str, target: FloatArray, stop: Callable[[], bool] | None, *, interrupted: bool
+    svg: str,
+    target: FloatArray,
+    settings: Settings,
+    stop: Callable[[], bool] | None,
+    *,
+    interrupted: bool,
 ) -> Score | None:
     """The score of a file, or None where there is no time for it."""
     quick = target.shape[0] * target.shape[1] <= QUICK_PIXELS
+    eyes = has_time_for_eyes(settings, target) and not interrupted
     if (interrupted and not quick) or (not interrupted and stop and stop()):
         return None
     try:
-        return score_svg(svg, target, own=True, stop=None if quick else stop)
+        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
     except Stopped:
         return None
 
@@ -210,6 +237,7 @@ def vectorize_file(
     backend: Backend,
     *,
     name: str | None = None,
+    importance: Path | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
@@ -221,20 +249,25 @@ def vectorize_file(
         settings: all that decides the result.
         backend: where to compute.
         name: how messages call the image; default: the file's name.
+        importance: file of a mask, see ``load_importance``.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
 
     Raises:
-        ImageError: ``source`` cannot be read.
+        ImageError: ``source`` or the mask cannot be read, or their proportions differ.
         OutputError: ``output`` cannot be written.
     """
     if isinstance(source, Path):
         name, source = name or input_name(source), read_input(source)
+    target = load_image(source, name)
+    mask, mask_name = (read_input(importance), input_name(importance)) if importance else (None, "")
+    height, width = target.shape[:2]
     return vectorize(
-        load_image(source, name),
+        target,
         settings,
         backend,
-        metadata=f"key={job_key(settings, source)}",
+        metadata=f"key={job_key(settings, source, mask)}",
+        importance=None if mask is None else load_importance(mask, width, height, mask_name),
         report=report,
         stop=stop,
         write=lambda svg: write_result(output, svg.encode()),

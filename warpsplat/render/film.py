@@ -71,7 +71,13 @@ class Film:
         )
 
     def removal_cost(
-        self, program: Program, bins: Bins, coverage: Coverage, target: wp.array, slot_cost: wp.array
+        self,
+        program: Program,
+        bins: Bins,
+        coverage: Coverage,
+        target: wp.array,
+        importance: wp.array | None,
+        slot_cost: wp.array,
     ) -> None:
         """Record what the squared error against ``target`` would grow by without each slot."""
         program.launch(
@@ -82,6 +88,7 @@ class Film:
             coverage.buffers,
             lane_columns=self._backend.lane_size,
             target=target,
+            importance=self.buffers.inside if importance is None else importance,
             slot_cost=slot_cost,
             split=True,
         )

@@ -122,15 +122,15 @@ class Renderer:
         """Set the image's gradient from the host, shape (height, width, 3)."""
         self.film.buffers.image_grad.assign(to_tiles(gradient))
 
-    def removal_costs(self, target: wp.array) -> FloatArray:
+    def removal_costs(self, target: wp.array, importance: wp.array | None = None) -> FloatArray:
         """What the mean squared error against ``target`` would grow by without each shape, after ``forward``.
 
-        ``target``: tiles as the film's image. Shape of the result: (shape,). Allocates and copies to the
-        host: for use between steps.
+        ``target``: tiles as the film's image; ``importance``: weights of the pixels by tiles, without all 1.
+        Shape of the result: (shape,). Allocates and copies to the host: for use between steps.
         """
         cost = self.backend.array(wp.float32, self.capacity.slots, self.backend.lanes)
         program = self.backend.program()
-        self.film.removal_cost(program, self.bins, self.coverage, target, cost)
+        self.film.removal_cost(program, self.bins, self.coverage, target, importance, cost)
         program.run()
         shapes = self.bins.buffers.slot_shape.numpy()
         used = shapes >= 0

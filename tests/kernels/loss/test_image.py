@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,45 +10,86 @@ import warp as wp
 
 from tests.helpers import relative_error, run
 from tests.reference import losses
-from warpsplat.kernels.constants import TILE
 from warpsplat.kernels.loss import image as kernels
 from warpsplat.kernels.tile import column
 from warpsplat.render.tiles import from_tiles, to_tiles
+from warpsplat.scene import FloatArray
+
+WIDTH, HEIGHT = 37, 27
+SHAPE = (HEIGHT, WIDTH, 3)
+TILES_X, TILE_COUNT = 3, 6
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
-def test_l2(device: str, lanes: int) -> None:
-    rng = np.random.default_rng(3)
-    a, b = (rng.uniform(size=(13, 21, 3)).astype(np.float32) for _ in range(2))
-    image, target = (wp.array(to_tiles(x), dtype=column, device=device) for x in (a, b))
-    # What lies in the padding of the tiles must not count.
-    image.assign(np.where(to_tiles(np.ones_like(a)) > 0, image.numpy(), 9).astype(np.float32))
-    inside = wp.array(to_tiles(np.ones((13, 21, 1), np.float32))[:, 0], dtype=column, device=device)
-    grad, sums = wp.zeros_like(image), wp.zeros((2, lanes), dtype=float, device=device)
-    values = {"image": image, "target": target, "inside": inside, "value_count": a.size, "loss": sums}
-    run(kernels.l2_loss, (2, lanes), device, values, lane_columns=TILE // lanes, image_grad=grad)
+class Launched:
+    """Gradient and sums of the kernel, for an image that ends inside a tile."""
+
+    def __init__(
+        self,
+        a: FloatArray,
+        b: FloatArray,
+        device: str,
+        *,
+        phase: int = 0,
+        similarity_weight: float = 0.0,
+        weights: FloatArray | None = None,
+    ) -> None:
+        image, target = (wp.array(to_tiles(x), dtype=column, device=device) for x in (a, b))
+        # What lies in the padding of the tiles must not count.
+        image.assign(np.where(to_tiles(np.ones_like(a)) > 0, image.numpy(), 9).astype(np.float32))
+        # Nor must weights that nobody gave.
+        given = np.full(SHAPE[:2], 7, np.float32) if weights is None else weights
+        values: dict[str, Any] = {
+            "image": image,
+            "target": target,
+            "importance": wp.array(to_tiles(given[..., None])[:, 0], dtype=column, device=device),
+            "weighted": weights is not None,
+            "width": WIDTH,
+            "height": HEIGHT,
+            "tiles_x": TILES_X,
+            "clock": wp.array([4 + phase], dtype=int, device=device),
+            "similarity_weight": similarity_weight,
+            "value_count": a.size,
+            "image_grad": wp.full_like(image, column(5.0)),
+            "loss": wp.zeros((TILE_COUNT, 3), dtype=float, device=device),
+            "similarity": wp.zeros((TILE_COUNT, 3), dtype=float, device=device),
+        }
+        run(kernels.image_loss, (TILE_COUNT, 3), device, values)
+        tiles = values["image_grad"].numpy()
+        self.gradient = from_tiles(tiles, WIDTH, HEIGHT)
+        self.padding = tiles[to_tiles(np.ones_like(a)) == 0]
+        self.loss, self.similarity = (values[name].numpy().sum() for name in ("loss", "similarity"))
+
+
+def images(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Image, target, weights of mean 1."""
+    rng = np.random.default_rng(seed)
+    a, b = (rng.uniform(size=SHAPE).astype(np.float32) for _ in range(2))
+    weights = rng.uniform(0.1, 3, SHAPE[:2])
+    return a, b, (weights / weights.mean()).astype(np.float32)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_squared_error(device: str, weighted: bool) -> None:
+    a, b, weights = images(3)
+    got = Launched(a, b, device, weights=weights if weighted else None)
     x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
-    value = torch.nn.functional.mse_loss(x, torch.tensor(b, dtype=torch.float64))
-    value.backward()
-    assert sums.numpy().sum() / a.size == pytest.approx(float(value.detach()), rel=1e-6)
+    squares = (x - torch.tensor(b, dtype=torch.float64)) ** 2
+    w = torch.tensor(weights if weighted else np.ones_like(weights), dtype=torch.float64)[..., None]
+    (w * squares).mean().backward()
+    assert got.loss / a.size == pytest.approx(float(squares.detach().mean()), rel=1e-6), "never weighted"
     assert x.grad is not None
-    np.testing.assert_allclose(from_tiles(grad.numpy(), 21, 13), x.grad.numpy(), rtol=1e-5, atol=1e-9)
-    assert grad.numpy()[to_tiles(np.ones_like(a)) == 0].max() == 0
+    np.testing.assert_allclose(got.gradient, x.grad.numpy(), rtol=1e-5, atol=1e-9)
+    assert not got.padding.any()
 
 
+@pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("phase", [0, 1, 2, 3])
-def test_ssim(device: str, phase: int) -> None:
-    """Window by window, over an image that ends inside a tile."""
-    rng = np.random.default_rng(phase)
-    a, b = (rng.uniform(size=(27, 37, 3)).astype(np.float32) for _ in range(2))
-    image, target = (wp.array(to_tiles(x), dtype=column, device=device) for x in (a, b))
-    inside = wp.array(to_tiles(np.ones((27, 37, 1), np.float32))[:, 0], dtype=column, device=device)
-    clock = wp.array([4 + phase], dtype=int, device=device)
-    grad, sums = wp.zeros_like(image), wp.zeros((6, 3), dtype=float, device=device)
-    values = {"image": image, "target": target, "inside": inside, "clock": clock, "value_count": a.size}
-    run(kernels.ssim_backward, (6, 3), device, values, weight=0.3, image_grad=grad, similarity=sums)
+def test_ssim(device: str, phase: int, weighted: bool) -> None:
+    """Window by window."""
+    a, b, weights = images(phase)
     x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
     y = torch.tensor(b, dtype=torch.float64)
+    w = torch.tensor(weights if weighted else np.ones_like(weights), dtype=torch.float64)
     borders = [[0, 8, 16, 24, 32, 40], [0, 4, 12, 16, 20, 28, 32, 36, 44]]
     columns, rows = borders[phase % 2], borders[phase // 2]
     total = torch.zeros((), dtype=torch.float64)
@@ -55,9 +97,20 @@ def test_ssim(device: str, phase: int) -> None:
         for y0, y1 in itertools.pairwise(rows):
             u, v = x[y0:y1, x0:x1].reshape(-1, 3), y[y0:y1, x0:x1].reshape(-1, 3)
             if len(u):
-                total = total + len(u) * losses.ssim(u, v).sum()
+                total = total + w[y0:y1, x0:x1].sum() * losses.ssim(u, v).sum()
     (-0.3 * total / a.size).backward()
-    assert sums.numpy().sum() == pytest.approx(float(total.detach()), rel=1e-5)
+    given = weights if weighted else None
+    got = Launched(a, b, device, phase=phase, similarity_weight=0.3, weights=given)
+    plain = Launched(a, b, device, phase=phase, weights=given)
+    assert got.similarity == pytest.approx(float(total.detach()), rel=1e-5)
     assert x.grad is not None
-    assert relative_error(from_tiles(grad.numpy(), 37, 27), x.grad.numpy()) < 1e-4
-    assert not grad.numpy()[to_tiles(np.ones_like(a)) == 0].any()
+    assert relative_error(got.gradient - plain.gradient, x.grad.numpy()) < 1e-4
+    assert not got.padding.any()
+
+
+def test_weights_of_one_change_nothing(device: str) -> None:
+    a, b, weights = images(5)
+    plain = Launched(a, b, device, phase=3, similarity_weight=0.3)
+    ones = Launched(a, b, device, phase=3, similarity_weight=0.3, weights=np.ones_like(weights))
+    np.testing.assert_array_equal(plain.gradient, ones.gradient)
+    assert (plain.loss, plain.similarity) == (ones.loss, ones.similarity)

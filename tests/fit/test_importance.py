@@ -1,0 +1,93 @@
+"""Errors that count more: what a mask becomes, and what it changes in a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import empty_scene, picture
+from warpsplat.fit.density import densify
+from warpsplat.fit.importance import LEAST, TEXTURE_NOISE, pixel_weights, weights_at
+from warpsplat.fit.loop import fit
+from warpsplat.fit.settings import make_settings
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+
+
+@pytest.mark.parametrize("size", [(12, 8), (6, 4), (24, 16), (18, 12), (7, 5)])
+def test_weights_are_linear_in_the_grey_of_any_size(size: tuple[int, int]) -> None:
+    mask = np.zeros((8, 12), np.float32)
+    mask[:4] = 1
+    weights = pixel_weights(np.zeros((size[1], size[0], 3), np.float32), mask, 0.0)
+    assert weights is not None
+    assert weights.shape == size[::-1]
+    assert weights[-1, 0] == pytest.approx(LEAST * weights[0, 0], rel=1e-5)
+
+
+@pytest.mark.parametrize("size", [(12, 8), (6, 4), (7, 5)])
+def test_weights_have_a_mean_of_1_at_any_size(size: tuple[int, int]) -> None:
+    weights = weights_at(np.random.default_rng(0).uniform(1, 9, (8, 12)).astype(np.float32), *size)
+    assert weights.shape == size[::-1]
+    assert weights.mean() == pytest.approx(1, abs=1e-6)
+    assert weights.std() > 0.1
+
+
+def test_a_mask_of_one_grey_weighs_nothing_more() -> None:
+    image = np.zeros((4, 6, 3), np.float32)
+    assert pixel_weights(image, None, 0.0) is None
+    for grey in (0.0, 0.5, 1.0):
+        weights = pixel_weights(image, np.full((8, 12), grey, np.float32), 0.0)
+        assert weights is not None
+        assert (weights_at(weights, 6, 4) == 1).all()
+
+
+def test_texture_counts_less_by_a_power_of_its_variance() -> None:
+    noise = np.random.default_rng(0).normal(0, 1, (120, 240, 1))
+    noise[:, :120] *= 0.04
+    noise[:, 120:] *= 0.16
+    image = np.repeat(0.5 + noise, 3, 2).astype(np.float32)
+    weights = pixel_weights(image, None, 0.3)
+    assert weights is not None
+    left, right = (weights[30:90, columns].mean() for columns in (slice(30, 90), slice(150, 210)))
+    variances = [deviation**2 + TEXTURE_NOISE**2 for deviation in (0.04, 0.16)]
+    assert left / right == pytest.approx((variances[1] / variances[0]) ** 0.3, rel=0.05)
+    masked = pixel_weights(image, np.full((12, 24), 0.5, np.float32), 0.3)
+    assert masked is not None
+    np.testing.assert_allclose(weights_at(masked, 240, 120), weights_at(weights, 240, 120), rtol=1e-5)
+
+
+def test_new_curves_come_where_the_error_counts() -> None:
+    target = np.full((60, 80, 3), 0.5, np.float32)
+    image = target.copy()
+    target[10:22, 50:62] = [1, 0, 0]
+    target[40:50, 10:20] = [0.8, 0.2, 0.2]
+    settings = make_settings()
+    for weights, centre in (
+        (None, [56, 16]),
+        (pixel_weights(target, mask_of_the_lower_half(), 0.0), [15, 45]),
+    ):
+        added = densify(
+            settings, empty_scene(settings, target), target, image, 1, np.random.default_rng(0), weights
+        )
+        np.testing.assert_allclose(added.points.mean(axis=0), centre, atol=3)
+
+
+def mask_of_the_lower_half() -> np.ndarray:
+    mask = np.zeros((60, 80), np.float32)
+    mask[30:] = 1
+    return mask
+
+
+def test_a_run_comes_nearer_where_the_mask_is_white(device: str) -> None:
+    target = picture()
+    height, width = target.shape[:2]
+    mask = np.zeros((height, width), np.float32)
+    mask[:, : width // 2] = 1
+    settings = make_settings(curves=12, iterations=60, coarse_pixels=1000)
+    errors = []
+    for importance in (None, mask):
+        scene = fit(target, settings, Backend.on(device), importance=importance).scene
+        squares = (render(scene, backend=Backend.on(device)) - target) ** 2
+        errors.append([squares[mask == white].mean() for white in (0, 1)])
+    assert errors[1][1] < 0.8 * errors[0][1]
+    assert errors[1][0] > errors[0][0]

@@ -1,0 +1,33 @@
+"""Reading masks: how much the error of each pixel of an image counts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from warpsplat.errors import ImageError
+from warpsplat.files.image import load_image
+from warpsplat.files.inputs import input_name
+from warpsplat.scene import FloatArray
+
+
+def load_importance(source: Path | bytes, width: int, height: int, name: str | None = None) -> FloatArray:
+    """Read the mask of an image of ``width`` x ``height`` px: its grey values in [0, 1], at its own size.
+
+    Any image will do, of any size of the same proportions: of colours the luma counts (ITU-R BT.601), and
+    where it is transparent nothing was painted, which is black.
+
+    Raises:
+        ImageError: as ``load_image``, or other proportions than the image has.
+    """
+    name = name or (input_name(source) if isinstance(source, Path) else "the mask")
+    mask = load_image(source, name, paper=0.0)
+    tall, wide = mask.shape[:2]
+    # A reduced side may be rounded to either neighbour.
+    if abs(wide - tall * width / height) >= 1 and abs(tall - wide * height / width) >= 1:
+        raise ImageError(
+            f"{name}: {wide}x{tall} pixels; a mask must have the proportions of its {width}x{height} image"
+        )
+    return np.asarray(cv2.cvtColor(mask, cv2.COLOR_RGB2GRAY), np.float32)

@@ -1,0 +1,50 @@
+"""How much the error of each pixel counts."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from warpsplat.scene import FloatArray
+
+LEAST = 0.05
+"""Weight of a black pixel of a mask over that of a white one. Not 0: shapes that nothing holds would grow
+over what is black, and the picture around a face is still to be a picture."""
+
+TEXTURE_SIGMA = 8.0
+"""Standard deviation of the window in which texture is measured [px]."""
+
+TEXTURE_NOISE = 4 / 255
+"""Standard deviation of what counts as plain."""
+
+
+def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) -> FloatArray | None:
+    """Weights of the pixels of ``image``, shape (height, width); None where all are alike.
+
+    Args:
+        image: sRGB in [0, 1], shape (height, width, 3).
+        mask: grey in [0, 1], of any size: a weight grows linearly with it from ``LEAST`` of white's.
+        texture: power of the local variance by which a weight falls. An eye sees an error in what is plain
+            sooner than in foliage (masking), and the shapes that foliage takes are worth more elsewhere.
+    """
+    height, width = image.shape[:2]
+    weights: FloatArray | None = None
+    if texture > 0:
+        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) - np.float32(0.5)  # about which 32 bits are enough
+        mean, squares = (cv2.GaussianBlur(x, (0, 0), TEXTURE_SIGMA) for x in (grey, grey * grey))
+        variance = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE**2)
+        weights = np.asarray(variance**-texture, np.float32)
+    if mask is not None:
+        shrinks = mask.shape[1] >= width and mask.shape[0] >= height
+        how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+        counts = LEAST + (1 - LEAST) * np.clip(cv2.resize(mask, (width, height), interpolation=how), 0, 1)
+        weights = counts if weights is None else weights * counts
+    return weights
+
+
+def weights_at(weights: FloatArray, width: int, height: int) -> FloatArray:
+    """``weights`` at another size, of mean 1: learning rates and other losses mean what they do without."""
+    resized = weights
+    if weights.shape != (height, width):
+        resized = np.asarray(cv2.resize(weights, (width, height), interpolation=cv2.INTER_AREA))
+    return np.asarray(resized / resized.mean(dtype=np.float64), np.float32)
