@@ -38,7 +38,7 @@ def plan_outline(
     bezier_pieces: wp.array[wp.int32],  # [bezier_count] straight pieces
     vertex_count: wp.array[wp.int32],  # [shape_count] a stroke has one more than pieces
 ):
-    """Pieces of each Bézier, one thread a shape: the polyline is slack x FLATNESS px off the curve at most."""
+    """Pieces of each Bézier, one thread a shape: the polyline is slack x FLATNESS px off it at most."""
     shape = offset + wp.tid()
     flatness = FLATNESS
     if kind[shape] != FILL:

@@ -12,7 +12,7 @@ from warpsplat.fit import density
 from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
 from warpsplat.fit.place import circle_outlines
 from warpsplat.fit.settings import Density, make_settings
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import Kind, Scene
 from warpsplat.scene.geometry import areas, bounds
 
 DENSITY = Density()

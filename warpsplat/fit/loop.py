@@ -11,7 +11,7 @@ import numpy as np
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.place import grid_scene
-from warpsplat.fit.rounding import choose_grid, hold_stage, stage_at
+from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.schedule import CHECK_INTERVAL, LOOK_INTERVAL, phase_at, phases, shapes_at, work_done
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
@@ -117,10 +117,12 @@ def fit(
             break
         stage = stage_at(settings, done)
         if stage is not None:
-            if stage == 0:
+            if stage == 1:
                 state.per_pixel = choose_grid(step, staged=True)
             rounding = True
             hold_stage(step, stage)
+        if done == opacities_at(settings):
+            hold_opacities(step)
         density = settings.density
         surgical = done < density.stop * settings.iterations
         if settings.viewer and finest and not surgical and not rounding and done % LOOK_INTERVAL == 0:

@@ -9,13 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.fit.export import export
+from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
 from warpsplat.scene import OPACITY_RANGE, Scene
 from warpsplat.svg.write import GRIDS, rounded
 
-STAGES = 4
-"""Opacities, then a third of the control points each: of cubics those on the outline, then the handles."""
+STAGES = 3
+"""Of a third of the control points each: of cubics those on the outline, then the handles."""
 
 STAGE_SHARE = 0.015
 """Steps after each stage, over those of the run."""
@@ -26,8 +28,14 @@ LOSS = 0.03
 STAGED = 0.2
 """What rounding in stages costs over what rounding at once does."""
 
-NEARLY_OPAQUE = 0.9
-"""From here on an opacity is rounded to 1."""
+USUAL_GRID = 5.0
+"""Units a pixel, where the grid is not known yet."""
+
+OPACITY_BYTES = 19
+"""Of a translucent shape, over an opaque one."""
+
+REFITTED = 0.5
+"""What an opacity of 1 costs when the rest is fitted anew, over what it costs at first."""
 
 
 def stage_steps(settings: Settings) -> int:
@@ -40,7 +48,14 @@ def stage_at(settings: Settings, step: int) -> int | None:
     since = step - (settings.iterations - STAGES * stage_steps(settings))
     if since < 0 or since % stage_steps(settings):
         return None
-    return min(since // stage_steps(settings), STAGES)
+    stage = 1 + since // stage_steps(settings)
+    return stage if stage <= STAGES else None
+
+
+def opacities_at(settings: Settings) -> int:
+    """Steps after which the opacities are held: once no shape comes or goes and the image is at its finest."""
+    share = max(settings.density.stop, settings.coarse)
+    return min(round(share * settings.iterations) + 1, settings.iterations - STAGES * stage_steps(settings))
 
 
 def finest(settings: Settings) -> float:
@@ -72,17 +87,30 @@ def choose_grid(step: Step, *, staged: bool) -> float:
     return grid
 
 
-def hold_stage(step: Step, stage: int) -> None:
-    """Round what belongs to ``stage``, and hold it from now on."""
-    parameters, grid = step.state.parameters, step.state.per_pixel
+def hold_opacities(step: Step) -> None:
+    """Round and hold the opacities; those that are worth less than their bytes become 1.
+
+    At its best opacity o, a shape that is worth D (the squared error without it over that with it) costs
+    D (1 - o)^2 / o^2 if it is made opaque: the error is quadratic in the opacity.
+    """
+    parameters = step.state.parameters
+    step.renderer.forward_complete()
+    worth = step.renderer.removal_costs(step.aim.target, step.aim.importance)
     scene = parameters.scene()
-    low = rounded(scene, grid)
-    if stage == 0:
-        opacities = np.where(scene.opacities >= NEARLY_OPAQUE, OPACITY_RANGE[1], low.opacities)
-        parameters.assign(replace(scene, opacities=opacities.astype(np.float32)))
-        parameters.hold("opacities", np.ones(len(scene), np.bool_))
-        return
+    cost = REFITTED * np.maximum(worth, 0) * ((1 - scene.opacities) / scene.opacities) ** 2
+    size = len(export(scene, step.settings, min(USUAL_GRID, finest(step.settings))))
+    opaque = cost < OPACITY_BYTES * byte_worth(step.square_error(), size)
+    opacities = np.where(opaque, OPACITY_RANGE[1], rounded(scene, 1.0).opacities)
+    parameters.assign(replace(scene, opacities=opacities.astype(np.float32)))
+    parameters.hold("opacities", np.ones(len(scene), np.bool_))
+
+
+def hold_stage(step: Step, stage: int) -> None:
+    """Round the points that belong to ``stage`` (1 to ``STAGES``), and hold them from now on."""
+    parameters = step.state.parameters
+    scene = parameters.scene()
+    low = rounded(scene, step.state.per_pixel)
     index = np.arange(len(scene.points)) - np.repeat(scene.first[:-1], scene.point_counts())
-    held = index % (STAGES - 1) < stage
+    held = index % STAGES < stage
     parameters.assign(replace(scene, points=np.where(held[:, None], low.points, scene.points)))
     parameters.hold("points", held)

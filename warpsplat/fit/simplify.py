@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ APART = 2
 """Points removed in one turn have more than so many others between them: each moves its neighbours."""
 
 
-def _quadratics(points: FloatArray, t: npt.NDArray[np.float64]) -> FloatArray:
+def _quadratics(points: npt.NDArray[Any], t: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
     """Open uniform quadratic B-spline of points [..., n, 2] at ``t`` in [0, n - 2], [..., m, 2]."""
     k = np.minimum(t.astype(np.intp), points.shape[-2] - 3)
     s = (t - k)[:, None]
@@ -35,8 +36,8 @@ def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         points: shape (shape, point, 2).
 
     Returns:
-        for every point of every ring, where its two neighbours go if it is removed, shape (shape, point, 2, 2),
-        and the area that the outline then sweeps, shape (shape, point).
+        for every point of every ring, where its two neighbours go if it is removed, shape (shape, point, 2,
+        2), and the area that the outline then sweeps, shape (shape, point).
     """
     count = points.shape[1]
     window = points[:, (np.arange(count)[:, None] + np.arange(-3, 4)) % count]  # [shape, point, 7, 2]
@@ -77,9 +78,9 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
         if group.basis != Basis.SPLINE or group.kind != Kind.FILL or number <= LEAST_POINTS:
             continue
         moved, area = without(group.points)
-        cost = area * worth[group.index][:, None]
+        cost = area * worth[group.shapes][:, None]
         for i in np.flatnonzero(np.isfinite(cost).all(axis=1)).tolist():
-            first = int(scene.first[group.index[i]])
+            first = int(scene.first[group.shapes[i]])
             chosen = _apart(cost[i], (number - LEAST_POINTS + 1) // 2)
             found += [(float(cost[i, k]), first, k, number, moved[i, k]) for k in chosen]
     found.sort(key=lambda entry: entry[:3])

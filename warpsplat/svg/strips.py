@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -13,6 +12,7 @@ from PIL import Image
 
 from warpsplat.errors import ImageError, Stopped
 from warpsplat.svg.viewer import render_own, render_svg
+from warpsplat.svg.write import OUR_HEAD, resized
 
 Bytes = npt.NDArray[np.uint8]
 Stop = Callable[[], bool]
@@ -27,12 +27,6 @@ curves at the border of its canvas. The PSNR changes by less than 0.0001 dB.
 
 DRAWERS = 4
 """Most strips that are drawn at once."""
-
-OUR_HEAD = re.compile(
-    r'<svg xmlns="http://www\.w3\.org/2000/svg" width="(\d+)" height="(\d+)" '
-    r'viewBox="0 0 \1 \2">\n<metadata>warpsplat '
-)
-"""Of a file whose canvas units are its pixels, so that a strip of it is another view box."""
 
 
 def check(stop: Stop | None) -> None:
@@ -76,8 +70,7 @@ def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: b
     def strip(rows: slice) -> Bytes:
         check(stop)
         tall = rows.stop - rows.start
-        view = f'width="{width}" height="{tall}" viewBox="0 {rows.start} {width} {tall}"'
-        part = re.sub(r'width="\d+" height="\d+" viewBox="[^"]*"', view, text, count=1)
+        part = resized(text, width, tall, 1.0, rows.start)
         return drawn(part, tall)
 
     out = np.empty((height, width, 4), np.uint8)

@@ -28,7 +28,7 @@ WIDTH_DECIMALS = 1
 OPAQUE = 1 - 0.5 / 255
 """From here on an opacity is left out: opaque paths are smaller and quicker to draw."""
 
-GRIDS = tuple(map(float, ".125 .25 .5 1 2 3 4 5 6 8 10 12 16 20 25 32 50 100".split()))
+GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 100)))
 """Units of the view box a pixel of the picture: sizes of the view box have few decimals with each."""
 
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
@@ -83,19 +83,37 @@ def path_data(points: FloatArray, kind: Kind, basis: Basis, per_pixel: float) ->
 def spline_data(points: FloatArray, closed: bool, per_pixel: float) -> str:
     """``d`` of a spline: one quadratic, and smooth ones, whose control points follow (SVG 1.1, 8.3.7).
 
-    The points lie on even numbers, so that the quadratics meet on whole ones.
+    The points lie on even numbers, so that the quadratics meet on whole ones. A ring is written from the point
+    from which it takes the fewest characters.
     """
     half = np.round(points.astype(np.float64) * (per_pixel / 2)).astype(np.int64)
-    joints = half + np.roll(half, -1, axis=0)
     if closed:
-        joints = np.concatenate([joints[-1:], joints])
+        half = np.roll(half, -_cheapest_start(half), axis=0)
+        joints = half + np.roll(half, 1, axis=0)
+        joints = np.concatenate([joints, joints[:1]])
         control = 2 * half[0]
     else:
-        joints = np.concatenate([2 * half[:1], joints[1:-2], 2 * half[-1:]])
+        joints = np.concatenate([2 * half[:1], half[1:-2] + half[2:-1], 2 * half[-1:]])
         control = 2 * half[1]
     steps = np.diff(joints, axis=0)
     text = f"M{integers(joints[0])}q{integers(np.stack([control - joints[0], steps[0]]))}"
     return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text
+
+
+def _digits(values: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Digits of both coordinates together, shape (point, 2) -> (point,)."""
+    return (np.searchsorted(POWERS, np.abs(values), side="right") + 1).sum(axis=1)
+
+
+POWERS = 10 ** np.arange(1, 16)
+
+
+def _cheapest_start(half: npt.NDArray[np.int64]) -> int:
+    """The point of a ring before which to start: where the start, and the control point that is written
+    besides, have the fewest digits. The steps are the same from everywhere.
+    """
+    before = np.roll(half, 1, axis=0)
+    return int(np.argmin(_digits(half + before) + _digits(half - before)))
 
 
 def hex_color(color: FloatArray) -> str:
@@ -120,7 +138,8 @@ def _element(scene: Scene, shape: int, per_pixel: float, opacity_scale: float) -
     shown = min(float(scene.opacities[shape]) * opacity_scale, 1.0)
     if shown < OPAQUE:
         style += f' {attribute}-opacity="{number(shown, OPACITY_DECIMALS)}"'
-    return f'<path d="{path_data(scene.points_of(shape), kind, Basis(int(scene.basis[shape])), per_pixel)}" {style}/>'
+    data = path_data(scene.points_of(shape), kind, Basis(int(scene.basis[shape])), per_pixel)
+    return f'<path d="{data}" {style}/>'
 
 
 def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
@@ -154,7 +173,7 @@ def write_svg(
     fill = hex_color(canvas.background)
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
     behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n' if background else ""
-    shapes = "\n".join(_groups(scene, per_pixel, opacity_scale))
+    shapes = "".join(_groups(scene, per_pixel, opacity_scale))
     note = f"warpsplat {__version__} {metadata}".strip()
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
@@ -164,15 +183,25 @@ def write_svg(
     )
 
 
-def resized(text: str, width: int, height: int, scale: float) -> str:
-    """A file written here, to be shown on ``width`` x ``height`` px at ``scale`` px a pixel of its own, not
-    stretched.
+OUR_HEAD = re.compile(
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)">\n'
+    "<metadata>warpsplat "
+)
+"""How a file written here begins: its size in pixels, and that in units of its view box."""
+
+
+def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> str:
+    """A file written here, ``scale`` px large for each pixel of its own, cut to the ``width`` x ``height`` px
+    from the left and from ``top`` on.
     """
-    found = re.search(r'width="(\d+)" height="(\d+)" viewBox="0 0 ([^" ]*) [^"]*"', text)
+    found = OUR_HEAD.match(text)
     assert found
     unit = float(found[3]) / float(found[1]) / scale
-    view = f'width="{width}" height="{height}" viewBox="0 0 {width * unit:.9g} {height * unit:.9g}"'
-    return text[: found.start()] + view + text[found.end() :]
+    view = f"0 {top * unit:.9g} {width * unit:.9g} {height * unit:.9g}"
+    head = (
+        f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">\n<metadata>warpsplat '
+    )
+    return head + text[found.end() :]
 
 
 def read_metadata(text: str) -> str:

@@ -1,0 +1,16 @@
+"""What a byte is worth: the exchange rate of error and file size."""
+
+from __future__ import annotations
+
+import math
+
+DB_PER_DOUBLING = 1.8
+"""What twice the shapes, and so twice the bytes, gain on photographs [dB] (docs/experiments.md)."""
+
+
+def byte_worth(square_error: float, size: int) -> float:
+    """What the mean squared error may grow by for each byte saved of a file with ``size`` bytes.
+
+    Shapes bought with the byte would lower it by as much: d error / d size at ``DB_PER_DOUBLING``.
+    """
+    return square_error * DB_PER_DOUBLING * math.log(10) / (10 * math.log(2) * size)
