@@ -38,6 +38,8 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
         shrinks = mask.shape[1] >= width and mask.shape[0] >= height
         how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
         counts = LEAST + (1 - LEAST) * np.clip(cv2.resize(mask, (width, height), interpolation=how), 0, 1)
+        # So that a mask of one grey is exactly none.
+        counts = np.asarray(counts / counts.mean(dtype=np.float64), np.float32)
         weights = counts if weights is None else weights * counts
     return weights
 

@@ -80,10 +80,12 @@ class Settings:
     """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
-    ssim: float = 0.005
-    """Weight of 1 - SSIM beside the mean squared error."""
-    texture: float = 0.0
-    """Power of the local variance by which the error of a pixel counts less: what is busy hides errors."""
+    ssim: float = 0.0
+    """Weight of 1 - SSIM of small windows beside the mean squared error. It raises the SSIM, and lowers PSNR
+    and SSIMULACRA2."""
+    texture: float = 0.3
+    """Power of the local variance by which the error of a pixel counts less: what is busy hides errors. As
+    far as it can go without cost in PSNR (docs/experiments.md)."""
     xing: float = 0.0
     """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
     bending: float = 5e-4

@@ -57,6 +57,7 @@ def refine(
         density=Density(interval=0),
         rates={**settings.rates, "points": REFINE_RATE},
         renderer="exact",
+        texture=0.0,  # whether a result is better is for the PSNR to say
     )
     seconds = training_seconds(settings, target, started)
     made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
