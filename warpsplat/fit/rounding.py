@@ -53,7 +53,7 @@ def stage_at(settings: Settings, step: int) -> int | None:
 
 
 def opacities_at(settings: Settings) -> int:
-    """Steps after which the opacities are held: once no shape comes or goes and the image is at its finest."""
+    """Steps after which the opacities are held: once shapes stay and the image is at its finest."""
     share = max(settings.density.stop, settings.coarse)
     return min(round(share * settings.iterations) + 1, settings.iterations - STAGES * stage_steps(settings))
 

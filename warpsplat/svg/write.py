@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from warpsplat import __version__
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
@@ -58,81 +57,89 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
     )
 
 
-def integers(values: npt.NDArray[np.int64]) -> str:
+Pair = tuple[int, int]
+
+
+def integers(pairs: Iterable[Pair]) -> str:
     """Whole numbers in a row with the fewest separators: a sign separates itself."""
-    return " ".join(map(str, values.ravel().tolist())).replace(" -", "-")
+    return " ".join([f"{x} {y}" for x, y in pairs]).replace(" -", "-")
+
+
+def minus(a: Pair, b: Pair) -> Pair:
+    """The way from ``b`` to ``a``."""
+    return a[0] - b[0], a[1] - b[1]
 
 
 def path_data(points: FloatArray, kind: Kind, basis: Basis, per_pixel: float) -> str:
     """``d`` of one shape, points of shape (point, 2) as in ``Scene``, in whole numbers of the view box."""
     closed = kind == Kind.FILL
-    if basis == Basis.SPLINE:
-        return spline_data(points, closed, per_pixel)
-    grid = np.round(points.astype(np.float64) * per_pixel).astype(np.int64)
-    if closed:
-        grid = np.concatenate([grid, grid[:1]])
-    count = (len(grid) - 1) // 3
-    steps = grid[1:].reshape(count, 3, 2) - grid[:-1:3, None]
-    if closed:
+    # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
+    unit = per_pixel / 2 if basis == Basis.SPLINE else per_pixel
+    grid = [(x, y) for x, y in np.round(points.astype(np.float64) * unit).astype(np.int64).tolist()]
+    return spline_data(grid, closed) if basis == Basis.SPLINE else cubic_data(grid, closed)
+
+
+def cubic_data(grid: list[Pair], closed: bool) -> str:
+    """``d`` of a chain of cubics."""
+    chain = [*grid, grid[0]] if closed else grid
+    steps: list[Pair] = []
+    for i in range(0, len(chain) - 1, 3):
+        cubic = [minus(point, chain[i]) for point in chain[i + 1 : i + 4]]
         # A cubic without extent draws nothing in a fill; in a stroke it may be the dot that is all there is.
-        steps = steps[steps.any(axis=(1, 2))]
-    text = f"M{integers(grid[0])}"
-    return f"{text}c{integers(steps)}" if len(steps) else f"{text}z"
+        if not closed or any(x or y for x, y in cubic):
+            steps += cubic
+    text = f"M{integers(chain[:1])}"
+    return f"{text}c{integers(steps)}" if steps else f"{text}z"
 
 
-def spline_data(points: FloatArray, closed: bool, per_pixel: float) -> str:
+def spline_data(half: list[Pair], closed: bool) -> str:
     """``d`` of a spline: one quadratic, and smooth ones, whose control points follow (SVG 1.1, 8.3.7).
 
-    The points lie on even numbers, so that the quadratics meet on whole ones. A ring is written from the point
-    from which it takes the fewest characters.
+    ``half``: its points in half of the numbers that are written. A ring is written from where that takes the
+    fewest characters.
     """
-    half = np.round(points.astype(np.float64) * (per_pixel / 2)).astype(np.int64)
     if closed:
-        half = np.roll(half, -_cheapest_start(half), axis=0)
-        joints = half + np.roll(half, 1, axis=0)
-        joints = np.concatenate([joints, joints[:1]])
-        control = 2 * half[0]
+        start = _cheapest_start(half)
+        ring = half[start:] + half[:start]
+        ring = [ring[-1], *ring, ring[0]]
     else:
-        joints = np.concatenate([2 * half[:1], half[1:-2] + half[2:-1], 2 * half[-1:]])
-        control = 2 * half[1]
-    steps = np.diff(joints, axis=0)
-    text = f"M{integers(joints[0])}q{integers(np.stack([control - joints[0], steps[0]]))}"
+        ring = half
+    joints = [(a + c, b + d) for (a, b), (c, d) in itertools.pairwise(ring)]
+    if not closed:
+        joints = [(2 * half[0][0], 2 * half[0][1]), *joints[1:-1], (2 * half[-1][0], 2 * half[-1][1])]
+    control = (2 * ring[1][0], 2 * ring[1][1])
+    steps = [minus(after, before) for before, after in itertools.pairwise(joints)]
+    text = f"M{integers(joints[:1])}q{integers([minus(control, joints[0]), steps[0]])}"
     return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text
 
 
-def _digits(values: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Digits of both coordinates together, shape (point, 2) -> (point,)."""
-    return (np.searchsorted(POWERS, np.abs(values), side="right") + 1).sum(axis=1)
-
-
-POWERS = 10 ** np.arange(1, 16)
-
-
-def _cheapest_start(half: npt.NDArray[np.int64]) -> int:
-    """The point of a ring before which to start: where the start, and the control point that is written
-    besides, have the fewest digits. The steps are the same from everywhere.
+def _cheapest_start(half: list[Pair]) -> int:
+    """The point of a ring before which to start: the start, and the control point that is written besides,
+    are shortest there. The steps are the same from everywhere.
     """
-    before = np.roll(half, 1, axis=0)
-    return int(np.argmin(_digits(half + before) + _digits(half - before)))
+    lengths = [
+        len(f"{a + c}{b + d}{c - a}{d - b}")
+        for (a, b), (c, d) in zip([half[-1], *half[:-1]], half, strict=True)
+    ]
+    return lengths.index(min(lengths))
 
 
-def hex_color(color: FloatArray) -> str:
-    """sRGB in [0, 1] -> ``#rrggbb``, or ``#rgb`` where that is the same."""
-    text = "".join(f"{int(v):02x}" for v in np.clip(np.round(color.astype(np.float64) * 255), 0, 255))
-    if text[0] == text[1] and text[2] == text[3] and text[4] == text[5]:
-        text = text[0] + text[2] + text[4]
-    return f"#{text}"
+def hex_colors(colors: FloatArray) -> list[str]:
+    """sRGB in [0, 1], shape (n, 3) -> ``#rrggbb``, or ``#rgb`` where that is the same."""
+    levels = np.clip(np.round(colors.astype(np.float64) * 255), 0, 255).astype(np.int64)
+    texts = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in levels.tolist()]
+    return [f"#{t[1]}{t[3]}{t[5]}" if t[1] == t[2] and t[3] == t[4] and t[5] == t[6] else t for t in texts]
 
 
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
 
-def _element(scene: Scene, shape: int, per_pixel: float, opacity_scale: float) -> str:
+def _element(scene: Scene, shape: int, color: str, per_pixel: float, opacity_scale: float) -> str:
     """The path of one shape."""
     kind = Kind(int(scene.kind[shape]))
     attribute = PAINTED[kind]
-    style = f'{attribute}="{hex_color(scene.colors[shape])}"'
+    style = f'{attribute}="{color}"'
     if kind == Kind.STROKE:
         style += f' stroke-width="{number(float(scene.widths[shape] * per_pixel), WIDTH_DECIMALS)}"'
     shown = min(float(scene.opacities[shape]) * opacity_scale, 1.0)
@@ -144,9 +151,10 @@ def _element(scene: Scene, shape: int, per_pixel: float, opacity_scale: float) -
 
 def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
     """Neighbours of one kind share a group, and what it says of them."""
+    colors = hex_colors(scene.colors)
     for kind, shapes in itertools.groupby(range(len(scene)), lambda i: Kind(int(scene.kind[i]))):
         yield f"<g {STROKE_ATTRIBUTES}>" if kind == Kind.STROKE else "<g>"
-        yield from (_element(scene, i, per_pixel, opacity_scale) for i in shapes)
+        yield from (_element(scene, i, colors[i], per_pixel, opacity_scale) for i in shapes)
         yield "</g>"
 
 
@@ -170,7 +178,7 @@ def write_svg(
         background: whether to write it; without, the picture is transparent where no shape is.
     """
     canvas = scene.canvas
-    fill = hex_color(canvas.background)
+    fill = hex_colors(canvas.background[None])[0]
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
     behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n' if background else ""
     shapes = "".join(_groups(scene, per_pixel, opacity_scale))
