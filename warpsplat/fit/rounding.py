@@ -106,11 +106,13 @@ def hold_opacities(step: Step) -> None:
 
 
 def hold_stage(step: Step, stage: int) -> None:
-    """Round the points that belong to ``stage`` (1 to ``STAGES``), and hold them from now on."""
+    """Round the points that belong to ``stage`` (1 to ``STAGES``) and all widths, and hold them."""
     parameters = step.state.parameters
     scene = parameters.scene()
     low = rounded(scene, step.state.per_pixel)
     index = np.arange(len(scene.points)) - np.repeat(scene.first[:-1], scene.point_counts())
     held = index % STAGES < stage
-    parameters.assign(replace(scene, points=np.where(held[:, None], low.points, scene.points)))
+    points = np.where(held[:, None], low.points, scene.points)
+    parameters.assign(replace(scene, points=points, widths=low.widths))
     parameters.hold("points", held)
+    parameters.hold("widths", np.ones(len(scene), np.bool_))

@@ -21,8 +21,8 @@ NAMESPACE = "http://www.w3.org/2000/svg"
 OPACITY_DECIMALS = 2
 """An 8-bit colour moves by less than an eighth of a level for half a unit of the third decimal."""
 
-WIDTH_DECIMALS = 1
-"""Of a stroke's width, which has no separators to save."""
+WIDTH_STEP = 0.25
+"""Coarsest step of a stroke's width [px]: whole units of the view box where they are that fine, else tenths."""
 
 OPAQUE = 1 - 0.5 / 255
 """From here on an opacity is left out: opaque paths are smaller and quicker to draw."""
@@ -43,6 +43,11 @@ def number(value: float, decimals: int) -> str:
     return re.sub(r"^(-?)0\.", r"\1.", text)
 
 
+def width_decimals(per_pixel: float) -> int:
+    """Decimals of a stroke's width."""
+    return 0 if per_pixel * WIDTH_STEP >= 1 else 1
+
+
 def rounded(scene: Scene, per_pixel: float) -> Scene:
     """What a file with ``per_pixel`` units a pixel holds of ``scene``."""
     spline = scene.basis[np.repeat(np.arange(len(scene)), scene.point_counts())] == Basis.SPLINE
@@ -53,7 +58,7 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
         points=(np.round(scene.points / unit) * unit).astype(np.float32),
         colors=(np.round(scene.colors * 255.0) / 255).astype(np.float32),
         opacities=np.where(scene.opacities < OPAQUE, shown, 1).astype(np.float32),
-        widths=(np.round(scene.widths * per_pixel, WIDTH_DECIMALS) / per_pixel).astype(np.float32),
+        widths=(np.round(scene.widths * per_pixel, width_decimals(per_pixel)) / per_pixel).astype(np.float32),
     )
 
 
@@ -141,7 +146,7 @@ def _element(scene: Scene, shape: int, color: str, per_pixel: float, opacity_sca
     attribute = PAINTED[kind]
     style = f'{attribute}="{color}"'
     if kind == Kind.STROKE:
-        style += f' stroke-width="{number(float(scene.widths[shape] * per_pixel), WIDTH_DECIMALS)}"'
+        style += f' stroke-width="{number(float(scene.widths[shape] * per_pixel), width_decimals(per_pixel))}"'
     shown = min(float(scene.opacities[shape]) * opacity_scale, 1.0)
     if shown < OPAQUE:
         style += f' {attribute}-opacity="{number(shown, OPACITY_DECIMALS)}"'
