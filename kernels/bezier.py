@@ -56,8 +56,8 @@ def bezier_points(
     count: wp.int32,
     local: wp.int32,
 ) -> control_points:
-    """Bézier ``local`` of a shape with ``count`` points from ``first`` on, as a cubic: a quadratic of a spline
-    with its degree elevated.
+    """Bézier ``local`` of a shape with ``count`` points from ``first`` on, as a cubic: quadratics of splines
+    have their degree elevated.
     """
     if basis == CUBIC:
         i = first + 3 * local

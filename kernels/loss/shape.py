@@ -82,8 +82,8 @@ def bending_backward(
     shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's Béziers, before weight
 ):
     """Bending of each Bézier, as a cubic: (|a|^2 + |b|^2) / (1 + c), a and b the second differences of its
-    control points and c the distance of its ends. A unit of length, as a hundredth of the outline of a circle is; but large
-    where handles are long for the way that they go, as in burrs and loops. One thread a shape.
+    control points and c the distance of its ends. A unit of length, as a hundredth of the outline of a circle
+    is; but large where handles are long for the way that they go, as in burrs and loops. One thread a shape.
     """
     shape = offset + wp.tid()
     first = point_first[shape]

@@ -86,8 +86,8 @@ def shapes_at(settings: Settings, step: int) -> int:
 
 
 def mean_points_at(settings: Settings, step: int) -> float:
-    """Points that splines should have in the mean after the turn at ``step``: those of a new one until all shapes
-    are there, then fewer, down to ``density.mean_points`` at the last turn.
+    """Points that splines should have in the mean after the turn at ``step``: those of a new one until all
+    shapes are there, then fewer, down to ``density.mean_points`` at the last turn.
     """
     density, steps = settings.density, settings.iterations
     last = min(density.stop, 1.0) * steps - density.interval

@@ -35,8 +35,8 @@ def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         points: shape (shape, point, 2).
 
     Returns:
-        for every point of every ring, where its two neighbours go if it is removed, shape (shape, point, 2, 2),
-        and the area that the outline then sweeps, shape (shape, point).
+        for every point of every ring, where its two neighbours go if it is removed, shape
+        (shape, point, 2, 2), and the area that the outline then sweeps, shape (shape, point).
     """
     count = points.shape[1]
     window = points[:, (np.arange(count)[:, None] + np.arange(-3, 4)) % count]  # [shape, point, 7, 2]
@@ -46,7 +46,7 @@ def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     plain = _quadratics(kept, t * 4 / 5)
     # Both neighbours move by w times the bulge that the point made.
     bulge = window[..., 3, :] - 0.5 * (window[..., 2, :] + window[..., 4, :])
-    unit = np.zeros((6, 1))
+    unit = np.zeros((6, 1), np.float32)
     unit[2:4] = 1
     share = _quadratics(unit, t * 4 / 5)  # [sample, 1]
     missing = old - plain
@@ -77,9 +77,9 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
         if group.basis != Basis.SPLINE or group.kind != Kind.FILL or number <= LEAST_POINTS:
             continue
         moved, area = without(group.points)
-        cost = area * worth[group.index][:, None]
+        cost = area * worth[group.shapes][:, None]
         for i in np.flatnonzero(np.isfinite(cost).all(axis=1)).tolist():
-            first = int(scene.first[group.index[i]])
+            first = int(scene.first[group.shapes[i]])
             chosen = _apart(cost[i], (number - LEAST_POINTS + 1) // 2)
             found += [(float(cost[i, k]), first, k, number, moved[i, k]) for k in chosen]
     found.sort(key=lambda entry: entry[:3])

@@ -33,7 +33,7 @@ class Alike(NamedTuple):
 
     kind: Kind
     basis: Basis
-    index: IndexArray
+    shapes: IndexArray
     """Which they are, shape (shape,)."""
     points: FloatArray
     """Shape (shape, point, 2)."""
@@ -45,8 +45,8 @@ class Scene:
 
     Shapes have as many Béziers as they need: the control points of all lie in one array, those of shape ``i``
     from ``first[i]`` to ``first[i + 1]``. The shape's ``basis`` says what they are. Of a fill they are a
-    ring: the last cubic ends at point 0, a spline has a quadratic for each point. Of a stroke they are a chain:
-    cubics have one point more, a spline has two points more than quadratics.
+    ring: the last cubic ends at point 0, a spline has a quadratic for each point. Of a stroke they are a
+    chain: cubics have one point more, a spline has two points more than quadratics.
     """
 
     canvas: Canvas
