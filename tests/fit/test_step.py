@@ -140,7 +140,7 @@ def test_a_look_at_the_file_that_outgrows_the_arrays(device: str) -> None:
     look_at_file(step)
     assert step._graph is not before
     assert step.renderer.capacity.slots > 9
-    shown = on_white(render_svg(export(step.state.scene(), settings)))
+    shown = on_white(render_svg(export(step.state.scene(), settings, step.state.per_pixel)))
     step.advance()
     assert step.psnr() == pytest.approx(psnr(shown, picture().astype(np.float64) * 255), abs=0.01)
 
