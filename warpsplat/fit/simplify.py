@@ -17,7 +17,7 @@ LEAST_POINTS = 4
 """Of a spline."""
 
 APART = 2
-"""Points removed in one turn have more than so many others between them: each moves its neighbours."""
+"""Points removed in one turn have at least so many others between them: each moves its neighbours."""
 
 
 def _quadratics(points: FloatArray, t: npt.NDArray[np.float64]) -> FloatArray:
@@ -42,13 +42,15 @@ def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     window = points[:, (np.arange(count)[:, None] + np.arange(-3, 4)) % count]  # [shape, point, 7, 2]
     t = (np.arange(5 * SAMPLES) + 0.5) / SAMPLES
     old = _quadratics(window, t)
+    # Without the point, two quadratics go half as far again as before.
+    t = np.interp(t, [0, 1, 2.5, 4, 5], np.arange(5))
     kept = window[..., [0, 1, 2, 4, 5, 6], :]
-    plain = _quadratics(kept, t * 4 / 5)
+    plain = _quadratics(kept, t)
     # Both neighbours move by w times the bulge that the point made.
     bulge = window[..., 3, :] - 0.5 * (window[..., 2, :] + window[..., 4, :])
     unit = np.zeros((6, 1), np.float32)
     unit[2:4] = 1
-    share = _quadratics(unit, t * 4 / 5)  # [sample, 1]
+    share = _quadratics(unit, t)  # [sample, 1]
     missing = old - plain
     along = (missing * bulge[..., None, :]).sum(axis=-1) @ share[:, 0]
     w = along / np.maximum((bulge**2).sum(axis=-1) * (share**2).sum(), 1e-12)
