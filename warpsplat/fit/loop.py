@@ -113,9 +113,9 @@ def fit(
             break
         stage = stage_at(settings, done)
         if stage is not None:
-            if stage == 0:
+            if not rounding:
                 state.per_pixel = choose_grid(step, staged=True)
-            rounding = True
+                rounding = True
             hold_stage(step, stage)
         density = settings.density
         surgical = done < density.stop * settings.iterations
