@@ -134,6 +134,7 @@ def test_strokes_of_smooth_quadratics_are_splines_clamped_at_both_ends() -> None
     assert scene.basis.tolist() == [SPLINE, SPLINE, CUBIC, CUBIC]
     np.testing.assert_allclose(scene.points_of(0), [[4, 6], [10, 2], [18, 14], [22, 6], [26, 7]], atol=1e-5)
     np.testing.assert_allclose(scene.points_of(1), [[3, 20], [8, 15], [12, 20]], atol=1e-5)
+    assert scene_of("M4 6Q10 2 14 8t6 2z", ROUND).basis.tolist() == [CUBIC], "closed by a line"
     closed = scene_of(RING + "z", ROUND)
     np.testing.assert_allclose(closed.points, [[10, 5], *CORNERS, [10, 5]], atol=1e-5)
 
