@@ -7,7 +7,6 @@ import math
 import os
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +20,15 @@ from PIL import Image
 
 from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
-from tests.scenes import random_scene
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
 from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.fit.settings import Settings, make_settings, parse_bytes, parse_duration
 from warpsplat.jobs.plan import KEYS, load_jobs
 from warpsplat.metrics import psnr
-from warpsplat.scene import Basis, Kind
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
-from warpsplat.svg.write import GRIDS, write_svg
+from warpsplat.svg.write import write_svg
 
 pytestmark = pytest.mark.slow
 
@@ -287,26 +284,6 @@ def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
     held, shown = (on_white(render_own(t.replace(own, large, 1))) for t in (svg, text))
     assert held.shape == (8 * HEIGHT, 8 * WIDTH, 3)
     assert psnr(held, shown) > FAITHFUL, text
-
-
-numbers_of_scenes = st.tuples(
-    st.sampled_from(list(Kind)), st.sampled_from(list(Basis)), st.integers(3, 9), st.integers(0, 999)
-)
-
-
-@examples(60)
-@given(st.lists(numbers_of_scenes, min_size=1, max_size=4), st.sampled_from(GRIDS))
-def test_own_files_come_back(shapes: list[tuple[Kind, Basis, int, int]], per_pixel: float) -> None:
-    """Read and written again, they are the same bytes, if no shape is too small for the grid."""
-    scene = random_scene(Kind.FILL, 0, 401, 299)
-    for _, basis, beziers, seed in shapes:
-        kind = shapes[0][0]
-        scene = scene.append(random_scene(kind, 1, 401, 299, seed=seed, basis=basis, beziers=beziers))
-    scene = replace(scene, points=np.float32(max(1.0, 4 / per_pixel)) * scene.points)
-    text = write_svg(scene, per_pixel=per_pixel)
-    back, _ = load_scene(text, 401, 299, "made up")
-    assert back.basis.tolist() == scene.basis.tolist()
-    assert write_svg(back, per_pixel=per_pixel) == text
 
 
 FAITHFUL = 30.0
