@@ -23,8 +23,8 @@ SCENES: dict[str, Scene] = {
     "fills": random_scene(Kind.FILL),
     "strokes": random_scene(Kind.STROKE),
     "crowd": random_scene(Kind.FILL, count=12, width=96, height=80, seed=3),
-    "mixed": mixed_scene(),
-    "mixed-wide": mixed_scene(64, 48, seed=2),
+    "mixed": mixed_scene(splines=False),
+    "mixed-wide": mixed_scene(64, 48, seed=2, splines=False),
     "disc": disc(10, 30, 15),
 }
 ZOOM = 4
@@ -44,7 +44,7 @@ def row(scene: Scene, text: str) -> np.ndarray:
 def main(folder: Path) -> None:
     """Write all."""
     folder.mkdir(parents=True, exist_ok=True)
-    texts = {name: write_svg(scene, precision=3) for name, scene in SCENES.items()}
+    texts = {name: write_svg(scene) for name, scene in SCENES.items()}
     for name, text in texts.items():
         (folder / f"{name}.svg").write_text(text, "utf-8")
     rows = [row(scene, texts[name]) for name, scene in SCENES.items()]

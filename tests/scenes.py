@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 
+CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
 FILL_CUBICS, STROKE_CUBICS = 4, 3
-"""As many as the shapes of a run have."""
+FILL_QUADRATICS, STROKE_QUADRATICS = 12, 5
+"""About as many as the shapes of a run have."""
 
 
 def canvas(width: int, height: int) -> Canvas:
@@ -17,13 +19,25 @@ def canvas(width: int, height: int) -> Canvas:
 
 
 def random_scene(
-    kind: Kind, count: int = 4, width: int = 40, height: int = 36, *, seed: int = 0, cubics: int | None = None
+    kind: Kind,
+    count: int = 4,
+    width: int = 40,
+    height: int = 36,
+    *,
+    seed: int = 0,
+    basis: Basis = CUBIC,
+    beziers: int | None = None,
 ) -> Scene:
-    """Wobbly blobs or strokes, some of them partly off the canvas."""
+    """Wobbly blobs or strokes of so many Béziers each, some of them partly off the canvas."""
     rng = np.random.default_rng(seed)
     centre = rng.uniform(0, 1, (count, 1, 2)) * np.array([width, height])
     outlines = _blobs if kind == Kind.FILL else _strokes
-    points = outlines(rng, centre, cubics or (FILL_CUBICS if kind == Kind.FILL else STROKE_CUBICS))
+    usual = {
+        CUBIC: (FILL_CUBICS, STROKE_CUBICS),
+        SPLINE: (FILL_QUADRATICS, STROKE_QUADRATICS),
+    }
+    beziers = beziers or usual[basis][kind == Kind.STROKE]
+    points = outlines(rng, centre, point_count(kind, basis, beziers))
     colors = rng.uniform(0.05, 0.95, (count, 3))
     opacities = rng.uniform(0.4, 0.95, count)
     widths = rng.uniform(1.5, 7, count) if kind == Kind.STROKE else np.zeros(count)
@@ -31,51 +45,76 @@ def random_scene(
         kind,
         canvas(width, height),
         points.astype(np.float32),
+        basis,
         colors=colors.astype(np.float32),
         opacities=opacities.astype(np.float32),
         widths=widths.astype(np.float32),
     )
 
 
-def _blobs(rng: np.random.Generator, centre: np.ndarray, cubics: int) -> np.ndarray:
-    count = 3 * cubics
+def point_count(kind: Kind, basis: Basis, beziers: int) -> int:
+    """Control points of a shape of so many Béziers."""
+    if basis == CUBIC:
+        return 3 * beziers + (kind == Kind.STROKE)
+    return beziers + 2 * (kind == Kind.STROKE)
+
+
+def _blobs(rng: np.random.Generator, centre: np.ndarray, count: int) -> np.ndarray:
     angle = 2 * np.pi * np.arange(count) / count
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return centre + rng.uniform(4, 12, (len(centre), count, 1)) * 1.15 * ring
 
 
-def _strokes(rng: np.random.Generator, centre: np.ndarray, cubics: int) -> np.ndarray:
+def _strokes(rng: np.random.Generator, centre: np.ndarray, count: int) -> np.ndarray:
     direction = rng.uniform(0, 2 * np.pi, (len(centre), 1, 1))
-    along = np.linspace(-14, 14, 3 * cubics + 1)[None, :, None]
+    along = np.linspace(-14, 14, count)[None, :, None]
     line = centre + along * np.concatenate([np.cos(direction), np.sin(direction)], axis=2)
     return line + rng.normal(0, 2.0, line.shape)
 
 
-def ragged_scene(
-    shapes: Sequence[tuple[Kind, int]], width: int = 40, height: int = 36, *, seed: int = 0
-) -> Scene:
-    """One random shape for each kind and number of cubics, the first furthest back."""
+Outline = tuple[Kind, Basis, int]
+"""Of one shape: what it is, and its number of Béziers."""
+
+
+def ragged_scene(shapes: Sequence[Outline], width: int = 40, height: int = 36, *, seed: int = 0) -> Scene:
+    """One random shape for each outline, the first furthest back."""
     scene = random_scene(Kind.FILL, 0, width, height)
-    for i, (kind, cubics) in enumerate(shapes):
-        scene = scene.append(random_scene(kind, 1, width, height, seed=100 * seed + i, cubics=cubics))
+    for i, (kind, basis, beziers) in enumerate(shapes):
+        one = random_scene(kind, 1, width, height, seed=100 * seed + i, basis=basis, beziers=beziers)
+        scene = scene.append(one)
     return scene
 
 
-MIXED = (
-    (Kind.FILL, 4),
-    (Kind.STROKE, 3),
-    (Kind.STROKE, 1),
-    (Kind.FILL, 2),
-    (Kind.STROKE, 5),
-    (Kind.FILL, 6),
-    (Kind.STROKE, 2),
-    (Kind.FILL, 4),
+MIXED_CUBICS: tuple[Outline, ...] = (
+    (Kind.FILL, CUBIC, 4),
+    (Kind.STROKE, CUBIC, 3),
+    (Kind.STROKE, CUBIC, 1),
+    (Kind.FILL, CUBIC, 2),
+    (Kind.STROKE, CUBIC, 5),
+    (Kind.FILL, CUBIC, 6),
+    (Kind.STROKE, CUBIC, 2),
+    (Kind.FILL, CUBIC, 4),
 )
 """Fills and strokes by turns, of different numbers of cubics; the fills' are even, as splats need."""
 
+MIXED: tuple[Outline, ...] = (
+    (Kind.FILL, SPLINE, 12),
+    (Kind.STROKE, CUBIC, 3),
+    (Kind.STROKE, SPLINE, 1),
+    (Kind.FILL, CUBIC, 3),
+    (Kind.FILL, SPLINE, 3),
+    (Kind.STROKE, SPLINE, 6),
+    (Kind.STROKE, CUBIC, 1),
+    (Kind.FILL, CUBIC, 4),
+    (Kind.FILL, SPLINE, 7),
+    (Kind.STROKE, SPLINE, 2),
+)
+"""Of both bases as well, from the fewest points on."""
 
-def mixed_scene(width: int = 40, height: int = 36, *, seed: int = 0) -> Scene:
-    return ragged_scene(MIXED, width, height, seed=seed)
+
+def mixed_scene(width: int = 40, height: int = 36, *, seed: int = 0, splines: bool = True) -> Scene:
+    """Of fills and strokes of different lengths; without splines, such as splats can show."""
+    return ragged_scene(MIXED if splines else MIXED_CUBICS, width, height, seed=seed)
 
 
 def with_points(scene: Scene, points: FloatArray) -> FloatArray:
@@ -85,8 +124,8 @@ def with_points(scene: Scene, points: FloatArray) -> FloatArray:
 
 def points_by_shape(scene: Scene) -> FloatArray:
     """Of a scene of alike shapes: (shape, point, 2), a copy."""
-    ((_, _, points),) = scene.alike()
-    return points.copy()
+    (group,) = scene.alike()
+    return group.points.copy()
 
 
 def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> Scene:

@@ -1,9 +1,20 @@
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from warpsplat.fit.schedule import fold_weight, opacity_threshold, phase_at, phases, shapes_at
-from warpsplat.fit.settings import QUALITIES, Density, make_settings
+from warpsplat.fit.schedule import (
+    fold_weight,
+    mean_points_at,
+    opacity_threshold,
+    phase_at,
+    phases,
+    shapes_at,
+)
+from warpsplat.fit.settings import QUALITIES, Density, Quality, Settings, make_settings
 
 DENSITY = Density()
 
@@ -38,20 +49,60 @@ def test_threshold_falls() -> None:
     assert values[2] == values[3] == pytest.approx(DENSITY.opacity_end)
 
 
-def test_the_number_of_curves_grows_to_all() -> None:
-    settings = make_settings(curves=90, iterations=1000)
-    counts = [shapes_at(settings, step) for step in range(0, 1000, 25)]
+SURPLUS = Density(start=1 / 3, grown=0.5, surplus=1.5, thin=0.6, stop=0.8)
+
+
+def turns_of(settings: Settings) -> list[int]:
+    """Steps after which there is a turn; 0 for the start."""
+    density = settings.density
+    return list(range(0, math.ceil(density.stop * settings.iterations), density.interval))
+
+
+def test_the_number_of_curves_grows_to_a_surplus_that_is_thinned() -> None:
+    """It grows until ``grown``, stays until ``thin``, falls until ``stop``."""
+    settings = make_settings(curves=90, iterations=1000, density=SURPLUS)
+    counts = {step: shapes_at(settings, step) for step in turns_of(settings)}
     assert counts[0] == 30
+    growing = [counts[s] for s in counts if s <= 500]
+    assert growing == sorted(set(growing)), "more at every turn"
+    assert {counts[s] for s in counts if 500 <= s <= 600} == {135}
+    falling = [counts[s] for s in counts if s >= 600]
+    assert falling == sorted(set(falling), reverse=True), "fewer at every turn"
+    assert falling[-1] == 90
+
+
+def test_thinning_takes_like_shares() -> None:
+    settings = make_settings(curves=9000, iterations=1000, density=SURPLUS)
+    counts = np.array([shapes_at(settings, step) for step in turns_of(settings) if step >= 600])
+    shares = counts[1:] / counts[:-1]
+    np.testing.assert_allclose(shares, shares[0], rtol=1e-3)
+
+
+def test_without_a_surplus_the_number_grows_to_all_and_stays() -> None:
+    settings = make_settings(curves=90, iterations=1000, density=replace(SURPLUS, surplus=1.0))
+    counts = [shapes_at(settings, step) for step in turns_of(settings)]
     assert counts == sorted(counts)
     assert counts[19] < 90
     assert set(counts[20:]) == {90}
 
 
-@pytest.mark.parametrize("iterations", [1, 30, 60, 100])
-def test_short_runs_have_all_shapes_at_the_last_turn(iterations: int) -> None:
-    settings = make_settings(curves=90, iterations=iterations)
-    turns = [s for s in range(25, iterations + 1, 25) if s < settings.density.stop * iterations]
-    assert shapes_at(settings, turns[-1] if turns else 0) == 90
+@pytest.mark.parametrize("quality", QUALITIES)
+@pytest.mark.parametrize("iterations", [1, 26, 30, 60, 100, 101, 333, 1000])
+def test_all_shapes_and_no_more_are_there_after_the_last_turn(quality: Quality, iterations: int) -> None:
+    settings = make_settings(quality, curves=90, iterations=iterations)
+    assert shapes_at(settings, turns_of(settings)[-1]) == 90
+    without = replace(settings, density=replace(settings.density, interval=0))
+    assert shapes_at(without, 0) == 90
+
+
+def test_splines_lose_points_once_all_shapes_are_there() -> None:
+    density = replace(SURPLUS, mean_points=8.0)
+    settings = make_settings(curves=90, iterations=1000, density=density, spline_points=12)
+    means = {step: mean_points_at(settings, step) for step in turns_of(settings)}
+    assert {means[s] for s in means if s <= 500} == {12}
+    falling = [means[s] for s in means if s >= 500]
+    assert falling == sorted(set(falling), reverse=True)
+    assert falling[-1] == 8
 
 
 def test_coarse_first_then_fine() -> None:

@@ -59,7 +59,7 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
     """On a CPU a step is a graph where one thread is asked for; on a GPU always. Every loss is on."""
     target = np.random.default_rng(0).uniform(size=(48, 64, 3)).astype(np.float32)
     settings = make_settings(kind=kind, renderer=renderer, curves=10, iterations=50, xing=0.01)
-    scene = mixed_scene(64, 48) if kind is None else None
+    scene = mixed_scene(64, 48, splines=renderer == "exact") if kind is None else None
     scenes = []
     for graph in (True, False):
         step = step_for(target, settings, device, threads=1, scene=scene)
@@ -78,7 +78,8 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     launched = {"removal_cost"}  # between steps
     for renderer in ("exact", "splat"):
         settings = make_settings(renderer=renderer, iterations=50, xing=0.01)
-        step = step_for(picture(), settings, device, threads=1, scene=mixed_scene(64, 48))
+        scene = mixed_scene(64, 48, splines=renderer == "exact")
+        step = step_for(picture(), settings, device, threads=1, scene=scene)
         assert step._graph is not None
         launched |= {launch.name for program in step.programs for launch in program.launches}
     every = {kernel.key for module in kernel_modules() for kernel in kernels_of(module)}
@@ -151,7 +152,7 @@ def test_a_look_at_the_file_that_outgrows_the_arrays(device: str) -> None:
     look_at_file(step)
     assert step._graph is not before
     assert step.renderer.capacity.slots > 9
-    shown = on_white(render_svg(export(step.state.scene(), settings)))
+    shown = on_white(render_svg(export(step.state.scene(), settings, step.state.per_pixel)))
     step.advance()
     assert step.psnr() == pytest.approx(psnr(shown, picture().astype(np.float64) * 255), abs=0.01)
 

@@ -10,6 +10,9 @@ import numpy as np
 from PIL import Image
 
 from tests.fuzz.vocabulary import HEAD, HEADS, HEIGHT, SHAPES, WIDTH, YAMLS
+from tests.scenes import ragged_scene
+from warpsplat.scene import Basis, Kind
+from warpsplat.svg.write import write_svg
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,9 @@ def svgs() -> list[Seed]:
     seeds = [Seed(f"shape-{i}.svg", f"{HEAD}{shape}</svg>".encode()) for i, shape in enumerate(SHAPES)]
     for step in (2, 3, 5):
         seeds.append(Seed(f"every-{step}.svg", f"{HEAD}{''.join(SHAPES[::step])}</svg>".encode()))
-    fills, strokes = own_svg("fill"), own_svg("stroke")
-    seeds += [Seed("fills.svg", fills)] * 4 + [Seed("strokes.svg", strokes)] * 4
+    for kind in ("fill", "stroke"):
+        seeds += [Seed(f"{kind}s.svg", own_svg(kind))] * 3
+        seeds += [Seed(f"{kind}s-fine.svg", own_svg(kind, 100)), Seed(f"{kind}s-old.svg", older_svg(kind))]
     seeds += [
         Seed(f"head-{i}.svg", f"{head}{''.join(SHAPES[: 3 * i + 2])}</svg>".encode())
         for i, head in enumerate(HEADS)
@@ -100,8 +104,16 @@ def svgs() -> list[Seed]:
     return seeds
 
 
-def own_svg(kind: str) -> bytes:
-    """An SVG as this tool writes it: ``kind`` is "fill" or "stroke"."""
+def own_svg(kind: str, per_pixel: float = 8) -> bytes:
+    """An SVG as this tool writes it, with curves of both bases: ``kind`` is "fill" or "stroke"."""
+    painted = Kind[kind.upper()]
+    outlines = [(painted, basis, beziers) for beziers in (3, 9, 4) for basis in Basis]
+    scene = ragged_scene(outlines, WIDTH, HEIGHT, seed=1)
+    return write_svg(scene, per_pixel=per_pixel, metadata="key=0123456789abcdef01234567").encode()
+
+
+def older_svg(kind: str) -> bytes:
+    """An SVG as this tool wrote it at first: coordinates with decimals, paths that are closed."""
     rng = np.random.default_rng(1)
     rows = []
     for _ in range(6):

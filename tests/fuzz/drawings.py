@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from tests.fuzz.vocabulary import CLAIMS_OF_FILLS, CLAIMS_OF_STROKES, GROUPS, HEAD, PAINTS
+from tests.fuzz.vocabulary import CLAIMS_OF_FILLS, CLAIMS_OF_STROKES, GROUPS, HEAD, HEIGHT, PAINTS, WIDTH
 
 numbers = st.integers(-4, 36).map(str)
 sizes = st.integers(1, 20).map(str)
@@ -26,9 +26,34 @@ curves = st.one_of(
     _command("h", numbers),
     _command("z"),
 )
-outlines = st.tuples(points, st.lists(curves, min_size=1, max_size=5)).map(
-    lambda p: f"M{p[0]}" + "".join(p[1])
+
+
+def _ring(controls: list[tuple[int, int]], letters: str, ending: str) -> str:
+    """A closed spline as a path: one quadratic and smooth ones, back at its start."""
+    joints = [(a[0] + b[0], a[1] + b[1]) for a, b in zip(controls, controls[1:] + controls[:1], strict=True)]
+    x, y = joints[-1]
+    data = f"M{x} {y}"
+    for i, (u, v) in enumerate(joints):
+        ends = [(u, v)] if i else [(2 * controls[0][0], 2 * controls[0][1]), (u, v)]
+        if letters.islower():
+            ends = [(a - x, b - y) for a, b in ends]
+        data += letters[min(i, 1)] + " ".join(f"{a} {b}" for a, b in ends)
+        x, y = u, v
+    return data + ending
+
+
+freely = st.tuples(points, st.lists(curves, min_size=1, max_size=5)).map(lambda p: f"M{p[0]}" + "".join(p[1]))
+smoothly = st.tuples(points, points, st.lists(points, min_size=1, max_size=5)).map(
+    lambda p: f"M{p[0]}Q{p[1]} {p[2][0]}" + "".join("T" + q for q in p[2][1:])
 )
+corners = st.tuples(st.integers(-1, 17), st.integers(-1, 13))
+rings = st.builds(
+    _ring,
+    st.lists(corners, min_size=2, max_size=7),
+    st.sampled_from(("QT", "qt")),
+    st.sampled_from(("", "z")),
+)
+outlines = st.one_of(freely, smoothly, rings)
 elements = st.one_of(
     st.lists(outlines, min_size=1, max_size=2).map(lambda d: f'<path d="{"".join(d)}"'),
     st.tuples(numbers, numbers, sizes, sizes, sizes).map(
@@ -46,14 +71,21 @@ stroked = st.tuples(elements, paints, st.sampled_from(CLAIMS_OF_STROKES)).map(
 )
 
 
-def _drawing(group: str, shapes: list[str]) -> str:
+def _drawing(group: str, shapes: list[str], per_pixel: int) -> str:
+    """``per_pixel``: units of the view box a pixel."""
     name = group.strip("<>").split()[0]
-    return f"{HEAD}{group}{''.join(shapes)}</{name}></svg>"
+    drawn = f"{group}{''.join(shapes)}</{name}>"
+    if per_pixel == 1:
+        return f"{HEAD}{drawn}</svg>"
+    box = f'viewBox="0 0 {per_pixel * WIDTH} {per_pixel * HEIGHT}"'
+    head = HEAD.replace(f'viewBox="0 0 {WIDTH} {HEIGHT}"', box)
+    return f'{head}<g transform="scale({per_pixel})">{drawn}</g></svg>'
 
 
 drawings = st.builds(
     _drawing,
     st.sampled_from(GROUPS),
     st.lists(filled, min_size=1, max_size=4) | st.lists(stroked, min_size=1, max_size=4),
+    st.sampled_from((1, 1, 3, 100)),
 )
 """A few shapes in one group."""

@@ -279,7 +279,7 @@ def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
     except ImageError as error:
         assert_named(error)
         return
-    svg = write_svg(scene, precision=3, background=background)
+    svg = write_svg(scene, background=background)
     own, large = f'width="{WIDTH}" height="{HEIGHT}"', f'width="{8 * WIDTH}" height="{8 * HEIGHT}"'
     held, shown = (on_white(render_own(t.replace(own, large, 1))) for t in (svg, text))
     assert held.shape == (8 * HEIGHT, 8 * WIDTH, 3)

@@ -10,12 +10,16 @@ HEADS = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="1in" height=".75in">',
     '<?xml version="1.0"?><!DOCTYPE svg [<!ENTITY a "red">]><svg xmlns="http://www.w3.org/2000/svg" width="100%" viewBox="-5 -5 64 48">',
     '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="8em" height="6em" viewBox="0 0 32 24" preserveAspectRatio="none">',
+    '<svg xmlns="http://www.w3.org/2000/svg" width="32" height="24" viewBox="0 0 3200 2400">',
 )
 """Other ways of saying how large an SVG is."""
 
 SHAPES = (
     '<path d="M2 2C8 2 20 4 28 10S14 22 9 20z" fill="#8a3c1e" fill-opacity=".8"/>',
     '<path d="M3 12q8-9 12 0t12 2" fill="none" stroke="#123" stroke-width="2.5" stroke-linecap="round"/>',
+    '<path d="M8 12q2-8 10-8t8 8-10 8-8-8" fill="#83c" fill-opacity=".7"/>',
+    '<path d="M8 12Q10 4 18 4T26 12 16 20 8 12z" fill="#38c"/>',
+    '<path d="M2 6q9-9 13 2t8 3t-4 6 6 5" fill="none" stroke="#a52" stroke-width="1.5" stroke-linecap="round" stroke-linejoin="round"/>',
     '<path d="M4 4h20v14H4zM8 8v6h10V8z" fill="teal" fill-rule="evenodd"/>',
     '<path d="M5 20A9 7 30 1 0 20 5" style="fill:none;stroke:rgb(10%,20%,30%);stroke-opacity:.5"/>',
     '<rect x="1" y="2" width="12" height="9" rx="3" fill="hsl(120,50%,50%)"/>',
@@ -53,7 +57,7 @@ SVG_WORDS = (
     "x", "y", "r", "rx", "cx", "points", "href", "id", "class", "display", "visibility", "fill-rule", "stroke-dasharray",
     "stroke-linecap", "stroke-linejoin", "preserveAspectRatio", "none", "inherit", "currentColor", "evenodd", "hidden", "auto",
     "scale", "rotate", "translate", "matrix", "skewX", "url", "rgb", "rgba", "hsl", "white", "transparent", "em", "ex", "px",
-    "M", "m", "L", "l", "H", "v", "C", "c", "S", "Q", "T", "A", "a", "Z", "z", "xMidYMid", "meet", "slice",
+    "M", "m", "L", "l", "H", "v", "C", "c", "S", "Q", "T", "q", "t", "A", "a", "Z", "z", "xMidYMid", "meet", "slice",
 )  # fmt: skip
 
 SVG_SNIPPETS = (
@@ -64,6 +68,7 @@ SVG_SNIPPETS = (
     "<![CDATA[<path d='M0 0'/>]]>",
     '<path d="z"/>',
     '<path d="M0 0' + "l1 1" * 3000 + '"/>',
+    '<path d="M0 0q1 2 3 1' + "t1 1" * 3000 + '"/>',
     '<path d="M0 0' + "a9 9 0 1 1 1 1" * 300 + '"/>',
     '<path d="' + "M0 0z" * 2000 + '"/>',
     '<use href="#s"/>',
@@ -73,7 +78,7 @@ SVG_SNIPPETS = (
     '<g transform="scale(1e-30) rotate(45)">',
     '<circle r="1e9" fill="url(#g)"/>',
     ' width="0"', ' height="-1"', ' width="1e30"', ' height="2000000"', ' width="100%"', ' viewBox="0 0 0 0"',
-    ' viewBox="0 0 1 60000"', ' viewBox="1e30 0 1e-30 5"', ' viewBox="nan 0 1 1"', ' style="mix-blend-mode:screen"',
+    ' viewBox="0 0 1 60000"', ' viewBox="0 0 3200 2400"', ' viewBox="0 0 3200000 2400000"', ' viewBox="1e30 0 1e-30 5"', ' viewBox="nan 0 1 1"', ' style="mix-blend-mode:screen"',
     ' stroke-dasharray="1e-9"', ' stroke-dasharray="0 0"', ' stroke-miterlimit="0"', ' stroke-width="1e30"', ' opacity=".5em"',
     ' fill="url(#nothing) red"', ' fill="#ggg"', ' fill="rgb(999,-1,1e400)"', ' transform="matrix(0 0 0 0 0 0)"', ' d=""',
     "\0", "\x1b[31m", "\ufffe", "\u202e", "</g>", "</svg>", "<svg>", "<", ">", '"', "&", "&#0;", "&#x110000;",

@@ -38,6 +38,7 @@ def test_a_default_is_what_a_run_takes(option: Option) -> None:
     if option.kind is not None:
         assert (settings.kind == option.kind) == bool(option.default)
     elif option.default and hasattr(settings, option.setting):
-        assert str(getattr(settings, option.setting)) == option.default.partition(";")[0]
+        value = getattr(settings, option.setting)
+        assert ("auto" if value is None else str(value)) == option.default.partition(";")[0]
     else:
         assert option.name == "quality" or option.setting in Settings.__dataclass_fields__

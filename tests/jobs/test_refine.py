@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import random_scene
+from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.refine import refine
 from warpsplat.metrics import score_svg
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind
+from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
@@ -60,3 +61,32 @@ def test_no_improvement_changes_nothing(device: str) -> None:
     target = (on_white(render_svg(text)) / 255).astype(np.float32)
     result, _ = refine(text, target, make_settings(iterations=5), Backend.on(device), name="a.svg")
     assert result.svg == text
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_splines_of_own_files_stay_splines(device: str, kind: Kind) -> None:
+    """As cubics they would take twice as many numbers."""
+    scene = random_scene(kind, count=6, width=48, height=40, seed=2, basis=Basis.SPLINE)
+    target = render(scene, backend=Backend.on(device))
+    noise = np.random.default_rng(0).normal(0, 0.5, scene.points.shape)
+    text = write_svg(replace(scene, points=(scene.points + noise).astype(np.float32)), per_pixel=10)
+    settings = make_settings(iterations=60, precision=1)
+    result, before = refine(text, target, settings, Backend.on(device), name="a.svg")
+    assert result.score
+    assert result.score.psnr > before + 3
+    assert set(result.scene.basis) == {Basis.SPLINE}
+    np.testing.assert_array_equal(result.scene.first, scene.first)
+    assert result.score.bytes < 1.05 * len(text)
+    back, _ = load_scene(result.svg, 48, 40, "b.svg")
+    np.testing.assert_array_equal(back.basis, scene.basis)
+
+
+def test_an_own_file_of_both_bases_is_refined(device: str) -> None:
+    """Also of an image of another size than the file says."""
+    outlines = [(Kind.FILL, basis, n) for n in (3, 5) for basis in Basis]
+    text = write_svg(ragged_scene(outlines, 48, 40, seed=1), per_pixel=3)
+    target = np.full((80, 96, 3), 0.4, np.float32)
+    result, before = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
+    assert result.score
+    assert result.score.psnr > before
+    assert result.scene.basis.tolist() == [basis for _, basis, _ in outlines]

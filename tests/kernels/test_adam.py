@@ -19,6 +19,7 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
         "value": value,
         **{name: wp.zeros_like(value) for name in ("grad", "moment1", "moment2")},
         "owner": wp.array(owner, dtype=int, device=device),
+        "held": wp.zeros(len(owner), dtype=int, device=device),
         "kind": wp.array(kind, dtype=int, device=device),
         "ages": wp.zeros(len(kind), dtype=int, device=device),
         "clock": wp.zeros(1, dtype=int, device=device),
@@ -79,3 +80,29 @@ def test_shapes_without_the_attribute_stay_as_they_are(device: str) -> None:
     step(s, np.ones((4, 1), np.float32), device, kinds=1 << Kind.STROKE, low=-1.0, high=-0.01)
     assert (s["value"].numpy()[:, 0] < 0).tolist() == [False, True, False, True]
     assert (s["moment2"].numpy()[:, 0] > 0).tolist() == [False, True, False, True]
+
+
+def test_held_rows_stay_as_they_are_with_their_moments(device: str) -> None:
+    """The others move as if nothing were held; let go, a row goes on from the moments that it had."""
+    rng = np.random.default_rng(3)
+    start = rng.normal(size=(4, 2)).astype(np.float32)
+    gradients = rng.normal(size=(6, 4, 2)).astype(np.float32)
+    held, free = (state(start, [0, 1, 1, 2], [0, 1, 0], device) for _ in range(2))
+    for g in gradients[:3]:
+        step(held, g, device)
+        step(free, g, device)
+    before = {name: held[name].numpy().copy() for name in ("value", "moment1", "moment2")}
+    held["held"].assign(np.array([0, 1, 0, 1], np.int32))
+    for g in gradients[3:]:
+        step(held, g, device)
+        step(free, g, device)
+    for name, old in before.items():
+        np.testing.assert_array_equal(held[name].numpy()[[1, 3]], old[[1, 3]])
+        np.testing.assert_array_equal(held[name].numpy()[[0, 2]], free[name].numpy()[[0, 2]])
+        assert (free[name].numpy()[[1, 3]] != old[[1, 3]]).all()
+    held["held"].zero_()
+    step(held, gradients[0], device)
+    np.testing.assert_allclose(
+        held["moment1"].numpy()[1], 0.9 * before["moment1"][1] + 0.1 * gradients[0, 1], rtol=1e-5
+    )
+    assert (held["value"].numpy()[1] != before["value"][1]).all()

@@ -16,7 +16,7 @@ from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
 from warpsplat.render.tiles import to_tiles
-from warpsplat.scene import Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 
 
 @pytest.mark.parametrize("opaque", [False, True])
@@ -65,6 +65,7 @@ def test_blending_and_adjoint(device: str, opaque: bool) -> None:
 SCENES = {
     "fills": random_scene(Kind.FILL, count=9, seed=3),
     "strokes": random_scene(Kind.STROKE, count=9, seed=3),
+    "splines": random_scene(Kind.FILL, count=9, seed=3, basis=Basis.SPLINE),
     "mixed": mixed_scene(seed=3),
 }
 

@@ -7,7 +7,7 @@ import torch
 from tests.reference.composite import pixel_centres
 from tests.reference.curves import Tensors, points_of
 from tests.reference.outline import polyline
-from warpsplat.scene import Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 
 
 def ramp_integral(u: torch.Tensor) -> torch.Tensor:
@@ -65,11 +65,12 @@ def stroke_coverage(vertices: torch.Tensor, half: torch.Tensor, width: int, heig
 def coverages(
     scene: Scene, p: Tensors, pieces: list[list[int]], width: int, height: int, scale: float
 ) -> list[torch.Tensor]:
-    """Of each shape, [height, width]; ``pieces`` of each shape's cubics."""
+    """Of each shape, [height, width]; ``pieces`` of each shape's Béziers."""
     covers = []
     for shape, count in enumerate(pieces):
         kind = Kind(int(scene.kind[shape]))
-        vertices = polyline(scale * points_of(scene, p, shape), count, kind)
+        basis = Basis(int(scene.basis[shape]))
+        vertices = polyline(scale * points_of(scene, p, shape), count, kind, basis)
         if kind == Kind.FILL:
             covers.append(fill_coverage(vertices, width, height))
         else:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import torch
 
-from tests.reference.curves import points_of
-from warpsplat.scene import Kind, Scene
+from tests.reference.curves import chain, points_of
+from warpsplat.scene import Basis, Kind, Scene
 
 
 def cubics(scene: Scene, points: torch.Tensor) -> torch.Tensor:
-    """All cubics of the scene, shape by shape, [cubic, 4, 2]; ``points``: the scene's."""
+    """All Béziers of the scene as cubics, shape by shape, [Bézier, 4, 2]; ``points``: the scene's."""
     found = []
     for shape in range(len(scene)):
-        chain = points_of(scene, {"points": points}, shape)
-        if scene.kind[shape] == Kind.FILL:
-            chain = torch.cat([chain, chain[:1]])
-        found += [chain[i : i + 4] for i in range(0, len(chain) - 1, 3)]
+        own = points_of(scene, {"points": points}, shape)
+        outline = chain(own, Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape])))
+        found += [outline[i : i + 4] for i in range(0, len(outline) - 1, 3)]
     return torch.stack(found)
 
 
@@ -25,7 +24,7 @@ def sine(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 
 
 def xing(scene: Scene, points: torch.Tensor) -> torch.Tensor:
-    """Xing loss of LIVE: mean over all cubics of the scene."""
+    """Xing loss of LIVE: mean over all Béziers of the scene."""
     total = torch.zeros(())
     every = cubics(scene, points)
     for cubic in every:
@@ -36,7 +35,7 @@ def xing(scene: Scene, points: torch.Tensor) -> torch.Tensor:
 
 
 def bending(scene: Scene, points: torch.Tensor) -> torch.Tensor:
-    """Bending of each cubic, [cubic]."""
+    """Bending of each Bézier, [Bézier]."""
     p0, p1, p2, p3 = cubics(scene, points).unbind(1)
     a, b = p0 - 2 * p1 + p2, p1 - 2 * p2 + p3
     chord = ((p3 - p0).square().sum(-1) + 1e-24).sqrt()

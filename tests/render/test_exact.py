@@ -15,37 +15,44 @@ from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.models import ExactModel
 from warpsplat.render.renderer import Capacity, render
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind
 from warpsplat.scene.geometry import flatten
 from warpsplat.svg.viewer import on_white, render_svg
-from warpsplat.svg.write import write_svg
+from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
-CASES = [(FILL, 2, 1.0), (FILL, 4, 0.7), (FILL, 6, 2.0), (FILL, 3, 1.0), (STROKE, 3, 1.0), (STROKE, 2, 1.3)]
+CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
+CASES = [
+    *((FILL, CUBIC, n, scale) for n, scale in ((2, 1.0), (4, 0.7), (6, 2.0), (3, 1.0))),
+    *((STROKE, CUBIC, n, scale) for n, scale in ((3, 1.0), (2, 1.3))),
+    *((FILL, SPLINE, n, scale) for n, scale in ((3, 1.3), (5, 1.0), (8, 0.7), (12, 2.0))),
+    *((STROKE, SPLINE, n, scale) for n, scale in ((1, 1.3), (2, 1.0), (3, 0.7), (8, 2.0))),
+]
 
 
-@pytest.mark.parametrize(("kind", "cubics", "scale"), CASES)
-def test_image_and_gradients(device: str, kind: Kind, cubics: int, scale: float) -> None:
-    compare(random_scene(kind, cubics=cubics, seed=3), device, scale)
+@pytest.mark.parametrize(("kind", "basis", "beziers", "scale"), CASES)
+def test_image_and_gradients(device: str, kind: Kind, basis: Basis, beziers: int, scale: float) -> None:
+    compare(random_scene(kind, basis=basis, beziers=beziers, seed=3), device, scale)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("basis", list(Basis))
 @pytest.mark.parametrize("seed", range(4))
-def test_self_overlap_and_off_canvas(device: str, seed: int) -> None:
+def test_self_overlap_and_off_canvas(device: str, basis: Basis, seed: int) -> None:
     """Points thrown about: loops, opposite windings, outlines across every border of the canvas."""
     rng = np.random.default_rng(seed)
-    scene = random_scene(FILL, count=5, seed=seed)
+    scene = random_scene(FILL, count=5, seed=seed, basis=basis)
     points = scene.points + rng.normal(0, 14, scene.points.shape).astype(np.float32)
     compare(replace(scene, points=points), device)
-    strokes = random_scene(STROKE, count=4, seed=seed)
+    strokes = random_scene(STROKE, count=4, seed=seed, basis=basis)
     points = strokes.points + rng.normal(0, 9, strokes.points.shape).astype(np.float32)
     compare(replace(strokes, points=points), device, tolerance=3e-3)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_strokes_wider_than_tiles(device: str, seed: int) -> None:
+@pytest.mark.parametrize(("seed", "basis"), [(0, CUBIC), (1, CUBIC), (2, CUBIC), (1, SPLINE)])
+def test_strokes_wider_than_tiles(device: str, seed: int, basis: Basis) -> None:
     """A row of pixels near one segment may span many tiles; some are covered throughout."""
-    scene = random_scene(STROKE, count=3, width=120, height=90, seed=seed)
+    scene = random_scene(STROKE, count=3, width=120, height=90, seed=seed, basis=basis)
     wide = replace(scene, widths=np.array([30, 55, 80], np.float32))
     compare(wide, device, tolerance=3e-3)
     assert constants.FULL in renderer_for(wide, device).bins.buffers.slot_state.numpy()
@@ -68,9 +75,10 @@ def test_edges_on_the_borders_of_tiles(device: str, step: int, seed: int) -> Non
 
 
 @pytest.mark.parametrize("kind", list(Kind))
-def test_finite_differences(device: str, kind: Kind) -> None:
+@pytest.mark.parametrize("basis", list(Basis))
+def test_finite_differences(device: str, kind: Kind, basis: Basis) -> None:
     """No reference at all: the loss itself, a random direction in all points, central differences."""
-    scene = random_scene(kind, count=3, seed=6)
+    scene = random_scene(kind, count=3, seed=6, basis=basis)
     rng = np.random.default_rng(0)
     weights = cv2.GaussianBlur(rng.normal(size=(36, 40, 3)), (0, 0), 2.0)
     renderer = renderer_for(scene, device)
@@ -90,27 +98,21 @@ def test_finite_differences(device: str, kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("basis", list(Basis))
 @pytest.mark.parametrize("size", [1.0, 0.15])
-def test_against_a_supersampled_truth(device: str, kind: Kind, size: float) -> None:
+def test_against_a_supersampled_truth(device: str, kind: Kind, basis: Basis, size: float) -> None:
     """At least 50 dB; ``size`` 0.15 makes strokes of 0.2 to 1 px."""
-    scene = random_scene(kind, count=12, width=96, height=80, seed=3)
+    scene = random_scene(kind, count=12, width=96, height=80, seed=3, basis=basis)
     scene = replace(scene, widths=scene.widths * np.float32(size))
-    big = on_white(render_svg(write_svg(scene, precision=4), zoom=16))
+    big = on_white(render_svg(write_svg(scene), zoom=16))
     truth = cv2.resize(big, (96, 80), interpolation=cv2.INTER_AREA)
-    rounded = replace(
-        scene,
-        colors=(np.round(scene.colors * 255) / 255).astype(np.float32),
-        canvas=replace(
-            scene.canvas, background=(np.round(scene.canvas.background * 255) / 255).astype(np.float32)
-        ),
-        widths=np.round(scene.widths, 2),
-        opacities=np.round(scene.opacities, 3),
-    )
-    mine = render(rounded, backend=Backend.on(device)).astype(np.float64) * 255
+    background = (np.round(scene.canvas.background * 255) / 255).astype(np.float32)
+    held = rounded(replace(scene, canvas=replace(scene.canvas, background=background)), GRIDS[-1])
+    mine = render(held, backend=Backend.on(device)).astype(np.float64) * 255
     # resvg rounds to 8 bits at each translucent layer, which no supersampling mends: a level of bias.
     assert psnr(mine, truth) > 46
-    opaque = replace(rounded, opacities=np.ones_like(scene.opacities))
-    big = on_white(render_svg(write_svg(opaque, precision=4), zoom=16))
+    opaque = replace(held, opacities=np.ones_like(scene.opacities))
+    big = on_white(render_svg(write_svg(opaque), zoom=16))
     truth = cv2.resize(big, (96, 80), interpolation=cv2.INTER_AREA)
     mine = render(opaque, backend=Backend.on(device)).astype(np.float64) * 255
     assert psnr(mine, truth) > 50
@@ -126,8 +128,9 @@ def test_an_opaque_square_covers_exactly_its_pixels(device: str) -> None:
 
 
 @pytest.mark.parametrize("kind", list(Kind))
-def test_degenerate_shapes_do_no_harm(device: str, kind: Kind) -> None:
-    scene = random_scene(kind, count=5)
+@pytest.mark.parametrize("basis", list(Basis))
+def test_degenerate_shapes_do_no_harm(device: str, kind: Kind, basis: Basis) -> None:
+    scene = random_scene(kind, count=5, basis=basis)
     points = points_by_shape(scene)
     points[0] = points[0, 0]
     points[1, 1:4] = points[1, 0]
@@ -145,10 +148,11 @@ def test_degenerate_shapes_do_no_harm(device: str, kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("basis", list(Basis))
 @pytest.mark.parametrize("far", [3e9, 1e30, np.inf, np.nan])
-def test_numbers_of_any_size_do_no_harm(device: str, kind: Kind, far: float) -> None:
+def test_numbers_of_any_size_do_no_harm(device: str, kind: Kind, basis: Basis, far: float) -> None:
     """A file may hold any number, in a point or a width."""
-    scene = random_scene(kind, count=4)
+    scene = random_scene(kind, count=4, basis=basis)
     points, widths = points_by_shape(scene), scene.widths.copy()
     points[0, 3:6, 0] = far
     points[1, 4, 1] = -far
@@ -173,8 +177,9 @@ def test_opaque_shapes_and_none_at_all(device: str) -> None:
 
 
 @pytest.mark.parametrize("kind", list(Kind))
-def test_same_bits_for_any_number_of_threads(device: str, kind: Kind) -> None:
-    scene = random_scene(kind, count=20, width=90, height=70, seed=2)
+@pytest.mark.parametrize("basis", list(Basis))
+def test_same_bits_for_any_number_of_threads(device: str, kind: Kind, basis: Basis) -> None:
+    scene = random_scene(kind, count=20, width=90, height=70, seed=2, basis=basis)
     outcomes = []
     for threads in (1, 2, 3, 1):
         renderer = renderer_for(scene, device, threads=threads)

@@ -13,19 +13,23 @@ from tests.scenes import mixed_scene, random_scene
 from warpsplat.kernels.tile import column
 from warpsplat.render.models import EXACT, Model
 from warpsplat.render.tiles import to_tiles
-from warpsplat.scene import Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 
 
-def scene_of(name: str) -> Scene:
+def scene_of(name: str, splines: bool) -> Scene:
     if name == "mixed":
-        return mixed_scene(90, 70, seed=4).append(mixed_scene(90, 70, seed=5))
-    return random_scene(Kind[name.upper()], count=30, width=90, height=70, seed=4)
+        both = (mixed_scene(90, 70, seed=seed, splines=splines) for seed in (4, 5))
+        return next(both).append(next(both))
+    basis = Basis.SPLINE if splines else Basis.CUBIC
+    return random_scene(Kind[name.upper()], count=30, width=90, height=70, seed=4, basis=basis)
 
 
 @pytest.mark.parametrize("name", ["fill", "stroke", "mixed"])
-@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
-def test_sixteen_lanes_do_what_one_does(device: str, name: str, model: Model) -> None:
-    scene = scene_of(name)
+@pytest.mark.parametrize(
+    ("model", "splines"), [(EXACT, False), (EXACT, True), (SPLAT, False)], ids=["exact", "splines", "splat"]
+)
+def test_sixteen_lanes_do_what_one_does(device: str, name: str, model: Model, splines: bool) -> None:
+    scene = scene_of(name, splines)
     scene = replace(scene, points=(1.5 * scene.points).astype(np.float32))
     weights = np.random.default_rng(0).normal(size=(70, 90, 3)).astype(np.float32)
     target = wp.array(to_tiles(np.abs(weights)), dtype=column, device=device)

@@ -1,4 +1,4 @@
-"""Scenes of fills and strokes of different lengths: image and adjoint, for both models of coverage."""
+"""Scenes of shapes of different kinds, bases and lengths: image and adjoint, for both models of coverage."""
 
 from __future__ import annotations
 
@@ -11,40 +11,65 @@ import torch
 from tests.helpers import SPLAT, compare, pieces_of, reference_image, renderer_for
 from tests.reference import exact
 from tests.reference.composite import composite
-from tests.scenes import MIXED, mixed_scene, ragged_scene, random_scene
+from tests.scenes import MIXED_CUBICS, Outline, mixed_scene, ragged_scene, random_scene
 from warpsplat.render.backend import Backend
 from warpsplat.render.models import EXACT, Model, SplatModel
 from warpsplat.render.renderer import Capacity, render
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind, Scene
 
-FILLS = [(Kind.FILL, n) for n in (1, 3, 2, 5, 4)]
-STROKES = [(Kind.STROKE, n) for n in (4, 1, 3, 2, 5)]
-ODD = [*MIXED, (Kind.FILL, 1), (Kind.STROKE, 4), (Kind.FILL, 3)]
+CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
+ODD: dict[str, list[Outline]] = {
+    "fills": [(Kind.FILL, CUBIC, n) for n in (1, 3, 2, 5, 4)],
+    "strokes": [(Kind.STROKE, CUBIC, n) for n in (4, 1, 3, 2, 5)],
+    "mixed": [*MIXED_CUBICS, (Kind.FILL, CUBIC, 1), (Kind.STROKE, CUBIC, 4), (Kind.FILL, CUBIC, 3)],
+    "splined fills": [(Kind.FILL, SPLINE, n) for n in (5, 3, 12, 4, 8)],
+    "splined strokes": [(Kind.STROKE, SPLINE, n) for n in (4, 1, 9, 2, 3)],
+    "both bases": [
+        (kind, basis, n)
+        for n in (3, 4)
+        for kind, basis in (
+            (Kind.STROKE, SPLINE),
+            (Kind.FILL, CUBIC),
+            (Kind.FILL, SPLINE),
+            (Kind.STROKE, CUBIC),
+        )
+    ],
+}
+
+
+def scene_for(model: Model, width: int = 40, height: int = 36, *, seed: int) -> Scene:
+    """Mixed as far as the model can show it."""
+    return mixed_scene(width, height, seed=seed, splines=model is EXACT)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_exact(device: str, seed: int) -> None:
+    compare(mixed_scene(seed=seed), device)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shapes", [FILLS, STROKES, ODD], ids=["fills", "strokes", "mixed"])
+@pytest.mark.parametrize("shapes", ODD.values(), ids=ODD.keys())
 @pytest.mark.parametrize("scale", [1.0, 1.6])
-def test_exact(device: str, shapes: list[tuple[Kind, int]], scale: float) -> None:
+def test_exact_of_any_lengths(device: str, shapes: list[Outline], scale: float) -> None:
     compare(ragged_scene(shapes, seed=1), device, scale)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("through_scales", [True, False])
 def test_splat(device: str, seed: int, through_scales: bool) -> None:
-    compare(mixed_scene(seed=seed), device, model=SplatModel(through_scales))
+    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
 def test_sixteen_lanes_against_the_reference(device: str, model: Model) -> None:
-    compare(mixed_scene(seed=2), device, model=model, lanes=16)
+    compare(scene_for(model, seed=2), device, model=model, lanes=16)
 
 
 @pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
 def test_depth_is_the_order_of_rows_whatever_the_kind(device: str, model: Model) -> None:
     """Turned round, the scene is another picture, and the right one."""
-    scene = mixed_scene(seed=3)
+    scene = scene_for(model, seed=3)
     turned = scene.take(np.arange(len(scene))[::-1])
     a, b = (renderer_for(s, device, model=model).read_image() for s in (scene, turned))
     assert np.abs(a - b).max() > 0.1
@@ -53,7 +78,7 @@ def test_depth_is_the_order_of_rows_whatever_the_kind(device: str, model: Model)
 
 def test_a_stroke_between_two_fills(device: str) -> None:
     """Composited by hand, the reference's coverages in the order of the rows."""
-    scene = ragged_scene([(Kind.FILL, 4), (Kind.STROKE, 3), (Kind.FILL, 4)], seed=5)
+    scene = ragged_scene([(Kind.FILL, CUBIC, 4), (Kind.STROKE, CUBIC, 3), (Kind.FILL, SPLINE, 10)], seed=5)
     for start, stop in itertools.pairwise(scene.first):
         scene.points[start:stop] += np.array([20, 18], np.float32) - scene.points[start:stop].mean(axis=0)
     renderer = renderer_for(scene, device)
@@ -70,12 +95,12 @@ def test_a_stroke_between_two_fills(device: str) -> None:
 @pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
 def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> None:
     """The gradient of a shape that nothing overlaps does not depend on what else is in the arrays."""
-    scene = mixed_scene(200, 40, seed=4)
+    scene = scene_for(model, 250, 40, seed=4)
     for i in range(len(scene)):
         points = scene.points_of(i)
         points += np.array([25 * i + 12, 20], np.float32) - points.mean(axis=0)
         points[:, 0] = np.clip(points[:, 0], 25 * i + 5, 25 * i + 20)
-    weights = np.random.default_rng(0).normal(size=(40, 200, 3)).astype(np.float32)
+    weights = np.random.default_rng(0).normal(size=(40, 250, 3)).astype(np.float32)
     whole = renderer_for(scene, device, model=model)
     whole.write_image_grad(weights)
     whole.backward()
@@ -94,7 +119,7 @@ def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> 
 
 @pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
 def test_mixed_scenes_that_outgrow_the_arrays(device: str, model: Model) -> None:
-    scene = mixed_scene(seed=1)
+    scene = scene_for(model, seed=1)
     whole = render(scene, model=model, backend=Backend.on(device))
     small = renderer_for(scene, device, model=model, capacity=Capacity(50, 5))
     np.testing.assert_array_equal(small.read_image(), whole)
@@ -102,7 +127,7 @@ def test_mixed_scenes_that_outgrow_the_arrays(device: str, model: Model) -> None
 
 @pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
 def test_same_bits_for_any_number_of_threads(device: str, model: Model) -> None:
-    scene = mixed_scene(90, 70, seed=6)
+    scene = scene_for(model, 90, 70, seed=6)
     outcomes = []
     for threads in (1, 3):
         renderer = renderer_for(scene, device, model=model, threads=threads)

@@ -29,7 +29,7 @@ from warpsplat.render.backend import Backend, Viewport
 from warpsplat.render.models import SplatModel
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.renderer import Capacity, Renderer, render
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import Basis, FloatArray, Kind, Scene
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
 CASES = [(FILL, n, 1.0) for n in (2, 4, 6)] + [(STROKE, n, 1.0) for n in (1, 2, 3, 4, 5)]
@@ -46,12 +46,18 @@ def splatted(scene: Scene, device: str) -> FloatArray:
 def test_image_and_gradients(
     device: str, kind: Kind, cubics: int, scale: float, through_scales: bool
 ) -> None:
-    compare(random_scene(kind, cubics=cubics, seed=3), device, scale, model=SplatModel(through_scales))
+    compare(random_scene(kind, beziers=cubics, seed=3), device, scale, model=SplatModel(through_scales))
 
 
 def test_a_fill_without_two_chains_is_refused(device: str) -> None:
     with pytest.raises(ValueError, match="odd number of cubics"):
-        renderer_for(random_scene(FILL, cubics=3), device, model=SPLAT)
+        renderer_for(random_scene(FILL, beziers=3), device, model=SPLAT)
+
+
+def test_splines_are_refused(device: str) -> None:
+    cubics, spline = random_scene(FILL), random_scene(STROKE, count=1, basis=Basis.SPLINE)
+    with pytest.raises(ValueError, match="shape 4 is a spline, not cubics"):
+        renderer_for(cubics.append(spline), device, model=SPLAT)
 
 
 @pytest.mark.parametrize("kind", list(Kind))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import MIXED, canvas, mixed_scene, random_scene
-from warpsplat.scene import ATTRIBUTES, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
 
 POINTS, COLORS = (next(a for a in ATTRIBUTES if a.name == name) for name in ("points", "colors"))
 
@@ -32,6 +32,27 @@ def test_shapes_have_whole_cubics(kind: Kind, count: int) -> None:
         Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32))
 
 
+@pytest.mark.parametrize("kind", list(Kind))
+def test_splines_have_three_points_at_least(kind: Kind) -> None:
+    for count in (3, 4, 5, 8):
+        scene = Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32), Basis.SPLINE)
+        assert scene.bezier_counts().tolist() == 2 * [count if kind == Kind.FILL else count - 2]
+    with pytest.raises(ValueError, match=f"a {kind.name.lower()} cannot have 2 control points"):
+        Scene.uniform(kind, canvas(9, 9), np.zeros((2, 2, 2), np.float32), Basis.SPLINE)
+
+
+def test_each_shape_has_a_basis() -> None:
+    scene = mixed_scene()
+    with pytest.raises(ValueError, match="basis has shape"):
+        replace(scene, basis=scene.basis[1:])
+    assert (
+        Scene.of(scene.canvas, scene.kind[:0], scene.first[:1], points=scene.points[:0]).basis == []
+    ).all()
+    cubics = random_scene(Kind.FILL)
+    assert set(cubics.basis) == {Basis.CUBIC}
+    assert cubics.bezier_counts().tolist() == 4 * [4]
+
+
 def test_uniform_leaves_the_rest_at_0() -> None:
     points = np.arange(48, dtype=np.float32).reshape(2, 12, 2)
     scene = Scene.uniform(Kind.FILL, canvas(9, 9), points, opacities=np.array([0.5, 0.7], np.float32))
@@ -53,7 +74,7 @@ def test_take_and_append() -> None:
     assert len(both) == len(scene) + 4
     for i, j in [*enumerate(range(len(scene))), *enumerate(index, len(scene))]:
         np.testing.assert_array_equal(both.points_of(i), scene.points_of(j))
-        assert both.kind[i] == scene.kind[j]
+        assert (both.kind[i], both.basis[i]) == (scene.kind[j], scene.basis[j])
         for name in ("colors", "opacities", "widths"):
             np.testing.assert_array_equal(getattr(both, name)[i], getattr(scene, name)[j])
     assert both.canvas is scene.canvas
@@ -63,12 +84,12 @@ def test_take_and_append() -> None:
 
 
 def test_alike_groups_every_shape_once() -> None:
-    scene = mixed_scene()
+    scene = mixed_scene().append(mixed_scene(seed=1))
     seen: list[int] = []
     groups = list(scene.alike())
-    for kind, index, points in groups:
+    for kind, basis, index, points in groups:
         for i, own in zip(index, points, strict=True):
-            assert scene.kind[i] == kind
+            assert (scene.kind[i], scene.basis[i]) == (kind, basis)
             np.testing.assert_array_equal(own, scene.points_of(i))
         seen += index.tolist()
     assert sorted(seen) == list(range(len(scene)))

@@ -30,7 +30,7 @@ def test_path_data_as_the_viewer_reads_it() -> None:
             data += (command if relative else command.upper()) + " ".join(v)
         text = f'{HEAD}width="40" height="30"><path {ROUND} stroke-width="2" d="{data}"/></svg>'
         scene, _ = load_scene(text, 40, 30, data)
-        assert psnr(on_white(render_svg(write_svg(scene, precision=4))), on_white(render_svg(text))) > 36, (
+        assert psnr(on_white(render_svg(write_svg(scene, per_pixel=1e4))), on_white(render_svg(text))) > 36, (
             data
         )
 

@@ -25,7 +25,7 @@ def test_foreign_files_look_the_same(name: str) -> None:
     assert psnr(render(scene, backend=Backend.on("cpu")).astype(np.float64) * 255, shown) > (
         34 if "stroke" in name else 38
     )
-    assert psnr(on_white(render_svg(write_svg(scene, precision=3))), shown) > 38
+    assert psnr(on_white(render_svg(write_svg(scene))), shown) > 38
 
 
 REFUSED = {

@@ -8,20 +8,30 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 import cairosvg
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
-from tests.scenes import disc, random_scene
+from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.models import SplatModel
 from warpsplat.render.renderer import render
-from warpsplat.scene import Kind
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.viewer import on_white, render_svg
-from warpsplat.svg.write import hex_color, join_numbers, number, path_data, read_metadata, write_svg
+from warpsplat.scene import Basis, Kind
+from warpsplat.svg.viewer import on_white, render_own, render_svg
+from warpsplat.svg.write import (
+    GRIDS,
+    hex_color,
+    integers,
+    number,
+    path_data,
+    read_metadata,
+    resized,
+    rounded,
+    write_svg,
+)
 
 NUMBERS = [
     (0.0, 1, "0"),
@@ -41,7 +51,8 @@ def test_numbers(value: float, decimals: int, text: str) -> None:
 
 
 def test_numbers_in_a_row() -> None:
-    assert join_numbers(["1", "-2", "3", ".5", "1.5", ".5"]) == "1-2 3 .5 1.5.5"
+    """A sign separates itself."""
+    assert integers(np.array([[1, -2], [-13, 0], [7, 8]])) == "1-2-13 0 7 8"
 
 
 def test_colors() -> None:
@@ -49,36 +60,79 @@ def test_colors() -> None:
     assert hex_color(np.array([0, 0.5, 1.2], np.float32)) == "#0080ff"
 
 
-def test_rounding_does_not_add_up() -> None:
-    """A thousand steps of 0.04 at one decimal: the end is at 40, not at 0."""
-    points = np.stack([0.04 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
-    steps = [float(x) for x in path_data(points, Kind.STROKE, 1).split("c")[1].replace("-", " -").split()]
-    # Each cubic is relative to the end of the one before.
-    assert sum(steps[4::6]) == pytest.approx(40, abs=0.1)
+def steps_of(data: str, command: str) -> np.ndarray:
+    """The numbers behind ``command``, the last one, in pairs."""
+    return np.array(re.findall(r"-?\d+", data.split(command)[1]), int).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("basis", list(Basis))
+def test_rounding_does_not_add_up(basis: Basis) -> None:
+    """A thousand steps of 0.4 units: the end is at 400, not at 0."""
+    points = np.stack([0.4 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
+    data = path_data(points, Kind.STROKE, basis, 1)
+    if basis == Basis.CUBIC:
+        # Each cubic is relative to the end of the one before.
+        ends = steps_of(data, "c")[2::3]
+    else:
+        ends = np.concatenate([steps_of(data.split("t")[0], "q")[1:], steps_of(data, "t")])
+    assert ends[:, 0].sum() == pytest.approx(400, abs=1)
 
 
 @pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("precision", [0, 1, 2, 3])
-def test_reads_back_what_it_writes(kind: Kind, precision: int) -> None:
-    scene = random_scene(kind, count=9)
-    canvas = scene.canvas
-    text = write_svg(scene, precision=precision)
-    back, _ = load_scene(text, canvas.width, canvas.height, "a.svg")
-    np.testing.assert_array_equal(back.kind, scene.kind)
-    np.testing.assert_array_equal(back.first, scene.first)
-    np.testing.assert_allclose(back.points, scene.points, atol=0.51 * 10.0**-precision)
-    np.testing.assert_allclose(back.colors, scene.colors, atol=0.51 / 255)
-    opacities = [float(x) for x in re.findall(r'-opacity="([^"]*)"', text)]
-    np.testing.assert_allclose(opacities, scene.opacities, atol=0.00051)
-    np.testing.assert_allclose(back.opacities, opacities, atol=0.51 / 255)
-    np.testing.assert_allclose(back.widths, scene.widths, atol=0.006)
-    np.testing.assert_allclose(back.canvas.background, canvas.background, atol=0.51 / 255)
+def test_a_spline_is_one_quadratic_and_smooth_ones(kind: Kind) -> None:
+    scene = random_scene(kind, count=1, basis=Basis.SPLINE, beziers=7)
+    data = path_data(scene.points, kind, Basis.SPLINE, 10)
+    assert re.fullmatch(r"M-?\d+[ -]\d+q[-\d ]+t[-\d ]+", data)
+    assert len(steps_of(data.split("t")[0], "q")) == 2
+    assert len(steps_of(data, "t")) == 6
+    moved = steps_of(data.split("t")[0], "q")[1:].sum(axis=0) + steps_of(data, "t").sum(axis=0)
+    if kind == Kind.FILL:
+        assert not moved.any(), "it comes back to its start"
+    else:
+        np.testing.assert_allclose(moved / 10, scene.points[-1] - scene.points[0], atol=0.21)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("per_pixel", GRIDS)
+def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -> None:
+    """Whole coordinates, opacities of two decimals and widths of one, no closing of paths."""
+    scene = mixed_scene(41, 37)
+    text = write_svg(scene.take(np.flatnonzero(scene.kind == kind)), per_pixel=per_pixel)
+    paths = re.findall(r' d="([^"]*)"', text)
+    assert len(paths) == (scene.kind == kind).sum()
+    for data in paths:
+        assert re.fullmatch(r"M-?\d+[ -]\d+([cqt](-?\d+[ ]?)+)+", data), data
+        assert "  " not in data and " -" not in data
+    assert all(len(x) <= 3 for x in re.findall(r'-opacity="([^"]*)"', text))
+    assert all(re.fullmatch(r"\d*(\.\d)?", x) for x in re.findall(r'stroke-width="([^"]*)"', text))
+    root = ElementTree.fromstring(text)
+    assert (root.attrib["width"], root.attrib["height"]) == ("41", "37")
+    assert [float(x) for x in root.attrib["viewBox"].split()] == [0, 0, 41 * per_pixel, 37 * per_pixel]
+
+
+@pytest.mark.parametrize("opacity", [0.9949, 0.995, 0.9981, 1.0])
+def test_what_rounds_to_opaque_is_written_so(opacity: float) -> None:
+    scene = replace(disc(10, 30, 15), opacities=np.full(1, opacity, np.float32))
+    text = write_svg(scene)
+    assert ("fill-opacity" in text) == (opacity < 0.995)
+    assert float(rounded(scene, 100).opacities[0]) == pytest.approx(0.99 if opacity < 0.995 else 1)
+
+
+def test_shown_at_another_size() -> None:
+    """A part of a file shown larger or smaller looks as the same part of the whole one."""
+    text = write_svg(random_scene(Kind.FILL, count=6, width=61, height=83), per_pixel=3)
+    big = on_white(render_svg(text, zoom=2))
+    shown = on_white(render_own(resized(text, 100, 120, 2.0)))
+    assert shown.shape == (120, 100, 3)
+    assert psnr(shown, big[:120, :100]) > 45
+    small = on_white(render_own(resized(text, 30, 41, 0.5)))
+    assert psnr(small, cv2.resize(on_white(render_svg(text)), (30, 41), interpolation=cv2.INTER_AREA)) > 20
 
 
 def test_document() -> None:
     text = write_svg(random_scene(Kind.STROKE, count=2), metadata="key=abc")
     root = ElementTree.fromstring(text)
-    assert root.attrib["viewBox"] == "0 0 40 36"
+    assert root.attrib["viewBox"] == "0 0 4000 3600"
     assert read_metadata(text).endswith("key=abc")
     group = root.find("{http://www.w3.org/2000/svg}g")
     assert group is not None
@@ -94,22 +148,30 @@ def test_opaque_shapes_need_no_opacity() -> None:
 
 
 @pytest.mark.parametrize("kind", list(Kind))
+def test_the_file_of_splines_looks_as_the_render(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, count=10, width=96, height=80, seed=3, basis=Basis.SPLINE)
+    mine = render(scene, backend=Backend.on(device)).astype(np.float64) * 255
+    assert psnr(mine, on_white(render_svg(write_svg(scene)))) > 42
+
+
+@pytest.mark.parametrize("kind", list(Kind))
 def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
     """Painter's order, opacity, extent: for the exact model, and for splats of strong contrast."""
     scene = random_scene(kind, count=10, width=96, height=80, seed=3)
     backend = Backend.on(device)
-    inner = on_white(render_svg(write_svg(scene, precision=2)))
+    inner = on_white(render_svg(write_svg(scene)))
     mine = render(scene, backend=backend).astype(np.float64) * 255
     assert psnr(mine, inner) > 42
-    shown = on_white(render_svg(write_svg(scene, precision=2, opacity_scale=PLATEAU)))
+    shown = on_white(render_svg(write_svg(scene, opacity_scale=PLATEAU)))
     assert psnr(render(scene, model=SplatModel(), backend=backend).astype(np.float64) * 255, shown) > 30
     swapped = replace(scene, points=scene.take(np.arange(len(scene))[::-1]).points)
     assert psnr(mine, on_white(render_svg(write_svg(swapped)))) < 20
 
 
+@pytest.mark.parametrize("basis", list(Basis))
 @pytest.mark.parametrize("kind", list(Kind))
-def test_viewers_agree(kind: Kind) -> None:
-    text = write_svg(random_scene(kind, count=12, width=96, height=80))
+def test_viewers_agree(kind: Kind, basis: Basis) -> None:
+    text = write_svg(random_scene(kind, count=12, width=96, height=80, basis=basis))
     other = cairosvg.svg2png(bytestring=text.encode())
     difference = np.abs(on_white(render_svg(text)) - on_white(Image.open(io.BytesIO(other))))
     assert difference.mean() < 0.01 * 255

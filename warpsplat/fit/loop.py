@@ -117,9 +117,9 @@ def fit(
             break
         stage = stage_at(settings, done)
         if stage is not None:
-            if stage == 1:
+            if not rounding:
                 state.per_pixel = choose_grid(step, staged=True)
-            rounding = True
+                rounding = True
             hold_stage(step, stage)
         if done == opacities_at(settings):
             hold_opacities(step)

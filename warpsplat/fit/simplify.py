@@ -18,7 +18,7 @@ LEAST_POINTS = 4
 """Of a spline."""
 
 APART = 2
-"""Points removed in one turn have more than so many others between them: each moves its neighbours."""
+"""Points removed in one turn have at least so many others between them: each moves its neighbours."""
 
 
 def _quadratics(points: npt.NDArray[Any], t: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
@@ -29,27 +29,32 @@ def _quadratics(points: npt.NDArray[Any], t: npt.NDArray[np.float64]) -> npt.NDA
     return 0.5 * (1 - s) ** 2 * a + (0.5 + s * (1 - s)) * b + 0.5 * s * s * c
 
 
-def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rings without one of their points each.
+def without(points: FloatArray, kind: Kind) -> tuple[FloatArray, FloatArray]:
+    """Splines without one of their points each.
 
     Args:
         points: shape (shape, point, 2).
+        kind: FILL: rings; STROKE: chains, whose ends stay where they are.
 
     Returns:
-        for every point of every ring, where its two neighbours go if it is removed, shape (shape, point, 2,
-        2), and the area that the outline then sweeps, shape (shape, point).
+        for every point of every spline, where its two neighbours go if it is removed, shape
+        (shape, point, 2, 2), and the area that the outline then sweeps, shape (shape, point).
     """
     count = points.shape[1]
-    window = points[:, (np.arange(count)[:, None] + np.arange(-3, 4)) % count]  # [shape, point, 7, 2]
+    near = np.arange(count)[:, None] + np.arange(-3, 4)
+    near = near % count if kind == Kind.FILL else np.clip(near, 0, count - 1)
+    window = points[:, near]  # [shape, point, 7, 2]
     t = (np.arange(5 * SAMPLES) + 0.5) / SAMPLES
     old = _quadratics(window, t)
+    # Without the point, two quadratics go half as far again as before.
+    t = np.interp(t, [0, 1, 2.5, 4, 5], np.arange(5))
     kept = window[..., [0, 1, 2, 4, 5, 6], :]
-    plain = _quadratics(kept, t * 4 / 5)
+    plain = _quadratics(kept, t)
     # Both neighbours move by w times the bulge that the point made.
     bulge = window[..., 3, :] - 0.5 * (window[..., 2, :] + window[..., 4, :])
-    unit = np.zeros((6, 1))
+    unit = np.zeros((6, 1), np.float32)
     unit[2:4] = 1
-    share = _quadratics(unit, t * 4 / 5)  # [sample, 1]
+    share = _quadratics(unit, t)  # [sample, 1]
     missing = old - plain
     along = (missing * bulge[..., None, :]).sum(axis=-1) @ share[:, 0]
     w = along / np.maximum((bulge**2).sum(axis=-1) * (share**2).sum(), 1e-12)
@@ -58,14 +63,18 @@ def without(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     direction = np.diff(old, axis=-2)
     middle = 0.5 * (apart[..., 1:, :] + apart[..., :-1, :])
     area = np.abs(direction[..., 0] * middle[..., 1] - direction[..., 1] * middle[..., 0]).sum(axis=-1)
-    return window[..., [2, 4], :] + shift[..., None, :], area
+    moved = window[..., [2, 4], :] + shift[..., None, :]
+    if kind == Kind.STROKE:
+        moved[:, 1, 0], moved[:, -2, 1] = points[:, 0], points[:, -1]
+        area[:, [0, -1]] = np.inf
+    return moved, area
 
 
 def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexArray]:
-    """Remove the points of splined fills that cost least, no two of them near each other.
+    """Remove the points of splines that cost least, no two of them near each other.
 
     Args:
-        scene: any shapes; others stay as they are.
+        scene: any shapes; those of cubics stay as they are.
         worth: of a unit of each shape's area, shape (shape,); infinite: all its points stay.
         count: points to remove, at the most.
 
@@ -75,11 +84,11 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
     found: list[tuple[float, int, int, int, FloatArray]] = []
     for group in scene.alike():
         number = group.points.shape[1]
-        if group.basis != Basis.SPLINE or group.kind != Kind.FILL or number <= LEAST_POINTS:
+        if group.basis != Basis.SPLINE or number <= LEAST_POINTS:
             continue
-        moved, area = without(group.points)
+        moved, area = without(group.points, group.kind)
         cost = area * worth[group.shapes][:, None]
-        for i in np.flatnonzero(np.isfinite(cost).all(axis=1)).tolist():
+        for i in np.flatnonzero(np.isfinite(worth[group.shapes])).tolist():
             first = int(scene.first[group.shapes[i]])
             chosen = _apart(cost[i], (number - LEAST_POINTS + 1) // 2)
             found += [(float(cost[i, k]), first, k, number, moved[i, k]) for k in chosen]
@@ -94,11 +103,13 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
 
 
 def _apart(cost: FloatArray, most: int) -> list[int]:
-    """The cheapest places of a ring, ``most`` at the most, with ``APART`` others between any two."""
+    """The cheapest places, ``most`` at the most, with ``APART`` others between any two also by way of the ends;
+    none that cost infinitely much.
+    """
     number = len(cost)
     chosen: list[int] = []
     for k in np.argsort(cost, kind="stable").tolist():
-        if len(chosen) == most:
+        if len(chosen) == most or not np.isfinite(cost[k]):
             break
         if all(min((k - i) % number, (i - k) % number) > APART for i in chosen):
             chosen.append(k)

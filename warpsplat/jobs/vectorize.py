@@ -196,6 +196,9 @@ HEAD_BYTES = 400
 STYLE_BYTES = {Kind.FILL: 45, Kind.STROKE: 65}
 """Of a shape, besides its coordinates."""
 
+STEP = {Kind.FILL: 1.0, Kind.STROKE: 1 / 3}
+"""Distance of a curve's neighbouring points over that of neighbouring curves, about."""
+
 SPARE_CURVES = 1.04
 """Curves trained over those expected to fit; shapes of a simple image are shorter."""
 
@@ -203,7 +206,7 @@ SPARE_CURVES = 1.04
 def affordable_curves(settings: Settings, width: int, height: int) -> int:
     """Curves that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
 
-    Coordinates are relative: each has as many digits before the point as the distance of two curves.
+    Coordinates are relative: each has as many digits before the point as the step from one to the next.
     """
     assert settings.max_bytes
     numbers = 4 + 2 * settings.density.mean_points
@@ -211,7 +214,8 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
     room = settings.max_bytes - HEAD_BYTES
     count = float(settings.curves)
     for _ in range(8):  # settles within a curve
-        digits = max(0.0, 0.5 * math.log10(width * height / max(count, 1.0)))
+        step = STEP[settings.kind] * math.sqrt(width * height / max(count, 1.0))
+        digits = max(0.0, math.log10(step))
         count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (separators + digits)))
     return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 

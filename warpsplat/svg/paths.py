@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 import re
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +20,45 @@ SPACE = re.compile(r"[\s,]*")
 FLAG = re.compile(r"[01]")
 
 
-def cubics(data: str, *, keep_dots: bool) -> list[tuple[Points, bool]]:
-    """Subpaths of path data as points p0, c, c, p3 ..., shape (1 + 3 cubics, 2), and which are closed.
+CLOSES = 1e-3
+"""Largest distance [px] of a closed spline's start from where its control points would have it."""
+
+
+class Subpath(NamedTuple):
+    """What one move of the pen draws."""
+
+    points: Points
+    """Of cubics: p0, c, c, p3, c, c, p6 ..., shape (1 + 3 cubics, 2)."""
+    is_closed: bool
+    """Whether it ends with the command that closes it."""
+    is_spline: bool
+    """Whether it is a quadratic and then only smooth ones: a uniform quadratic B-spline."""
+
+    def moved(self, linear: Points, shift: Points) -> Subpath:
+        """Under an affine map."""
+        return self._replace(points=self.points @ linear.T + shift)
+
+    def controls(self) -> Points:
+        """Control points of the quadratics, shape (quadratic, 2)."""
+        return 1.5 * self.points[1::3] - 0.5 * self.points[:-1:3]
+
+    def spline_chain(self) -> Points | None:
+        """A spline's ``Scene`` points as a stroke; None if it is none."""
+        if not self.is_spline:
+            return None
+        return np.concatenate([self.points[:1], self.controls(), self.points[-1:]])
+
+    def spline_ring(self) -> Points | None:
+        """A spline's ``Scene`` points as a fill; None if it is none, or does not close smoothly."""
+        controls = self.controls()
+        if not self.is_spline or len(controls) < 3:
+            return None
+        seam = (controls[0] + controls[-1]) / 2
+        return controls if np.allclose(self.points[[0, -1]], seam, rtol=0, atol=CLOSES) else None
+
+
+def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
+    """Subpaths of path data.
 
     ``keep_dots`` keeps subpaths without extent, which show in a stroke.
 
@@ -41,8 +79,8 @@ def cubics(data: str, *, keep_dots: bool) -> list[tuple[Points, bool]]:
             move_on = i and command in "Mm"
             pen.draw(("l" if command == "m" else "L") if move_on else command, values[i : i + size])
     return [
-        (np.array([(p.real, p.imag) for p in points]), is_closed)
-        for points, is_closed in pen.finish(keep_dots)
+        Subpath(np.array([(p.real, p.imag) for p in points]), is_closed, is_spline)
+        for points, is_closed, is_spline in pen.finish(keep_dots)
         if len(points) > 1
     ]
 
@@ -68,8 +106,10 @@ class _Pen:
     """Draws commands as cubics; points are complex numbers."""
 
     def __init__(self) -> None:
-        self.subpaths: list[tuple[list[complex], bool]] = []
+        self.subpaths: list[tuple[list[complex], bool, bool]] = []
         self.points: list[complex] = []
+        self.is_spline = True
+        """Whether the subpath is a spline so far."""
         self.at = self.start = 0j
         self.control: tuple[str, complex] = ("", 0j)
         """Kind (``c`` or ``q``) and last control point of the command before."""
@@ -86,10 +126,13 @@ class _Pen:
             # Relative coordinates come back to the start but for rounding: no further cubic for that.
             if not cmath.isclose(self.at, self.start, rel_tol=1e-9, abs_tol=1e-9):
                 self._line(self.start)
+                self.is_spline = False
             self._lift(True)
         else:
             if not self.points:  # goes on after a subpath was closed
                 self.points = [self.at]
+            # The first of a chain has a control point of its own, the others follow.
+            self.is_spline &= kind == ("t" if len(self.points) > 1 else "q")
             self._segment(kind, v, origin)
             return
         self.control = ("", 0j)
@@ -119,15 +162,16 @@ class _Pen:
 
     def _lift(self, is_closed: bool) -> None:
         if self.points:
-            self.subpaths.append((self.points, is_closed))
+            self.subpaths.append((self.points, is_closed, self.is_spline and len(self.points) > 1))
         self.points = []
+        self.is_spline = True
 
-    def finish(self, keep_dots: bool) -> list[tuple[list[complex], bool]]:
+    def finish(self, keep_dots: bool) -> list[tuple[list[complex], bool, bool]]:
         """All subpaths; a closed point, if dots are kept, as a cubic without extent."""
         self._lift(False)
         return [
-            (3 * points + points if keep_dots and is_closed and len(points) == 1 else points, is_closed)
-            for points, is_closed in self.subpaths
+            (4 * points if keep_dots and is_closed and len(points) == 1 else points, is_closed, is_spline)
+            for points, is_closed, is_spline in self.subpaths
         ]
 
     def _line(self, end: complex) -> None:

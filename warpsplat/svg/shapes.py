@@ -15,7 +15,7 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.svg.geometry import Matrix, outline, parse_transform, winding
 from warpsplat.svg.inspect import NAMESPACE, inspect_svg, svg_size, view_box
-from warpsplat.svg.paths import Points, cubics
+from warpsplat.svg.paths import Subpath, cubics
 from warpsplat.svg.style import (
     INHERITED,
     Style,
@@ -35,10 +35,7 @@ MAX_EXTENT = 1e5
 class Shape:
     """One fill or stroke of one colour, in canvas units."""
 
-    subpaths: list[Points]
-    """Cubics of each subpath as points p0, c, c, p3, c, c, p6 ..., shape (1 + 3 cubics, 2)."""
-    closed: list[bool]
-    """Whether each subpath ends with the command that closes it."""
+    subpaths: list[Subpath]
     filled: bool
     color: tuple[float, float, float]
     """sRGB in 0..1."""
@@ -203,8 +200,8 @@ def _shape(element: ElementTree.Element, tag: str, style: Style, context: _Conte
     data, is_rect = outline(tag, element.attrib, context.size)
     scale = _similarity(context.matrix)
     subpaths = [
-        (points @ context.matrix[:2, :2].T + context.matrix[:2, 2], is_closed)
-        for points, is_closed in cubics(data, keep_dots=not filled)
+        subpath.moved(context.matrix[:2, :2], context.matrix[:2, 2])
+        for subpath in cubics(data, keep_dots=not filled)
     ]
     if not subpaths:
         return []
@@ -214,20 +211,19 @@ def _shape(element: ElementTree.Element, tag: str, style: Style, context: _Conte
     if not filled:
         _check_stroke(style, subpaths, scale)
         width *= scale or 1.0
-    reach = max(width, *(float(np.abs(points).max()) for points, _ in subpaths))
-    if not (reach <= MAX_EXTENT and all(np.isfinite(points).all() for points, _ in subpaths)):
+    reach = max(width, *(float(np.abs(subpath.points).max()) for subpath in subpaths))
+    if not (reach <= MAX_EXTENT and all(np.isfinite(subpath.points).all() for subpath in subpaths)):
         raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
     paint = "fill" if filled else "stroke"
     color, alpha = parse_color(style["color"] if style[paint].lower() == "currentcolor" else style[paint])
     opacity = alpha * fraction(style, f"{paint}-opacity") * fraction(style, "opacity")
     if filled and style["fill-rule"] == "evenodd":
-        around = winding([points for points, _ in subpaths])
+        around = winding([subpath.points for subpath in subpaths])
         if ((around % 2 == 0) & (around != 0)).any():
             raise ImageError("uses the even-odd fill rule where it matters, not supported")
     if not filled and opacity < 1 and len(subpaths) > 1:
         raise ImageError("a translucent stroke of several subpaths is not supported")
-    points, closed = [p for p, _ in subpaths], [is_closed for _, is_closed in subpaths]
-    return [Shape(points, closed, filled, color, opacity, width, is_rect)]
+    return [Shape(subpaths, filled, color, opacity, width, is_rect)]
 
 
 ANIMATIONS = {f"{{{NAMESPACE}}}{tag}" for tag in ("animate", "animateTransform", "animateMotion", "set")}
@@ -244,7 +240,7 @@ def _check_properties(style: Style, filled: bool, tag: str) -> None:
         raise ImageError(f"fill-rule {style['fill-rule'][:40]!r} is not known")
 
 
-def _check_stroke(style: Style, subpaths: list[tuple[Points, bool]], scale: float | None) -> None:
+def _check_stroke(style: Style, subpaths: list[Subpath], scale: float | None) -> None:
     """Strokes written here have round caps and joins, no dashes, and one width.
 
     Raises:
@@ -256,7 +252,7 @@ def _check_stroke(style: Style, subpaths: list[tuple[Points, bool]], scale: floa
         raise ImageError("uses vector-effect, not supported")
     if scale is None:
         raise ImageError("a stroke that a transform stretches is not supported")
-    for points, is_closed in subpaths:
+    for points, is_closed, _ in subpaths:
         if not is_closed and style["stroke-linecap"] != "round":
             raise ImageError(
                 f"a stroke with {style['stroke-linecap'][:40]} caps is not supported, only round ones"

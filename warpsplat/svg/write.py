@@ -22,10 +22,10 @@ OPACITY_DECIMALS = 2
 """An 8-bit colour moves by less than an eighth of a level for half a unit of the third decimal."""
 
 WIDTH_STEP = 0.25
-"""Coarsest step of a stroke's width [px]: whole units of the view box where they are that fine, else tenths."""
+"""Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth of one."""
 
-OPAQUE = 1 - 0.5 / 255
-"""From here on an opacity is left out: opaque paths are smaller and quicker to draw."""
+OPAQUE = 1 - 0.5 * 10.0**-OPACITY_DECIMALS
+"""From here on an opacity rounds to 1 and is left out: opaque paths are smaller and quicker to draw."""
 
 GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 100)))
 """Units of the view box a pixel of the picture: sizes of the view box have few decimals with each."""
@@ -50,15 +50,18 @@ def width_decimals(per_pixel: float) -> int:
 
 def rounded(scene: Scene, per_pixel: float) -> Scene:
     """What a file with ``per_pixel`` units a pixel holds of ``scene``."""
-    spline = scene.basis[np.repeat(np.arange(len(scene)), scene.point_counts())] == Basis.SPLINE
-    unit = np.where(spline, 2 / per_pixel, 1 / per_pixel)[:, None]
-    shown = np.round(scene.opacities.astype(np.float64), OPACITY_DECIMALS)
+    spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
+    per_unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
+    points, colors, opacities, widths = (
+        values.astype(np.float64) for values in (scene.points, scene.colors, scene.opacities, scene.widths)
+    )
+    shown = np.where(opacities < OPAQUE, np.round(opacities, OPACITY_DECIMALS), 1)
     return replace(
         scene,
-        points=(np.round(scene.points / unit) * unit).astype(np.float32),
-        colors=(np.round(scene.colors * 255.0) / 255).astype(np.float32),
-        opacities=np.where(scene.opacities < OPAQUE, shown, 1).astype(np.float32),
-        widths=(np.round(scene.widths * per_pixel, width_decimals(per_pixel)) / per_pixel).astype(np.float32),
+        points=(np.round(points * per_unit) / per_unit).astype(np.float32),
+        colors=(np.round(colors * 255) / 255).astype(np.float32),
+        opacities=shown.astype(np.float32),
+        widths=(np.round(widths * per_pixel, width_decimals(per_pixel)) / per_pixel).astype(np.float32),
     )
 
 
@@ -146,7 +149,8 @@ def _element(scene: Scene, shape: int, color: str, per_pixel: float, opacity_sca
     attribute = PAINTED[kind]
     style = f'{attribute}="{color}"'
     if kind == Kind.STROKE:
-        style += f' stroke-width="{number(float(scene.widths[shape] * per_pixel), width_decimals(per_pixel))}"'
+        width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
+        style += f' stroke-width="{width}"'
     shown = min(float(scene.opacities[shape]) * opacity_scale, 1.0)
     if shown < OPAQUE:
         style += f' {attribute}-opacity="{number(shown, OPACITY_DECIMALS)}"'

@@ -20,9 +20,9 @@ from warpsplat.render.models import SplatModel
 from warpsplat.scene import Kind, Scene
 
 SCENES = {
-    **{f"fill-{n}": random_scene(Kind.FILL, cubics=n, seed=11) for n in (2, 4, 6)},
-    **{f"stroke-{n}": random_scene(Kind.STROKE, cubics=n, seed=11) for n in (1, 2, 3, 4, 5)},
-    "mixed": mixed_scene(seed=11),
+    **{f"fill-{n}": random_scene(Kind.FILL, beziers=n, seed=11) for n in (2, 4, 6)},
+    **{f"stroke-{n}": random_scene(Kind.STROKE, beziers=n, seed=11) for n in (1, 2, 3, 4, 5)},
+    "mixed": mixed_scene(seed=11, splines=False),
 }
 
 

@@ -11,20 +11,21 @@ from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.kernels.loss import shape as kernels
 from warpsplat.render.backend import Backend
 from warpsplat.render.parameters import Parameters
-from warpsplat.scene import Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 
-SCENES = ["fills", "strokes", "mixed"]
+SCENES = ["fills", "strokes", "splined fills", "splined strokes", "mixed"]
 
 
 def scene_of(name: str) -> Scene:
     if name == "mixed":
         return mixed_scene(seed=6)
-    return random_scene(Kind.FILL if name == "fills" else Kind.STROKE, count=6, seed=6)
+    kind = Kind.FILL if name.endswith("fills") else Kind.STROKE
+    return random_scene(kind, count=6, seed=6, basis=Basis.SPLINE if "splined" in name else Basis.CUBIC)
 
 
 def by_shape(scene: Scene, values: torch.Tensor) -> np.ndarray:
-    """Sums over each shape's cubics."""
-    ends = np.cumsum(scene.point_counts() // 3)
+    """Sums over each shape's Béziers."""
+    ends = np.cumsum(scene.bezier_counts())
     return np.array([part.sum() for part in np.split(values.detach().numpy(), ends[:-1])])
 
 
@@ -49,7 +50,7 @@ def test_bending(device: str, name: str) -> None:
     assert relative_error(got, x.grad.numpy()) < 1e-4
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["fills", "strokes", "mixed"])
 def test_xing(device: str, name: str) -> None:
     scene = scene_of(name)
     scene.points[:] += np.random.default_rng(0).normal(0, 6, scene.points.shape).astype(np.float32)
@@ -58,10 +59,20 @@ def test_xing(device: str, name: str) -> None:
     value = losses.xing(scene, points)
     assert float(value.detach()) > 0.05
     (0.7 * value).backward()
-    count = (scene.point_counts() // 3).sum()
+    count = (scene.bezier_counts()).sum()
     assert each.sum() / count == pytest.approx(float(value.detach()), rel=1e-4)
     assert points.grad is not None
     assert relative_error(got, points.grad.numpy()) < 1e-4
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_quadratics_never_cross_themselves(device: str, kind: Kind) -> None:
+    """Wherever their points lie."""
+    scene = random_scene(kind, count=20, seed=6, basis=Basis.SPLINE)
+    scene.points[:] += np.random.default_rng(0).normal(0, 6, scene.points.shape).astype(np.float32)
+    got, each = launch(kernels.xing_backward, scene, device, 1.0)
+    assert not each.any()
+    assert not got.any()
 
 
 def test_xing_is_zero_for_a_convex_outline(device: str) -> None:

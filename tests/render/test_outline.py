@@ -1,0 +1,83 @@
+"""Outlines as polylines, against de Boor's recursion in float64."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import torch
+
+from tests.helpers import outline_of, pieces_of, renderer_for
+from tests.reference.curves import bezier, chain, spline_at
+from tests.reference.outline import polyline
+from tests.scenes import mixed_scene, point_count, random_scene
+from warpsplat.kernels import bezier as kernels
+from warpsplat.kernels.constants import FLATNESS, FLATNESS_STROKE
+from warpsplat.scene import Basis, Kind, Scene
+
+LENGTHS = {Kind.FILL: (3, 4, 5, 12), Kind.STROKE: (1, 2, 3, 9)}
+"""Quadratics of splines."""
+SPLINES = [(kind, n) for kind in Kind for n in LENGTHS[kind]]
+
+
+def curve(scene: Scene, shape: int, t: torch.Tensor) -> torch.Tensor:
+    """The outline of a shape at t in [0, Béziers]."""
+    points = torch.tensor(scene.points_of(shape), dtype=torch.float64)
+    kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
+    if basis == Basis.SPLINE:
+        return spline_at(points, kind == Kind.FILL, t)
+    return bezier(chain(points, kind, basis), t)
+
+
+@pytest.mark.parametrize(("kind", "beziers"), SPLINES)
+def test_the_reference_agrees_with_the_recursion(kind: Kind, beziers: int) -> None:
+    scene = random_scene(kind, 1, basis=Basis.SPLINE, beziers=beziers, seed=beziers)
+    t = torch.linspace(0, beziers, 101, dtype=torch.float64)
+    points = torch.tensor(scene.points, dtype=torch.float64)
+    np.testing.assert_allclose(
+        bezier(chain(points, kind, Basis.SPLINE), t), curve(scene, 0, t), rtol=0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_vertices_lie_on_the_outline(device: str, scale: float) -> None:
+    """Those of all shapes of a mixed scene, and no piece lies farther from it than is allowed."""
+    scene = mixed_scene(seed=5)
+    renderer = renderer_for(scene, device, scale)
+    buffers = outline_of(renderer)
+    vertex, firsts, lasts = (x.numpy() for x in (buffers.vertex, buffers.vertex_first, buffers.vertex_last))
+    for shape, pieces in enumerate(pieces_of(renderer)):
+        basis, is_fill = scene.basis[shape], scene.kind[shape] == Kind.FILL
+        assert min(pieces) >= (3 if basis == Basis.CUBIC else 2)
+        steps = np.concatenate([number + np.arange(n) / n for number, n in enumerate(pieces)])
+        ends = np.append(steps, len(pieces))
+        want = scale * curve(scene, shape, torch.tensor(steps if is_fill else ends)).numpy()
+        np.testing.assert_allclose(vertex[firsts[shape] : lasts[shape]], want, atol=2e-4 * scale)
+        corners = scale * curve(scene, shape, torch.tensor(ends)).numpy()
+        for (a, b), (p, q) in zip(itertools.pairwise(ends), itertools.pairwise(corners), strict=True):
+            between = scale * curve(scene, shape, torch.linspace(a, b, 9, dtype=torch.float64)).numpy()
+            along = (q - p) / max(np.linalg.norm(q - p), 1e-12)
+            off = (between - p) @ np.array([along[1], -along[0]])
+            assert np.abs(off).max() <= (FLATNESS if is_fill else FLATNESS_STROKE) * 1.001
+
+
+@pytest.mark.parametrize(
+    ("kind", "basis", "beziers"),
+    [(k, Basis.SPLINE, n) for k, n in SPLINES] + [(Kind.FILL, Basis.CUBIC, 3), (Kind.STROKE, Basis.CUBIC, 3)],
+)
+def test_weights_of_points(kind: Kind, basis: Basis, beziers: int) -> None:
+    """What the adjoint weighs by is the derivative of the outline by its points."""
+    count = point_count(kind, basis, beziers)
+    points = torch.zeros((count, 2), dtype=torch.float64, requires_grad=True)
+    of_point = range(4 if basis == Basis.CUBIC else 3)
+    for local in range(beziers):
+        for t in (0.0, 0.25, 1.0):
+            vertices = polyline(points, [4] * beziers, kind, basis)
+            (want,) = torch.autograd.grad(vertices[4 * local + int(4 * t), 0], points)
+            got = np.zeros(count)
+            for j in of_point:
+                before = local - 1 if kind == Kind.FILL else local
+                index = 3 * local + j if basis == Basis.CUBIC else before + j
+                got[index % count] += kernels.point_weight(int(kind), int(basis), count, local, j, t)
+            np.testing.assert_allclose(got, want[:, 0], atol=1e-6)

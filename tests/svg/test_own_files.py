@@ -1,0 +1,156 @@
+"""Files written here, read back: nothing is lost, and written again they are the same bytes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import ragged_scene, random_scene
+from tests.svg.foreign import HEAD
+from warpsplat.metrics import psnr
+from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import GRIDS, rounded, write_svg
+
+CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
+BOTH = {
+    Kind.FILL: [(CUBIC, 4), (SPLINE, 12), (SPLINE, 3), (CUBIC, 2), (SPLINE, 7), (CUBIC, 5)],
+    Kind.STROKE: [(CUBIC, 3), (SPLINE, 5), (SPLINE, 1), (CUBIC, 1), (SPLINE, 2)],
+}
+"""Bases and numbers of Béziers."""
+
+
+def check(back: Scene, scene: Scene, per_pixel: float) -> None:
+    """``back`` is what a file of ``scene`` holds."""
+    held = rounded(scene, per_pixel)
+    for name in ("kind", "basis", "first"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(scene, name))
+    for name in ("points", "colors", "opacities", "widths"):
+        np.testing.assert_allclose(getattr(back, name), getattr(held, name), rtol=3e-7, atol=1e-6)
+    np.testing.assert_allclose(back.canvas.background, scene.canvas.background, atol=0.5001 / 255)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize(("width", "height"), [(41, 37), (769, 511), (4001, 2999)])
+def test_what_is_written_is_read(kind: Kind, width: int, height: int) -> None:
+    outlines = [(kind, basis, beziers) for basis, beziers in BOTH[kind]]
+    for seed, per_pixel in enumerate((*GRIDS, 1000.0)):
+        scene = ragged_scene(outlines, width, height, seed=seed)
+        if per_pixel < 1:  # so that no cubic shrinks to a point, which a fill's path leaves out
+            scene = replace(scene, points=(scene.points % 40 * np.float32(2 / per_pixel)))
+        text = write_svg(scene, per_pixel=per_pixel)
+        back, has_background = load_scene(text, width, height, "a.svg")
+        check(back, scene, per_pixel)
+        assert has_background
+        assert write_svg(back, per_pixel=per_pixel) == text
+        assert write_svg(rounded(scene, per_pixel), per_pixel=per_pixel) == text
+
+
+@pytest.mark.parametrize("basis", list(Basis))
+def test_dots(basis: Basis) -> None:
+    """A stroke without extent is seen, and stays; a fill without is not, whatever is left of it."""
+    for kind in Kind:
+        scene = random_scene(kind, count=2, seed=2, basis=basis)
+        scene.points[: scene.first[1]] = [20.0, 18.0]
+        text = write_svg(scene, per_pixel=2)
+        back, _ = load_scene(text, 40, 36, "a.svg")
+        assert write_svg(back, per_pixel=2) == write_svg(scene.take(np.arange(2)[-len(back) :]), per_pixel=2)
+        if kind == Kind.STROKE:
+            check(back, scene, 2)
+            dotless = write_svg(scene.take(np.arange(1, 2)), per_pixel=2)
+            assert (on_white(render_svg(text)) != on_white(render_svg(dotless))).any()
+
+
+def test_cubics_without_extent_are_left_out_of_fills() -> None:
+    scene = random_scene(Kind.FILL, count=1)
+    scene.points[3:7] = scene.points[3]
+    back, _ = load_scene(write_svg(scene, per_pixel=4), 40, 36, "a.svg")
+    np.testing.assert_allclose(back.points, np.delete(rounded(scene, 4).points, [4, 5, 6], axis=0), atol=1e-6)
+
+
+def scene_of(data: str, style: str = "", *, scale: float = 1.0) -> Scene:
+    box = f'width="40" height="30" viewBox="0 0 {40 * scale:g} {30 * scale:g}"'
+    return load_scene(f'{HEAD}{box}><path d="{data}" {style}/></svg>', 40, 30, "a.svg")[0]
+
+
+ROUND = 'fill="none" stroke="red" stroke-linecap="round" stroke-linejoin="round"'
+RING = "M10 5q5 0 5 5t-5 5-5-5 5-5"
+"""A ring of four quadratics through the middles of a square's sides; the square is its control points."""
+CORNERS = [[15, 5], [15, 15], [5, 15], [5, 5]]
+RINGS = {
+    "relative": RING,
+    "closed": RING + "z",
+    "absolute": "M10 5Q15 5 15 10T10 15T5 10T10 5",
+    "mixed": "m10 5q5 0 5 5T10 15 5 10t5-5Z",
+    "decimals": "M10.0 5.0q5.0 0 5 5t-5.0004 5-4.9996-5 5-5",
+}
+
+
+@pytest.mark.parametrize("data", RINGS.values(), ids=RINGS.keys())
+def test_smooth_rings_are_splines(data: str) -> None:
+    scene = scene_of(data)
+    assert scene.basis.tolist() == [SPLINE]
+    np.testing.assert_allclose(scene.points, CORNERS, atol=2e-3)
+
+
+@pytest.mark.parametrize("transform", ["rotate(30)", "scale(.5 2)", "matrix(1 .2 .3 1 4 5)"])
+def test_splines_stay_splines_under_transforms(transform: str) -> None:
+    moved = scene_of(RING, f'transform="{transform}"')
+    assert moved.basis.tolist() == [SPLINE]
+    cubics = scene_of(RING + "l0 0", f'transform="{transform}"')
+    assert cubics.basis.tolist() == [CUBIC]
+    joints = (moved.points + np.roll(moved.points, 1, axis=0)) / 2
+    np.testing.assert_allclose(joints, cubics.points[:12:3], atol=1e-5)
+
+
+CUBIC_PATHS = {
+    "a corner at the start": "M10 5q5 0 5 5t-10 0 5-5",
+    "not back at the start": "M10 5q5 0 5 5t-5 5-5-5",
+    "closed by a line": "M10 5q5 0 5 5t-5 5-5-5z",
+    "a second quadratic": "M10 5q5 0 5 5 0 5-5 5t-5-5 5-5",
+    "a line between": "M10 5q5 0 5 5t-5 5l0 0t-5-5 5-5",
+    "smooth from the start": "M10 5t5 5t-5 5-5-5 5-5z",
+    "cubics": "M10 5c5 0 5 5 5 5s-5 5-5 5z",
+    "a hole": RING + "M10 8q2 0 2 2t-2 2-2-2 2-2",
+    "two quadratics": "M10 5q5 0 5 5t-5-5",
+}
+
+
+@pytest.mark.parametrize("data", CUBIC_PATHS.values(), ids=CUBIC_PATHS.keys())
+def test_other_rings_are_cubics(data: str) -> None:
+    scene = scene_of(data)
+    assert scene.basis.tolist() == [CUBIC]
+    text = write_svg(scene, per_pixel=100)
+    given = f'{HEAD}width="40" height="30"><rect width="40" height="30" fill="#fff"/><path d="{data}"/></svg>'
+    assert psnr(*(on_white(render_svg(t, zoom=4)) for t in (text, given))) > 40
+
+
+def test_strokes_of_smooth_quadratics_are_splines_clamped_at_both_ends() -> None:
+    scene = scene_of("M4 6Q10 2 14 8t6 2 6-3M3 20q5-5 9 0M5 9h20M30 5t4 4", ROUND)
+    assert scene.basis.tolist() == [SPLINE, SPLINE, CUBIC, CUBIC]
+    np.testing.assert_allclose(scene.points_of(0), [[4, 6], [10, 2], [18, 14], [22, 6], [26, 7]], atol=1e-5)
+    np.testing.assert_allclose(scene.points_of(1), [[3, 20], [8, 15], [12, 20]], atol=1e-5)
+    assert scene_of("M4 6Q10 2 14 8t6 2z", ROUND).basis.tolist() == [CUBIC], "closed by a line"
+    closed = scene_of(RING + "z", ROUND)
+    np.testing.assert_allclose(closed.points, [[10, 5], *CORNERS, [10, 5]], atol=1e-5)
+
+
+def test_files_of_an_older_format() -> None:
+    """Decimals of a pixel, paths that are closed, opacities of three decimals."""
+    text = (
+        f'{HEAD}width="40" height="30" viewBox="0 0 40 30">\n<metadata>warpsplat 0.1.0 key=1</metadata>\n'
+        '<rect width="40" height="30" fill="#123"/>\n'
+        '<g><path d="M5.5 4c3.1-2.4 8.2 1.5 6 5.2-2.6 4.1-9.1 1.2-6-5.2z" fill="#fa0" fill-opacity=".832"/>'
+        "</g>\n</svg>\n"
+    )
+    scene, has_background = load_scene(text, 40, 30, "a.svg")
+    assert has_background
+    assert scene.basis.tolist() == [CUBIC]
+    want = [[5.5, 4], [8.6, 1.6], [13.7, 5.5], [11.5, 9.2], [8.9, 13.3], [2.4, 10.4]]
+    np.testing.assert_allclose(scene.points, want, atol=1e-5)
+    assert scene.opacities.tolist() == pytest.approx([0.832])
+    assert re.search(r' d="M55 40c[^"z.]*"', write_svg(scene, per_pixel=10))
