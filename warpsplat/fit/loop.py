@@ -121,7 +121,7 @@ def fit(
                 state.per_pixel = choose_grid(step, staged=True)
                 rounding = True
             hold_stage(step, stage)
-        if done == opacities_at(settings):
+        if done == opacities_at(settings) and settings.renderer == "exact":
             hold_opacities(step)
         density = settings.density
         surgical = done < density.stop * settings.iterations

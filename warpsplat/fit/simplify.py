@@ -103,8 +103,8 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
 
 
 def _apart(cost: FloatArray, most: int) -> list[int]:
-    """The cheapest places, ``most`` at the most, with ``APART`` others between any two also by way of the ends;
-    none that cost infinitely much.
+    """The cheapest places, ``most`` at the most and none of infinite cost, with ``APART`` others between any
+    two, by way of the ends as well.
     """
     number = len(cost)
     chosen: list[int] = []

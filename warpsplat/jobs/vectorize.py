@@ -26,6 +26,7 @@ from warpsplat.metrics import Score, score_svg
 from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas
+from warpsplat.svg.order import by_opacity
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,7 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
+    scene = scene.take(by_opacity(scene))
     svg = export(scene, settings, per_pixel, metadata)
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())

@@ -22,7 +22,7 @@ OPACITY_DECIMALS = 2
 """An 8-bit colour moves by less than an eighth of a level for half a unit of the third decimal."""
 
 WIDTH_STEP = 0.25
-"""Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth of one."""
+"""Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth."""
 
 OPAQUE = 1 - 0.5 * 10.0**-OPACITY_DECIMALS
 """From here on an opacity rounds to 1 and is left out: opaque paths are smaller and quicker to draw."""
@@ -143,27 +143,39 @@ PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
 
-def _element(scene: Scene, shape: int, color: str, per_pixel: float, opacity_scale: float) -> str:
-    """The path of one shape."""
+def _path(scene: Scene, shape: int, color: str, per_pixel: float, opacity: str) -> str:
+    """The path of one shape; ``opacity``: its attribute, or nothing."""
     kind = Kind(int(scene.kind[shape]))
-    attribute = PAINTED[kind]
-    style = f'{attribute}="{color}"'
+    style = f'{PAINTED[kind]}="{color}"'
     if kind == Kind.STROKE:
         width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
         style += f' stroke-width="{width}"'
-    shown = min(float(scene.opacities[shape]) * opacity_scale, 1.0)
-    if shown < OPAQUE:
-        style += f' {attribute}-opacity="{number(shown, OPACITY_DECIMALS)}"'
     data = path_data(scene.points_of(shape), kind, Basis(int(scene.basis[shape])), per_pixel)
-    return f'<path d="{data}" {style}/>'
+    return f'<path d="{data}" {style}{opacity}/>'
+
+
+def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
+    """The attribute of each shape's opacity; empty for opaque ones."""
+    shown = np.minimum(scene.opacities.astype(np.float64) * opacity_scale, 1.0).tolist()
+    return [
+        f' {PAINTED[Kind(kind)]}-opacity="{number(value, OPACITY_DECIMALS)}"' if value < OPAQUE else ""
+        for kind, value in zip(scene.kind.tolist(), shown, strict=True)
+    ]
 
 
 def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
-    """Neighbours of one kind share a group, and what it says of them."""
-    colors = hex_colors(scene.colors)
+    """Neighbours of one kind share a group, and what it says of them; neighbours of one opacity a group in it
+    where that is shorter.
+    """
+    colors, opacities = hex_colors(scene.colors), _opacities(scene, opacity_scale)
     for kind, shapes in itertools.groupby(range(len(scene)), lambda i: Kind(int(scene.kind[i]))):
         yield f"<g {STROKE_ATTRIBUTES}>" if kind == Kind.STROKE else "<g>"
-        yield from (_element(scene, i, colors[i], per_pixel, opacity_scale) for i in shapes)
+        for opacity, run in itertools.groupby(shapes, lambda i: opacities[i]):
+            alike = list(run)
+            group = f"<g{opacity}>", "</g>"
+            shared = len(alike) * len(opacity) > len("".join(group))
+            paths = (_path(scene, i, colors[i], per_pixel, "" if shared else opacity) for i in alike)
+            yield from (group[0], *paths, group[1]) if shared else paths
         yield "</g>"
 
 
