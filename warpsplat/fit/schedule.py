@@ -16,7 +16,7 @@ COARSE_SLACK = 2.0
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
 
-LOOK_INTERVAL = 25
+LOOK_INTERVAL = 50
 """Steps between two looks at the file as a viewer shows it."""
 
 

@@ -34,7 +34,7 @@ class Density:
     """Shapes at the most, over those that are left in the end."""
     thin: float = 0.6
     """Fraction of the run from which on the surplus is removed, until ``stop``."""
-    mean_points: float = 10.0
+    mean_points: float = 10.2
     """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
@@ -67,7 +67,7 @@ class Settings:
     simplify: bool = False
     """Whether an image that is simple gets fewer curves (``place.simple_curves``)."""
     iterations: int = 1000
-    coarse: float = 0.7
+    coarse: float = 0.72
     """Fraction of the iterations on a reduced image."""
     coarse_pixels: int = 100_000
     """Size of that image [pixels]; a smaller image is not reduced."""
@@ -83,7 +83,7 @@ class Settings:
     ssim: float = 0.0
     """Weight of 1 - SSIM of small windows beside the mean squared error. It raises the SSIM, and lowers PSNR
     and SSIMULACRA2."""
-    texture: float = 0.3
+    texture: float = 0.1
     """Power of the local variance by which the error of a pixel counts less: what is busy hides errors. As
     far as it can go without cost in PSNR (docs/experiments.md)."""
     xing: float = 0.0
@@ -198,6 +198,9 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 }
 """What each preset changes in the defaults."""
 
+FILL_POINT_RATE = 6.0
+"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
+
 SPLAT_SHARE = 0.5
 """Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
 
@@ -228,4 +231,6 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     if given.get("renderer") == "splat":
         preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
+    elif given.get("kind", Kind.FILL) == Kind.FILL:
+        preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
     return replace(preset, **given)

@@ -1,7 +1,7 @@
 """An order of painting that shows the same and takes fewer characters.
 
-Shapes that do not overlap may change places. So shapes of one opacity are brought together, that a group can say
-it for all of them.
+Shapes that do not overlap may change places. So shapes of one opacity are brought together, for a group to say
+it of all of them.
 """
 
 from __future__ import annotations
@@ -39,10 +39,8 @@ def by_opacity(scene: Scene) -> IndexArray:
 def _arrange(boxes: FloatArray, keys: Sequence[tuple[int, float]]) -> list[int]:
     """Order of shapes with these boxes and keys."""
     low, high = boxes[:, :2] - MARGIN / 2, boxes[:, 2:] + MARGIN / 2
-    overlap = ((low[:, None] < high[None]) & (low[None] < high[:, None])).all(axis=2)
-    above: list[npt.NDArray[np.intp]] = [
-        np.flatnonzero(row[i + 1 :]) + i + 1 for i, row in enumerate(overlap)
-    ]
+    overlap: npt.NDArray[np.bool_] = np.all((low[:, None] < high[None]) & (low[None] < high[:, None]), axis=2)
+    above = [np.flatnonzero(overlap[i, i + 1 :]) + i + 1 for i in range(len(keys))]
     below = np.triu(overlap, 1).sum(axis=0)
     """Unpainted shapes that lie under each."""
     ready = [i for i in range(len(keys)) if below[i] == 0]
