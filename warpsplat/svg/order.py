@@ -1,6 +1,6 @@
 """An order of painting that shows the same and takes fewer characters.
 
-Shapes that do not overlap may change places. So shapes of one opacity are brought together, for a group to say
+Shapes that do not overlap may change places. So those of one opacity are brought together, for a group to say
 it of all of them.
 """
 
