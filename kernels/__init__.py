@@ -7,9 +7,10 @@ Conventions and glossary, here once:
   the input image); ``scale`` takes it to render pixels.
 * Colours are sRGB values in [0, 1], not linearised (SVG composites so), straight, not premultiplied.
 * A **shape** is what is composited once, a path of the file. Row 0 is painted first (furthest back).
-  Its **kind** is FILL (a ring of cubics) or STROKE (a chain). Shapes are ragged: the control
-  **points** of shape ``i`` are those from ``point_first[i]`` to ``point_first[i + 1]``, its **cubics**
-  those from ``cubic_first[i]`` on; ``point_shape`` and ``cubic_shape`` say whose a point or cubic is.
+  Its **kind** is FILL (a ring of Béziers) or STROKE (a chain), its **basis** CUBIC or SPLINE
+  (``constants``). Shapes are ragged: the control **points** of shape ``i`` are those from ``point_first[i]``
+  to ``point_first[i + 1]``, its **Béziers** those from ``bezier_first[i]`` on; ``point_shape`` and
+  ``bezier_shape`` say whose a point or Bézier is.
 * A **sample** is a point by which a shape's tiles are found: a **vertex** of its polyline (exact coverage),
   or a **Gaussian** (splats). A shape's samples are the range [``*_first``, ``*_last``), empty where they did
   not fit into the capacity.

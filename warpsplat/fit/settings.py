@@ -34,7 +34,7 @@ class Density:
     """Shapes at the most, over those that are left in the end."""
     thin: float = 0.6
     """Fraction of the run from which on the surplus is removed, until ``stop``."""
-    mean_points: float = 10.2
+    mean_points: float = 10.6
     """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
