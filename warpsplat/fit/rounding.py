@@ -5,6 +5,7 @@ Rounded all at once, coordinates cost several times as much (docs/experiments.md
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -63,10 +64,13 @@ def finest(settings: Settings) -> float:
     return GRIDS[-1] if settings.precision is None else 10.0**settings.precision
 
 
-def choose_grid(step: Step, *, staged: bool) -> float:
+def choose_grid(step: Step, *, staged: bool, thrifty: bool = False) -> float:
     """Units a pixel of the coarsest grid that costs less than ``LOSS``.
 
-    ``staged``: whether what is not rounded yet will be fitted anew.
+    Args:
+        step: with the scene.
+        staged: whether what is not rounded yet will be fitted anew.
+        thrifty: take the grid that costs least, the bytes of the file counted as well.
     """
     state, renderer = step.state, step.renderer
 
@@ -77,12 +81,22 @@ def choose_grid(step: Step, *, staged: bool) -> float:
 
     scene = state.scene()
     before = error(scene)
-    allowed = before * (10 ** (LOSS / 10) - 1) / (STAGED if staged else 1)
+    after_refit = STAGED if staged else 1.0
+    allowed = before * (10 ** (LOSS / 10) - 1) / after_refit
     limit = finest(step.settings)
-    grid = limit
-    for grid in [g for g in GRIDS if g < limit] + [limit]:
-        if error(replace(scene, points=rounded(scene, grid).points)) <= before + allowed:
+    grid, least = limit, math.inf
+    worth = byte_worth(before, len(export(scene, step.settings, min(USUAL_GRID, limit)))) if thrifty else 0.0
+    for tried in [g for g in GRIDS if g < limit] + [limit]:
+        loss = error(replace(scene, points=rounded(scene, tried).points)) - before
+        if not thrifty:
+            grid = tried
+            if loss <= allowed:
+                break
+            continue
+        cost = after_refit * loss + worth * len(export(scene, step.settings, tried))
+        if cost > least:
             break
+        grid, least = tried, cost
     state.parameters.assign(scene)
     return grid
 

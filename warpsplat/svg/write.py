@@ -142,6 +142,11 @@ def _element(scene: Scene, shape: int, per_pixel: float, opacity_scale: float) -
     return f'<path d="{data}" {style}/>'
 
 
+def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
+    """Bytes of each shape in a file with ``per_pixel`` units a pixel, shape (shape,)."""
+    return np.array([len(_element(scene, i, per_pixel, 1.0)) for i in range(len(scene))], np.int64)
+
+
 def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
     """Neighbours of one kind share a group, and what it says of them."""
     for kind, shapes in itertools.groupby(range(len(scene)), lambda i: Kind(int(scene.kind[i]))):

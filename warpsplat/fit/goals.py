@@ -1,0 +1,314 @@
+"""The smallest file that reaches a PSNR, and the best one within a size.
+
+A first run has about as many shapes as are needed. Then shapes go, or come, and the last steps are done
+again, until the file is as it should be: what counts is the file itself, as it is written and shown.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpsplat.fit.afford import affordable_curves
+from warpsplat.fit.density import densify
+from warpsplat.fit.export import export
+from warpsplat.fit.importance import pixel_weights
+from warpsplat.fit.loop import Fit, Progress, fit
+from warpsplat.fit.place import simple_curves
+from warpsplat.fit.rate import DB_PER_DOUBLING
+from warpsplat.fit.schedule import phases
+from warpsplat.fit.settings import PRESETS, Settings
+from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
+from warpsplat.metrics import psnr
+from warpsplat.render.backend import Backend
+from warpsplat.scene import FloatArray
+from warpsplat.svg.viewer import on_white, render_own
+from warpsplat.svg.write import path_sizes
+
+Report = Callable[[Progress], None]
+Stop = Callable[[], bool]
+
+MOST_CURVES = 20_000
+"""Without ``--curves``."""
+
+PILOT_CURVES = 256
+"""Of the first pilot."""
+
+PILOT_GAIN = 1.65
+"""What a run of 1,000 steps has over a pilot with as many shapes [dB]."""
+
+PILOT_RANGE = 2.0
+"""Factor of the number of shapes over which a pilot is believed."""
+
+PILOTS = 3
+"""At the most."""
+
+ROUNDS = 6
+"""Times at the most that shapes go or come."""
+
+ENOUGH_DB = 0.03
+"""A file that has no more than this over the target is small enough [dB]."""
+
+AIM_DB = 0.01
+"""What is aimed at over the target [dB]."""
+
+NEAR = 0.005
+"""Where a file that is smaller by this share has turned out to miss the target, no other is tried."""
+
+FULL = 0.985
+"""A file that fills so much of its limit is large enough."""
+
+AIM_FULL = 0.996
+"""What is aimed at of the limit."""
+
+LAST_STEPS = 0.1
+"""Share of the run that is done again where shapes went."""
+
+GROWN_STEPS = 0.2
+"""Share of the run that is done again where shapes came."""
+
+CUT_MOST = 0.8
+"""Size after a round over that before, at the least; beyond, what went would be missed."""
+
+GROW_MOST = 1.35
+"""Size after a round over that before, at the most."""
+
+PILOT_TIME, MAIN_TIME = 0.15, 0.7
+"""Shares of a time budget; the rest is for the rounds."""
+
+PILOT_WORK, MAIN_WORK = 0.1, 0.7
+"""Shares of the work, as progress is shown."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A fit with the figures of its file."""
+
+    fit: Fit
+    size: int
+    """Bytes."""
+    psnr: float
+    """As a viewer shows it [dB]."""
+
+
+@dataclass(frozen=True)
+class Pursuit:
+    """What all runs on the way to a goal share."""
+
+    image: FloatArray
+    settings: Settings
+    """With the goals; their ``curves`` are the most that there may be."""
+    backend: Backend
+    importance: FloatArray | None
+    deadline: float
+    """Of ``time.monotonic``; infinite where there is none."""
+    report: Report | None
+    stop: Stop | None
+
+    def over(self) -> bool:
+        """Whether there is no time for another round, or the user wants no more."""
+        return time.monotonic() > self.deadline or bool(self.stop and self.stop())
+
+    def told(self, first: float, last: float) -> Report | None:
+        """Progress that counts as the work from ``first`` to ``last``."""
+        report = self.report
+        if report is None:
+            return None
+        return lambda now: report(replace(now, work=first + (last - first) * now.work))
+
+    def seconds(self, share: float) -> float | None:
+        """A share of the time that is left."""
+        return share * max(self.deadline - time.monotonic(), 0.0) if self.deadline < math.inf else None
+
+    def made(self, result: Fit) -> Made:
+        """``result`` with the figures of its file."""
+        text = export(result.scene, self.settings, result.per_pixel)
+        shown = on_white(render_own(text))
+        return Made(result, len(text.encode()), psnr(shown, np.round(255 * self.image)))
+
+    def run(self, settings: Settings, report: Report | None, seconds: float | None) -> Fit:
+        """A run from the start, that aims at no PSNR."""
+        return fit(
+            self.image,
+            replace(settings, target_psnr=None),
+            self.backend,
+            thrifty=True,
+            importance=self.importance,
+            seconds=seconds,
+            report=report,
+            stop=self.stop,
+        )
+
+    def resized(self, base: Made, wanted: float, report: Report | None) -> Fit:
+        """``base`` with shapes removed or added for a file of ``wanted`` bytes, and the last steps again."""
+        settings, scene = self.settings, base.fit.scene
+        plan = phases(settings, self.image.shape[1], self.image.shape[0])
+        weights = pixel_weights(Target(self.image, plan[-1]).image, self.importance, settings.texture)
+        rng = np.random.default_rng(settings.seed)
+        target = Target(self.image, plan[-1], weights)
+        step = Step(FitState.start(scene, self.backend, rng), settings, target)
+        sizes = path_sizes(scene, base.fit.per_pixel)
+        if wanted < base.size:
+            seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
+            order = np.argsort(seen / sizes, kind="stable")
+            removed = np.cumsum(sizes[order])
+            count = min(1 + int(np.searchsorted(removed, base.size - wanted)), len(scene) - 1)
+            scene = scene.take(np.sort(order[count:]))
+            again = LAST_STEPS
+        else:
+            count = max(1, round((wanted - base.size) / sizes.mean()))
+            count = min(count, settings.curves - len(scene))
+            image = step.renderer.read_image()
+            scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
+            again = GROWN_STEPS
+        return fit(
+            self.image,
+            replace(settings, target_psnr=None, curves=len(scene)),
+            self.backend,
+            scene=scene,
+            begin=round((1 - again) * settings.iterations),
+            per_pixel=base.fit.per_pixel,
+            importance=self.importance,
+            report=report,
+            stop=self.over,
+        )
+
+
+def pursue(
+    image: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    *,
+    importance: FloatArray | None = None,
+    seconds: float | None = None,
+    report: Report | None = None,
+    stop: Stop | None = None,
+) -> Fit:
+    """The smallest file that has ``target_psnr``, within ``max_bytes``; without a target the best in these.
+
+    Arguments are those of ``fit``. Where a goal is out of reach, the result is what comes nearest to it.
+    """
+    most = settings.curves
+    if settings.simplify:
+        most = min(MOST_CURVES, simple_curves(image))
+    settings = replace(settings, curves=most)
+    deadline = math.inf if seconds is None else time.monotonic() + seconds
+    pursuit = Pursuit(image, settings, backend, importance, deadline, report, stop)
+    done, first = _first(pursuit)
+    if first.interrupted:
+        return replace(first, iterations=done)
+    tried = [pursuit.made(first)]
+    for turn in range(ROUNDS):
+        step = _next(tried, settings)
+        if step is None or pursuit.over():
+            break
+        share = (1 - MAIN_WORK) / ROUNDS
+        now = MAIN_WORK + turn * share
+        result = pursuit.resized(*step, pursuit.told(now, now + share))
+        done += result.iterations
+        if result.interrupted:
+            break
+        tried.append(pursuit.made(result))
+    best = min(tried, key=lambda made: _rank(made, settings))
+    interrupted = bool(stop and stop())
+    return replace(best.fit, iterations=done, interrupted=interrupted)
+
+
+def _first(pursuit: Pursuit) -> tuple[int, Fit]:
+    """Steps done, and a run with about as many shapes as are needed."""
+    settings, image = pursuit.settings, pursuit.image
+    curves, done = settings.curves, 0
+    if settings.max_bytes:
+        curves = affordable_curves(settings, image.shape[1], image.shape[0])
+    if settings.target_psnr:
+        done, curves, pilot = _pilot(pursuit, curves)
+        if pilot.interrupted:
+            return done, pilot
+    settings = replace(settings, curves=curves)
+    report = pursuit.told(PILOT_WORK if done else 0.0, MAIN_WORK)
+    result = pursuit.run(settings, report, pursuit.seconds(MAIN_TIME))
+    return done + result.iterations, result
+
+
+def _pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
+    """Steps done, the number of shapes that the target needs, and the last pilot."""
+    settings = pursuit.settings
+    assert settings.target_psnr
+    draft = PRESETS["draft"]
+    steps = min(draft["iterations"], settings.iterations)
+    draft = {name: min(draft[name], getattr(settings, name)) for name in ("coarse_pixels", "fine_pixels")}
+    draft |= {"iterations": steps, "coarse": PRESETS["draft"]["coarse"], "max_bytes": None}
+    gain = PILOT_GAIN * math.log(settings.iterations / steps) / math.log(5)
+    curves, done = min(PILOT_CURVES, most), 0
+    for turn in range(PILOTS):
+        share = PILOT_WORK / PILOTS
+        report = pursuit.told(turn * share, (turn + 1) * share)
+        pilot = pursuit.run(
+            replace(settings, curves=curves, **draft), report, pursuit.seconds(PILOT_TIME / PILOTS)
+        )
+        done += pilot.iterations
+        missing = settings.target_psnr - gain - pursuit.made(pilot).psnr
+        needed = curves * 2 ** min(max(missing / DB_PER_DOUBLING, -20), 20)
+        used, curves = curves, max(1, min(most, round(needed)))
+        if pilot.interrupted or max(used / curves, curves / used) <= PILOT_RANGE:
+            break
+    return done, curves, pilot
+
+
+def _fits(made: Made, settings: Settings) -> bool:
+    return not settings.max_bytes or made.size <= settings.max_bytes
+
+
+def _reaches(made: Made, settings: Settings) -> bool:
+    return settings.target_psnr is not None and made.psnr >= settings.target_psnr
+
+
+def _rank(made: Made, settings: Settings) -> tuple[bool, bool, float]:
+    """Less is better: what fits comes first, of that what reaches the target, of that the smallest; of what
+    does not fit the smallest, of what does not reach it the best.
+    """
+    if not _fits(made, settings):
+        return True, True, made.size
+    reaches = _reaches(made, settings)
+    return False, not reaches, made.size if reaches else -made.psnr
+
+
+def _next(tried: list[Made], settings: Settings) -> tuple[Made, float] | None:
+    """What to go on with and how many bytes it should have; None where what there is will do."""
+    best = min(tried, key=lambda made: _rank(made, settings))
+    limit = settings.max_bytes or math.inf
+    if _reaches(best, settings) and _fits(best, settings):
+        assert settings.target_psnr
+        surplus = best.psnr - settings.target_psnr
+        worse = [made.size for made in tried if made.size < best.size]
+        least = (2 * max(worse) + best.size) / 3 if worse else CUT_MOST * best.size
+        if surplus <= ENOUGH_DB or best.size - least < NEAR * best.size:
+            return None
+        return best, max(best.size * 2 ** ((AIM_DB - surplus) / _slope(best, tried)), least)
+    if best.size > FULL * limit and _fits(best, settings):
+        return None
+    large = [made for made in tried if not _fits(made, settings)]
+    if large:
+        base = min(large, key=lambda made: made.size)
+        return base, max(AIM_FULL * limit, CUT_MOST * base.size)
+    if len(best.fit.scene) >= settings.curves:
+        return None
+    wanted = AIM_FULL * limit
+    if settings.target_psnr:
+        lack = settings.target_psnr + AIM_DB - best.psnr
+        wanted = min(wanted, best.size * 2 ** (lack / _slope(best, tried)))
+    return best, min(wanted, GROW_MOST * best.size)
+
+
+def _slope(best: Made, tried: list[Made]) -> float:
+    """Decibels that twice the bytes are worth around ``best``, by the last other file."""
+    others = [made for made in tried if abs(made.size / best.size - 1) > 1e-3]
+    if not others:
+        return DB_PER_DOUBLING
+    slope = (best.psnr - others[-1].psnr) / math.log2(best.size / others[-1].size)
+    return min(max(slope, 0.5 * DB_PER_DOUBLING), 3 * DB_PER_DOUBLING)
