@@ -21,8 +21,11 @@ STYLE_BYTES = {Kind.FILL: 45, Kind.STROKE: 65}
 SEPARATOR = 1.6
 """Bytes of a number, besides those of its digits in whole pixels."""
 
-SPARE_CURVES = 1.15
+SPARE_CURVES = 1.3
 """Curves trained over those expected to fit: what is too many goes with the surplus."""
+
+LATER = 0.86
+"""Bytes of a shape in the file over those before the last steps: opacities become 1, the grid coarser."""
 
 
 def affordable_curves(settings: Settings, width: int, height: int) -> int:
@@ -58,5 +61,5 @@ def affordable(step: Step) -> Settings:
         points = float(scene.point_counts()[splines].mean())
         lost = max(0.0, points - mean_points_at(settings, settings.iterations)) / (points + 2)
         per_shape -= lost * max(per_shape - STYLE_BYTES[settings.kind], 0.0)
-    room = round((settings.max_bytes - HEAD_BYTES) / max(per_shape, 1.0))
+    room = round((settings.max_bytes - HEAD_BYTES) / max(LATER * per_shape, 1.0))
     return replace(settings, curves=min(settings.curves, max(room, 1)))

@@ -39,8 +39,9 @@ MOST_CURVES = 20_000
 PILOT_CURVES = 256
 """Of the first pilot."""
 
-PILOT_GAIN = 1.65
-"""What a run of 1,000 steps has over a pilot with as many shapes [dB]."""
+PILOT_GAIN = 1.5
+"""What a run of 1,000 steps has at least over a pilot with as many shapes [dB]: rather too many shapes, since
+some that go at the end cost little."""
 
 PILOT_RANGE = 2.0
 """Factor of the number of shapes over which a pilot is believed."""
@@ -60,7 +61,10 @@ AIM_DB = 0.01
 NEAR = 0.005
 """Where a file that is smaller by this share has turned out to miss the target, no other is tried."""
 
-FULL = 0.985
+LEAST_LACK = 0.05
+"""A file that misses the target gets shapes for so much at the least [dB]."""
+
+FULL = 0.98
 """A file that fills so much of its limit is large enough."""
 
 AIM_FULL = 0.996
@@ -296,13 +300,14 @@ def _next(tried: list[Made], settings: Settings) -> tuple[Made, float] | None:
     if large:
         base = min(large, key=lambda made: made.size)
         return base, max(AIM_FULL * limit, CUT_MOST * base.size)
-    if len(best.fit.scene) >= settings.curves:
+    base = max(tried, key=lambda made: made.size)
+    if len(base.fit.scene) >= settings.curves:
         return None
-    wanted = AIM_FULL * limit
+    wanted = GROW_MOST * base.size
     if settings.target_psnr:
-        lack = settings.target_psnr + AIM_DB - best.psnr
-        wanted = min(wanted, best.size * 2 ** (lack / _slope(best, tried)))
-    return best, min(wanted, GROW_MOST * best.size)
+        lack = max(settings.target_psnr - base.psnr, LEAST_LACK)
+        wanted = min(wanted, base.size * 2 ** (lack / DB_PER_DOUBLING))
+    return base, min(wanted, AIM_FULL * limit)
 
 
 def _slope(best: Made, tried: list[Made]) -> float:
