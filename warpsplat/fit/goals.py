@@ -20,6 +20,7 @@ from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.rate import DB_PER_DOUBLING
+from warpsplat.fit.rounding import finest
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.fit.state import FitState
@@ -28,7 +29,7 @@ from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import on_white, render_own
-from warpsplat.svg.write import path_sizes
+from warpsplat.svg.write import GRIDS, path_sizes
 
 Report = Callable[[Progress], None]
 Stop = Callable[[], bool]
@@ -46,7 +47,10 @@ some that go at the end cost little."""
 PILOT_RANGE = 2.0
 """Factor of the number of shapes over which a pilot is believed."""
 
-PILOTS = 3
+PILOT_STEP = 8.0
+"""Most that the number of shapes changes by from one pilot to the next, as a factor."""
+
+PILOTS = 4
 """At the most."""
 
 ROUNDS = 6
@@ -57,6 +61,9 @@ ENOUGH_DB = 0.03
 
 AIM_DB = 0.01
 """What is aimed at over the target [dB]."""
+
+CUT_DB = 1.3
+"""What half of the shapes cost, by what the first few that go do when the rest is fitted anew [dB]."""
 
 NEAR = 0.005
 """Where a file that is smaller by this share has turned out to miss the target, no other is tried."""
@@ -79,6 +86,9 @@ GROWN_STEPS = 0.2
 CUT_MOST = 0.8
 """Size after a round over that before, at the least; beyond, what went would be missed."""
 
+SAME_GRID = 1.15
+"""Size after a round over that before up to which the grid stays; beyond, it is chosen anew."""
+
 GROW_MOST = 1.35
 """Size after a round over that before, at the most."""
 
@@ -98,6 +108,17 @@ class Made:
     """Bytes."""
     psnr: float
     """As a viewer shows it [dB]."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What is to be made of a file."""
+
+    base: Made
+    size: float
+    """Bytes that it should have, by the number of its shapes."""
+    per_pixel: float | None
+    """Units of the view box a pixel that it is to be rounded to; None: those that are worth their bytes."""
 
 
 @dataclass(frozen=True)
@@ -148,9 +169,10 @@ class Pursuit:
             stop=self.stop,
         )
 
-    def resized(self, base: Made, wanted: float, report: Report | None) -> Fit:
-        """``base`` with shapes removed or added for a file of ``wanted`` bytes, and the last steps again."""
-        settings, scene = self.settings, base.fit.scene
+    def changed(self, change: Change, report: Report | None) -> Fit:
+        """Shapes removed or added, and the last steps again."""
+        settings, base, wanted = self.settings, change.base, change.size
+        scene = base.fit.scene
         plan = phases(settings, self.image.shape[1], self.image.shape[0])
         weights = pixel_weights(Target(self.image, plan[-1]).image, self.importance, settings.texture)
         rng = np.random.default_rng(settings.seed)
@@ -165,10 +187,10 @@ class Pursuit:
             scene = scene.take(np.sort(order[count:]))
             again = LAST_STEPS
         else:
-            count = max(1, round((wanted - base.size) / sizes.mean()))
-            count = min(count, settings.curves - len(scene))
-            image = step.renderer.read_image()
-            scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
+            count = min(math.ceil((wanted - base.size) / sizes.mean()), settings.curves - len(scene))
+            if count > 0:
+                image = step.renderer.read_image()
+                scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
             again = GROWN_STEPS
         return fit(
             self.image,
@@ -176,7 +198,8 @@ class Pursuit:
             self.backend,
             scene=scene,
             begin=round((1 - again) * settings.iterations),
-            per_pixel=base.fit.per_pixel,
+            per_pixel=change.per_pixel,
+            thrifty=True,
             importance=self.importance,
             report=report,
             stop=self.over,
@@ -208,16 +231,19 @@ def pursue(
         return replace(first, iterations=done)
     tried = [pursuit.made(first)]
     for turn in range(ROUNDS):
-        step = _next(tried, settings)
-        if step is None or pursuit.over():
+        change = _next(tried, settings)
+        if change is None or pursuit.over():
             break
         share = (1 - MAIN_WORK) / ROUNDS
         now = MAIN_WORK + turn * share
-        result = pursuit.resized(*step, pursuit.told(now, now + share))
+        result = pursuit.changed(change, pursuit.told(now, now + share))
         done += result.iterations
         if result.interrupted:
             break
-        tried.append(pursuit.made(result))
+        made = pursuit.made(result)
+        if made.size in {other.size for other in tried}:
+            break  # what there is no step between
+        tried.append(made)
     best = min(tried, key=lambda made: _rank(made, settings))
     interrupted = bool(stop and stop())
     return replace(best.fit, iterations=done, interrupted=interrupted)
@@ -247,21 +273,31 @@ def _pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
     steps = min(draft["iterations"], settings.iterations)
     draft = {name: min(draft[name], getattr(settings, name)) for name in ("coarse_pixels", "fine_pixels")}
     draft |= {"iterations": steps, "coarse": PRESETS["draft"]["coarse"], "max_bytes": None}
-    gain = PILOT_GAIN * math.log(settings.iterations / steps) / math.log(5)
+    aim = settings.target_psnr - PILOT_GAIN * math.log(settings.iterations / steps) / math.log(5)
     curves, done = min(PILOT_CURVES, most), 0
+    seen: dict[int, float] = {}
     for turn in range(PILOTS):
         share = PILOT_WORK / PILOTS
         report = pursuit.told(turn * share, (turn + 1) * share)
-        pilot = pursuit.run(
-            replace(settings, curves=curves, **draft), report, pursuit.seconds(PILOT_TIME / PILOTS)
-        )
+        seconds = pursuit.seconds(PILOT_TIME / PILOTS)
+        pilot = pursuit.run(replace(settings, curves=curves, **draft), report, seconds)
         done += pilot.iterations
-        missing = settings.target_psnr - gain - pursuit.made(pilot).psnr
-        needed = curves * 2 ** min(max(missing / DB_PER_DOUBLING, -20), 20)
-        used, curves = curves, max(1, min(most, round(needed)))
-        if pilot.interrupted or max(used / curves, curves / used) <= PILOT_RANGE:
+        seen[curves] = pursuit.made(pilot).psnr
+        used, curves = curves, _curves_for(aim, seen, most)
+        if pilot.interrupted or max(used / curves, curves / used) <= PILOT_RANGE or curves in seen:
             break
     return done, curves, pilot
+
+
+def _curves_for(aim: float, seen: dict[int, float], most: int) -> int:
+    """Shapes that a pilot needs for ``aim`` dB, by the PSNR of the ``seen`` numbers of shapes."""
+    nearest, *others = sorted(seen, key=lambda count: abs(seen[count] - aim))
+    slope = DB_PER_DOUBLING
+    if others:
+        slope = (seen[nearest] - seen[others[0]]) / math.log2(nearest / others[0])
+    doublings = (aim - seen[nearest]) / max(slope, 0.5 * DB_PER_DOUBLING)
+    step = math.log2(PILOT_STEP)
+    return max(1, min(most, round(nearest * 2 ** min(max(doublings, -step), step))))
 
 
 def _fits(made: Made, settings: Settings) -> bool:
@@ -282,38 +318,37 @@ def _rank(made: Made, settings: Settings) -> tuple[bool, bool, float]:
     return False, not reaches, made.size if reaches else -made.psnr
 
 
-def _next(tried: list[Made], settings: Settings) -> tuple[Made, float] | None:
-    """What to go on with and how many bytes it should have; None where what there is will do."""
+def _next(tried: list[Made], settings: Settings) -> Change | None:
+    """What to do next; None where what there is will do."""
     best = min(tried, key=lambda made: _rank(made, settings))
     limit = settings.max_bytes or math.inf
     if _reaches(best, settings) and _fits(best, settings):
         assert settings.target_psnr
         surplus = best.psnr - settings.target_psnr
-        worse = [made.size for made in tried if made.size < best.size]
-        least = (2 * max(worse) + best.size) / 3 if worse else CUT_MOST * best.size
+        slope, least = CUT_DB, CUT_MOST * best.size
+        failed = [made for made in tried[tried.index(best) + 1 :] if made.size < best.size]
+        if failed:
+            nearest = max(failed, key=lambda made: made.size)
+            slope = (best.psnr - nearest.psnr) / math.log2(best.size / nearest.size)
+            least = (2 * nearest.size + best.size) / 3
         if surplus <= ENOUGH_DB or best.size - least < NEAR * best.size:
             return None
-        return best, max(best.size * 2 ** ((AIM_DB - surplus) / _slope(best, tried)), least)
+        wanted = best.size * 2 ** ((AIM_DB - surplus) / slope)
+        return Change(best, max(wanted, least), best.fit.per_pixel)
     if best.size > FULL * limit and _fits(best, settings):
         return None
     large = [made for made in tried if not _fits(made, settings)]
     if large:
         base = min(large, key=lambda made: made.size)
-        return base, max(AIM_FULL * limit, CUT_MOST * base.size)
+        return Change(base, max(AIM_FULL * limit, CUT_MOST * base.size), base.fit.per_pixel)
     base = max(tried, key=lambda made: made.size)
+    per_pixel = base.fit.per_pixel
     if len(base.fit.scene) >= settings.curves:
-        return None
+        finer = [grid for grid in (*GRIDS, finest(settings)) if 2 * per_pixel <= grid <= finest(settings)]
+        return Change(base, base.size, min(finer)) if finer else None
     wanted = GROW_MOST * base.size
     if settings.target_psnr:
         lack = max(settings.target_psnr - base.psnr, LEAST_LACK)
         wanted = min(wanted, base.size * 2 ** (lack / DB_PER_DOUBLING))
-    return base, min(wanted, AIM_FULL * limit)
-
-
-def _slope(best: Made, tried: list[Made]) -> float:
-    """Decibels that twice the bytes are worth around ``best``, by the last other file."""
-    others = [made for made in tried if abs(made.size / best.size - 1) > 1e-3]
-    if not others:
-        return DB_PER_DOUBLING
-    slope = (best.psnr - others[-1].psnr) / math.log2(best.size / others[-1].size)
-    return min(max(slope, 0.5 * DB_PER_DOUBLING), 3 * DB_PER_DOUBLING)
+    wanted = min(wanted, AIM_FULL * limit)
+    return Change(base, wanted, per_pixel if wanted <= SAME_GRID * base.size else None)

@@ -26,6 +26,9 @@ STAGE_SHARE = 0.015
 LOSS = 0.03
 """Most that rounding may cost [dB]."""
 
+THRIFTY_LOSS = 0.15
+"""Most that rounding may cost where it saves bytes that are worth more [dB]: beyond, refitting fails."""
+
 STAGED = 0.2
 """What rounding in stages costs over what rounding at once does."""
 
@@ -82,21 +85,21 @@ def choose_grid(step: Step, *, staged: bool, thrifty: bool = False) -> float:
     scene = state.scene()
     before = error(scene)
     after_refit = STAGED if staged else 1.0
-    allowed = before * (10 ** (LOSS / 10) - 1) / after_refit
+    allowed = before * (10 ** ((THRIFTY_LOSS if thrifty else LOSS) / 10) - 1) / after_refit
     limit = finest(step.settings)
     grid, least = limit, math.inf
     worth = byte_worth(before, len(export(scene, step.settings, min(USUAL_GRID, limit)))) if thrifty else 0.0
     for tried in [g for g in GRIDS if g < limit] + [limit]:
         loss = error(replace(scene, points=rounded(scene, tried).points)) - before
-        if not thrifty:
-            grid = tried
-            if loss <= allowed:
-                break
-            continue
-        cost = after_refit * loss + worth * len(export(scene, step.settings, tried))
+        size = len(export(scene, step.settings, tried)) if thrifty else 0
+        cost = after_refit * loss + worth * size
         if cost > least:
             break
-        grid, least = tried, cost
+        grid = tried
+        if loss <= allowed:
+            least = cost
+            if not thrifty:
+                break
     state.parameters.assign(scene)
     return grid
 
