@@ -20,19 +20,21 @@ from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.rate import DB_PER_DOUBLING
-from warpsplat.fit.rounding import finest
+from warpsplat.fit.rounding import STAGES, finest, stage_steps
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.metrics import psnr
+from warpsplat.metrics import score_svg
 from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray
-from warpsplat.svg.viewer import on_white, render_own
 from warpsplat.svg.write import GRIDS, path_sizes
 
 Report = Callable[[Progress], None]
 Stop = Callable[[], bool]
+
+METADATA = f"key={'0' * 24}"
+"""As long as that of a finished file."""
 
 MOST_CURVES = 20_000
 """Without ``--curves``."""
@@ -99,7 +101,7 @@ PILOT_WORK, MAIN_WORK = 0.1, 0.7
 """Shares of the work, as progress is shown."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Made:
     """A fit with the figures of its file."""
 
@@ -152,9 +154,9 @@ class Pursuit:
 
     def made(self, result: Fit) -> Made:
         """``result`` with the figures of its file."""
-        text = export(result.scene, self.settings, result.per_pixel)
-        shown = on_white(render_own(text))
-        return Made(result, len(text.encode()), psnr(shown, np.round(255 * self.image)))
+        text = export(result.scene, self.settings, result.per_pixel, METADATA)
+        score = score_svg(text, self.image, own=True, eyes=False)
+        return Made(result, score.bytes, score.psnr)
 
     def run(self, settings: Settings, report: Report | None, seconds: float | None) -> Fit:
         """A run from the start, that aims at no PSNR."""
@@ -192,12 +194,14 @@ class Pursuit:
                 image = step.renderer.read_image()
                 scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
             again = GROWN_STEPS
+        before_stages = settings.iterations - STAGES * stage_steps(settings) - 1
+        density = replace(settings.density, interval=0)
         return fit(
             self.image,
-            replace(settings, target_psnr=None, curves=len(scene)),
+            replace(settings, target_psnr=None, curves=len(scene), density=density),
             self.backend,
             scene=scene,
-            begin=round((1 - again) * settings.iterations),
+            begin=max(0, min(round((1 - again) * settings.iterations), before_stages)),
             per_pixel=change.per_pixel,
             thrifty=True,
             importance=self.importance,

@@ -26,7 +26,7 @@ STAGE_SHARE = 0.015
 LOSS = 0.03
 """Most that rounding may cost [dB]."""
 
-THRIFTY_LOSS = 0.15
+THRIFTY_LOSS = 0.06
 """Most that rounding may cost where it saves bytes that are worth more [dB]: beyond, refitting fails."""
 
 STAGED = 0.2
