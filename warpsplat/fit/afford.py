@@ -24,7 +24,7 @@ SEPARATOR = 1.6
 SPARE_CURVES = 1.3
 """Curves trained over those expected to fit: what is too many goes with the surplus."""
 
-LATER = 0.86
+LATER = 0.92
 """Bytes of a shape in the file over those before the last steps: opacities become 1, the grid coarser."""
 
 

@@ -79,11 +79,8 @@ FULL = 0.98
 AIM_FULL = 0.996
 """What is aimed at of the limit."""
 
-LAST_STEPS = 0.1
-"""Share of the run that is done again where shapes went."""
-
-GROWN_STEPS = 0.2
-"""Share of the run that is done again where shapes came."""
+LAST_STEPS = 0.2
+"""Share of the run that is done again where shapes went or came."""
 
 CUT_MOST = 0.8
 """Size after a round over that before, at the least; beyond, what went would be missed."""
@@ -187,13 +184,11 @@ class Pursuit:
             removed = np.cumsum(sizes[order])
             count = min(1 + int(np.searchsorted(removed, base.size - wanted)), len(scene) - 1)
             scene = scene.take(np.sort(order[count:]))
-            again = LAST_STEPS
         else:
             count = min(math.ceil((wanted - base.size) / sizes.mean()), settings.curves - len(scene))
             if count > 0:
                 image = step.renderer.read_image()
                 scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
-            again = GROWN_STEPS
         before_stages = settings.iterations - STAGES * stage_steps(settings) - 1
         density = replace(settings.density, interval=0)
         return fit(
@@ -201,7 +196,7 @@ class Pursuit:
             replace(settings, target_psnr=None, curves=len(scene), density=density),
             self.backend,
             scene=scene,
-            begin=max(0, min(round((1 - again) * settings.iterations), before_stages)),
+            begin=max(0, min(round((1 - LAST_STEPS) * settings.iterations), before_stages)),
             per_pixel=change.per_pixel,
             thrifty=True,
             importance=self.importance,
