@@ -294,7 +294,9 @@ def _curves_for(aim: float, seen: dict[int, float], most: int) -> int:
     slope = DB_PER_DOUBLING
     if others:
         slope = (seen[nearest] - seen[others[0]]) / math.log2(nearest / others[0])
-    doublings = (aim - seen[nearest]) / max(slope, 0.5 * DB_PER_DOUBLING)
+    missing = aim - seen[nearest]
+    # Pilots gain less by more shapes than whole runs do; rather too many shapes than too few.
+    doublings = missing / max(slope, (0.75 if missing > 0 else 1.0) * DB_PER_DOUBLING)
     step = math.log2(PILOT_STEP)
     return max(1, min(most, round(nearest * 2 ** min(max(doublings, -step), step))))
 
