@@ -92,9 +92,12 @@ def run_file(
 
     ``importance``: file of a mask.
     """
+    pursued = settings.target_psnr or settings.max_bytes
     if verbose:
-        most = "at most " if settings.simplify or settings.max_bytes else ""
-        say(f"{source}: {most}{settings.curves} {PLURALS[settings.kind]} on {backend.device}", err=True)
+        number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
+        if settings.simplify and pursued:
+            number = "no more than needed"
+        say(f"{source}: {number} {PLURALS[settings.kind]} on {backend.device}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         result = vectorize_file(
@@ -108,7 +111,7 @@ def run_file(
             stop=interrupt,
         )
     count = len(result.scene)
-    if settings.simplify and not settings.max_bytes and count < settings.curves and not quiet:
+    if settings.simplify and not pursued and count < settings.curves and not quiet:
         hint = f"a simple image: {count} shapes; --curves N for another number"
         say(f"warpsplat: {input_name(source)}: {hint}", err=True)
     return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from warpsplat.fit.settings import Density, Renderer, make_settings
 from warpsplat.jobs.vectorize import has_time_for_eyes, vectorize
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Kind
+from warpsplat.svg.write import read_metadata
 
 CAT = ROOT / "docs" / "images" / "cat.jpg"
 
@@ -121,16 +123,46 @@ def test_eyes_have_to_wait_in_large_images_and_short_times() -> None:
     assert not has_time_for_eyes(make_settings(time_budget="2m"), small)
 
 
-def test_target_psnr_ends_the_run(device: str) -> None:
-    settings = make_settings(curves=20, iterations=3000, target_psnr=22.0)
+def test_target_psnr_is_reached_with_few_bytes(device: str) -> None:
+    """With a file between those of fixed numbers of shapes, and no more decibels than a shape is worth."""
+    settings = make_settings(iterations=100, target_psnr=24.0)
     result = vectorize(picture(), settings, Backend.on(device))
     assert result.score
-    assert result.score.psnr >= 22
-    assert result.iterations < 3000
+    assert 24 <= result.score.psnr < 27
     assert not result.missed
-    missed = vectorize(picture(), replace(settings, iterations=10, target_psnr=60.0), Backend.on(device))
+    plain = vectorize(
+        picture(), make_settings(iterations=100, curves=2 * len(result.scene)), Backend.on(device)
+    )
+    assert plain.score
+    assert result.score.bytes < 0.7 * plain.score.bytes
+
+
+def test_target_psnr_out_of_reach_says_so_and_keeps_to_the_curves(device: str) -> None:
+    settings = make_settings(iterations=20, curves=10, target_psnr=60.0)
+    missed = vectorize(picture(), settings, Backend.on(device))
     assert missed.score
+    assert len(missed.scene) == 10
     assert missed.missed[0].startswith("target-psnr 60 dB: reached ")
+
+
+def test_target_psnr_within_a_size_and_a_time(device: str) -> None:
+    settings = make_settings(iterations=20, target_psnr=60.0, max_bytes=1500)
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert 0.9 * 1500 < result.score.bytes <= 1500
+    late = vectorize(picture(), replace(settings, max_bytes=None, time_budget=0.5), Backend.on(device))
+    assert not late.stopped
+    assert late.missed[0].startswith("target-psnr 60 dB: reached ")
+
+
+@pytest.mark.parametrize("asked", [3, 25, 45])
+def test_a_goal_may_be_interrupted_anywhere(device: str, asked: int) -> None:
+    """In a pilot, in the run, and where shapes come: the best so far is the result."""
+    steps = itertools.count()
+    settings = make_settings(iterations=20, curves=10, target_psnr=60.0)
+    result = vectorize(picture(), settings, Backend.on(device), stop=lambda: next(steps) >= asked)
+    assert result.stopped
+    assert "stopped" in read_metadata(result.svg)
 
 
 def test_max_bytes_is_kept(device: str) -> None:

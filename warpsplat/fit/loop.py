@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.place import grid_scene
@@ -20,9 +21,6 @@ from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
 from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray, Scene
-
-TARGET_MARGIN = 0.1
-"""How much more than the target the training render must have [dB], for the file to have it."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +63,9 @@ def fit(
     backend: Backend,
     *,
     scene: Scene | None = None,
+    begin: int = 0,
+    per_pixel: float | None = None,
+    thrifty: bool = False,
     importance: FloatArray | None = None,
     seconds: float | None = None,
     report: Callable[[Progress], None] | None = None,
@@ -77,15 +78,18 @@ def fit(
         settings: all that decides the result.
         backend: where to compute.
         scene: shapes to start from, whose number stays; without, new ones.
+        begin: step of the schedule to start at.
+        per_pixel: units of the view box a pixel; without, they are chosen.
+        thrifty: whether to choose those that are worth their bytes, rather than some that lose little.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size.
         seconds: time that the run should take, in place of the settings' iterations.
         report: called every few steps.
-        stop: asked after every step; once true, the run ends. So does reaching ``target_psnr``.
+        stop: asked after every step; once true, the run ends.
     """
     rng = np.random.default_rng(settings.seed)
     grows = scene is None
     start = grid_scene(settings, image, shapes_at(settings, 0), rng) if scene is None else scene
-    state = FitState.start(start, backend, rng)
+    state = FitState.start(start, backend, rng, begin)
     budget = Budget(seconds) if seconds is not None else None
     if budget:
         settings = budget.measure(state, settings, image)
@@ -108,8 +112,6 @@ def fit(
             if report:
                 spent, work = time.monotonic() - started, work_done(settings, plan, done)
                 report(Progress(done, settings.iterations, step.psnr(), spent, work, finest))
-            if settings.target_psnr and finest and step.psnr() >= settings.target_psnr + TARGET_MARGIN:
-                break
         if stop and stop():
             interrupted = True
             break
@@ -118,10 +120,10 @@ def fit(
         stage = stage_at(settings, done)
         if stage is not None:
             if not rounding:
-                state.per_pixel = choose_grid(step, staged=True)
+                state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
                 rounding = True
             hold_stage(step, stage)
-        if done == opacities_at(settings) and settings.renderer == "exact":
+        if done == max(opacities_at(settings), begin + 1) and settings.renderer == "exact":
             hold_opacities(step)
         density = settings.density
         surgical = done < density.stop * settings.iterations
@@ -132,9 +134,13 @@ def fit(
             slowness = (time.monotonic() - started) / (done * budget.costs[0])
             settings = budget.fit(settings, done, slowness)
             step.configure(settings)
+        if due and grows and settings.max_bytes and surgical:
+            settings = affordable(step)
+            step.configure(settings)
         missing = grows and state.parameters.shape_count != settings.curves
         if due and done < settings.iterations and (missing or done < density.stop * settings.iterations):
             step = operate(step, grows=grows)
     if not rounding:
         state.per_pixel = choose_grid(step, staged=False)
-    return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), state.step, interrupted)
+    done = state.step - begin
+    return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), done, interrupted)

@@ -5,6 +5,7 @@ Rounded all at once, coordinates cost several times as much (docs/experiments.md
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,9 @@ STAGE_SHARE = 0.015
 
 LOSS = 0.03
 """Most that rounding may cost [dB]."""
+
+THRIFTY_LOSS = 0.06
+"""Most that rounding may cost where it saves bytes that are worth more [dB]: beyond, refitting fails."""
 
 STAGED = 0.2
 """What rounding in stages costs over what rounding at once does."""
@@ -63,10 +67,13 @@ def finest(settings: Settings) -> float:
     return GRIDS[-1] if settings.precision is None else 10.0**settings.precision
 
 
-def choose_grid(step: Step, *, staged: bool) -> float:
+def choose_grid(step: Step, *, staged: bool, thrifty: bool = False) -> float:
     """Units a pixel of the coarsest grid that costs less than ``LOSS``.
 
-    ``staged``: whether what is not rounded yet will be fitted anew.
+    Args:
+        step: with the scene.
+        staged: whether what is not rounded yet will be fitted anew.
+        thrifty: take the grid that costs least, the bytes of the file counted as well.
     """
     state, renderer = step.state, step.renderer
 
@@ -77,12 +84,22 @@ def choose_grid(step: Step, *, staged: bool) -> float:
 
     scene = state.scene()
     before = error(scene)
-    allowed = before * (10 ** (LOSS / 10) - 1) / (STAGED if staged else 1)
+    after_refit = STAGED if staged else 1.0
+    allowed = before * (10 ** ((THRIFTY_LOSS if thrifty else LOSS) / 10) - 1) / after_refit
     limit = finest(step.settings)
-    grid = limit
-    for grid in [g for g in GRIDS if g < limit] + [limit]:
-        if error(replace(scene, points=rounded(scene, grid).points)) <= before + allowed:
+    grid, least = limit, math.inf
+    worth = byte_worth(before, len(export(scene, step.settings, min(USUAL_GRID, limit)))) if thrifty else 0.0
+    for tried in [g for g in GRIDS if g < limit] + [limit]:
+        loss = error(replace(scene, points=rounded(scene, tried).points)) - before
+        size = len(export(scene, step.settings, tried)) if thrifty else 0
+        cost = after_refit * loss + worth * size
+        if cost > least:
             break
+        grid = tried
+        if loss <= allowed:
+            least = cost
+            if not thrifty:
+                break
     state.parameters.assign(scene)
     return grid
 

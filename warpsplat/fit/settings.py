@@ -103,11 +103,12 @@ class Settings:
     """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
     (``fit.rounding``)."""
     target_psnr: float | None = None
-    """Stop once the render has this PSNR at the finest size [dB]."""
+    """The smallest file that has this PSNR, as a viewer shows it [dB]; ``curves`` are the most that it may
+    have, unless ``simplify``."""
     time_budget: float | None = None
     """Size the run to end within this time [s], start of the program not included."""
     max_bytes: int | None = None
-    """Largest file [bytes]: as many curves as fit, ``curves`` at the most."""
+    """The best file that has no more [bytes]; ``curves`` as for ``target_psnr``."""
     rates: dict[str, float] = field(default_factory=default_rates)
     """Adam's learning rates at the start, by attribute; they decay along a cosine."""
     final_rate: float = 0.2

@@ -28,9 +28,11 @@ class FitState:
     """Units of the file's view box a pixel."""
 
     @staticmethod
-    def start(scene: Scene, backend: Backend, rng: np.random.Generator) -> FitState:
-        """Before the first step."""
-        return FitState(Parameters(scene, backend), backend.array(wp.int32, 1), rng)
+    def start(scene: Scene, backend: Backend, rng: np.random.Generator, step: int = 0) -> FitState:
+        """Before the first step; ``step``: those that count as done."""
+        clock = backend.array(wp.int32, 1)
+        clock.fill_(step)
+        return FitState(Parameters(scene, backend), clock, rng, step)
 
     def scene(self) -> Scene:
         """The current scene, on the host."""

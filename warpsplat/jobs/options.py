@@ -39,7 +39,13 @@ class Option:
 
 
 OPTIONS = (
-    Option("curves", int, "Number of shapes.", f"{_defaults.curves}; fewer for a simple image", "N"),
+    Option(
+        "curves",
+        int,
+        "Number of shapes; with a goal the most.",
+        f"{_defaults.curves}; fewer for a simple image",
+        "N",
+    ),
     Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
     Option("open", bool, "Strokes.", kind=Kind.STROKE),
     Option("quality", str, "Effort.", DEFAULT_QUALITY, choices=QUALITIES),
@@ -51,9 +57,9 @@ OPTIONS = (
         choices=get_args(Renderer),
     ),
     Option("iterations", int, "Steps; overrides the effort's number.", metavar="N"),
-    Option("target-psnr", float, "Stop once this is reached.", metavar="DB"),
+    Option("target-psnr", float, "Smallest file that has this.", metavar="DB"),
     Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
-    Option("max-bytes", str, "Largest file, 100KB ...; fewer curves if need be.", metavar="SIZE"),
+    Option("max-bytes", str, "Best file within 100KB, 1MB ...", metavar="SIZE"),
     Option("seed", int, "Random seed.", str(_defaults.seed), "N"),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -19,12 +18,13 @@ from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.output import write_result
 from warpsplat.fit.export import export
+from warpsplat.fit.goals import pursue
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Settings
 from warpsplat.metrics import Score, score_svg
 from warpsplat.render.backend import Backend
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
 
@@ -99,22 +99,25 @@ def vectorize(
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
     """
     started = time.monotonic()
-    if settings.simplify and scene is None:
-        settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
-    if settings.max_bytes:
-        height, width = target.shape[:2]
-        settings = replace(settings, curves=affordable_curves(settings, width, height))
     seconds = training_seconds(settings, target, started)
-    made = fit(
-        target,
-        settings,
-        backend,
-        scene=scene,
-        importance=importance,
-        seconds=seconds,
-        report=report,
-        stop=stop,
-    )
+    if scene is None and (settings.target_psnr or settings.max_bytes):
+        made = pursue(
+            target, settings, backend, importance=importance, seconds=seconds, report=report, stop=stop
+        )
+    else:
+        if settings.simplify and scene is None:
+            settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
+        made = fit(
+            target,
+            settings,
+            backend,
+            scene=scene,
+            importance=importance,
+            seconds=seconds,
+            report=report,
+            stop=stop,
+        )
+        made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
@@ -146,7 +149,6 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
-    scene = scene.take(by_opacity(scene))
     svg = export(scene, settings, per_pixel, metadata)
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())
@@ -191,35 +193,6 @@ def _score(
 TAIL_SECONDS = 0.3
 TAIL_PER_PIXEL = 3e-7
 """Of a time budget: what the last step, exporting and scoring take [s]."""
-
-HEAD_BYTES = 400
-"""Of a file, besides its shapes."""
-
-STYLE_BYTES = {Kind.FILL: 45, Kind.STROKE: 65}
-"""Of a shape, besides its coordinates."""
-
-STEP = {Kind.FILL: 1.0, Kind.STROKE: 1 / 3}
-"""Distance of a curve's neighbouring points over that of neighbouring curves, about."""
-
-SPARE_CURVES = 1.04
-"""Curves trained over those expected to fit; shapes of a simple image are shorter."""
-
-
-def affordable_curves(settings: Settings, width: int, height: int) -> int:
-    """Curves that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
-
-    Coordinates are relative: each has as many digits before the point as the step from one to the next.
-    """
-    assert settings.max_bytes
-    numbers = 4 + 2 * settings.density.mean_points
-    separators = 1.6
-    room = settings.max_bytes - HEAD_BYTES
-    count = float(settings.curves)
-    for _ in range(8):  # settles within a curve
-        step = STEP[settings.kind] * math.sqrt(width * height / max(count, 1.0))
-        digits = max(0.0, math.log10(step))
-        count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (separators + digits)))
-    return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 
 
 def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat import __version__
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
@@ -161,6 +162,13 @@ def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
         f' {PAINTED[Kind(kind)]}-opacity="{number(value, OPACITY_DECIMALS)}"' if value < OPAQUE else ""
         for kind, value in zip(scene.kind.tolist(), shown, strict=True)
     ]
+
+
+def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
+    """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
+    colors, opacities = hex_colors(scene.colors), _opacities(scene, 1.0)
+    paths = (_path(scene, i, colors[i], per_pixel, opacities[i]) for i in range(len(scene)))
+    return np.array([len(path) for path in paths], np.int64)
 
 
 def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:

@@ -1,0 +1,230 @@
+"""The smallest file that reaches a PSNR, and the best one within a size.
+
+A first run has about as many shapes as are needed. Then shapes go, or come, and the last steps are done
+again, until the file is as it should be: what counts is the file itself, as it is written and shown.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+from warpsplat.fit.afford import affordable_curves
+from warpsplat.fit.loop import Fit
+from warpsplat.fit.place import simple_curves
+from warpsplat.fit.pursuit import Change, Made, Pursuit, Report, Stop
+from warpsplat.fit.rate import DB_PER_DOUBLING
+from warpsplat.fit.rounding import finest
+from warpsplat.fit.settings import PRESETS, Settings
+from warpsplat.render.backend import Backend
+from warpsplat.scene import FloatArray
+from warpsplat.svg.write import GRIDS
+
+MOST_CURVES = 20_000
+"""Without ``--curves``."""
+
+PILOT_CURVES = 256
+"""Of the first pilot."""
+
+PILOT_GAIN = 1.5
+"""What a run of 1,000 steps has at least over a pilot with as many shapes [dB]: rather too many shapes, since
+some that go at the end cost little."""
+
+PILOT_RANGE = 2.0
+"""Factor of the number of shapes over which a pilot is believed."""
+
+PILOT_STEP = 8.0
+"""Most that the number of shapes changes by from one pilot to the next, as a factor."""
+
+PILOTS = 4
+"""At the most."""
+
+ROUNDS = 6
+"""Times at the most that shapes go or come."""
+
+ENOUGH_DB = 0.03
+"""A file that has no more than this over the target is small enough [dB]."""
+
+AIM_DB = 0.01
+"""What is aimed at over the target [dB]."""
+
+CUT_DB = 1.3
+"""What half of the shapes cost, by what the first few that go do when the rest is fitted anew [dB]."""
+
+NEAR = 0.005
+"""Where a file that is smaller by this share has turned out to miss the target, no other is tried."""
+
+LEAST_LACK = 0.05
+"""A file that misses the target gets shapes for so much at the least [dB]."""
+
+FULL = 0.98
+"""A file that fills so much of its limit is large enough."""
+
+AIM_FULL = 0.996
+"""What is aimed at of the limit."""
+
+CUT_MOST = 0.8
+"""Size after a round over that before, at the least; beyond, what went would be missed."""
+
+SAME_GRID = 1.15
+"""Size after a round over that before up to which the grid stays; beyond, it is chosen anew."""
+
+GROW_MOST = 1.35
+"""Size after a round over that before, at the most."""
+
+PILOT_TIME, MAIN_TIME = 0.15, 0.7
+"""Shares of a time budget; the rest is for the rounds."""
+
+PILOT_WORK, MAIN_WORK = 0.1, 0.7
+"""Shares of the work, as progress is shown."""
+
+
+def pursue(
+    image: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    *,
+    importance: FloatArray | None = None,
+    seconds: float | None = None,
+    report: Report | None = None,
+    stop: Stop | None = None,
+) -> Fit:
+    """The smallest file that has ``target_psnr``, within ``max_bytes``; without a target the best in these.
+
+    Arguments are those of ``fit``. Where a goal is out of reach, the result is what comes nearest to it.
+    """
+    most = settings.curves
+    if settings.simplify:
+        most = min(MOST_CURVES, simple_curves(image))
+    settings = replace(settings, curves=most)
+    deadline = math.inf if seconds is None else time.monotonic() + seconds
+    pursuit = Pursuit(image, settings, backend, importance, deadline, report, stop)
+    done, first = _first(pursuit)
+    if first.interrupted:
+        return replace(first, iterations=done)
+    tried = [pursuit.made(first)]
+    for turn in range(ROUNDS):
+        change = _next(tried, settings)
+        if change is None or pursuit.over():
+            break
+        share = (1 - MAIN_WORK) / ROUNDS
+        now = MAIN_WORK + turn * share
+        result = pursuit.changed(change, pursuit.told(now, now + share))
+        done += result.iterations
+        if result.interrupted:
+            break
+        made = pursuit.made(result)
+        if made.size in {other.size for other in tried}:
+            break  # what there is no step between
+        tried.append(made)
+    best = min(tried, key=lambda made: _rank(made, settings))
+    interrupted = bool(stop and stop())
+    return replace(best.fit, iterations=done, interrupted=interrupted)
+
+
+def _first(pursuit: Pursuit) -> tuple[int, Fit]:
+    """Steps done, and a run with about as many shapes as are needed."""
+    settings, image = pursuit.settings, pursuit.image
+    curves, done = settings.curves, 0
+    if settings.max_bytes:
+        curves = affordable_curves(settings, image.shape[1], image.shape[0])
+    if settings.target_psnr:
+        done, curves, pilot = _pilot(pursuit, curves)
+        if pilot.interrupted:
+            return done, pilot
+    settings = replace(settings, curves=curves)
+    report = pursuit.told(PILOT_WORK if done else 0.0, MAIN_WORK)
+    result = pursuit.run(settings, report, pursuit.seconds(MAIN_TIME))
+    return done + result.iterations, result
+
+
+def _pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
+    """Steps done, the number of shapes that the target needs, and the last pilot."""
+    settings = pursuit.settings
+    assert settings.target_psnr
+    draft = PRESETS["draft"]
+    steps = min(draft["iterations"], settings.iterations)
+    draft = {name: min(draft[name], getattr(settings, name)) for name in ("coarse_pixels", "fine_pixels")}
+    draft |= {"iterations": steps, "coarse": PRESETS["draft"]["coarse"], "max_bytes": None}
+    aim = settings.target_psnr - PILOT_GAIN * math.log(settings.iterations / steps) / math.log(5)
+    curves, done = min(PILOT_CURVES, most), 0
+    seen: dict[int, float] = {}
+    for turn in range(PILOTS):
+        share = PILOT_WORK / PILOTS
+        report = pursuit.told(turn * share, (turn + 1) * share)
+        seconds = pursuit.seconds(PILOT_TIME / PILOTS)
+        pilot = pursuit.run(replace(settings, curves=curves, **draft), report, seconds)
+        done += pilot.iterations
+        seen[curves] = pursuit.made(pilot).psnr
+        used, curves = curves, _curves_for(aim, seen, most)
+        if pilot.interrupted or max(used / curves, curves / used) <= PILOT_RANGE or curves in seen:
+            break
+    return done, curves, pilot
+
+
+def _curves_for(aim: float, seen: dict[int, float], most: int) -> int:
+    """Shapes that a pilot needs for ``aim`` dB, by the PSNR of the ``seen`` numbers of shapes."""
+    nearest, *others = sorted(seen, key=lambda count: abs(seen[count] - aim))
+    slope = DB_PER_DOUBLING
+    if others:
+        slope = (seen[nearest] - seen[others[0]]) / math.log2(nearest / others[0])
+    missing = aim - seen[nearest]
+    # Pilots gain less by more shapes than whole runs do; rather too many shapes than too few.
+    doublings = missing / max(slope, (0.75 if missing > 0 else 1.0) * DB_PER_DOUBLING)
+    step = math.log2(PILOT_STEP)
+    return max(1, min(most, round(nearest * 2 ** min(max(doublings, -step), step))))
+
+
+def _fits(made: Made, settings: Settings) -> bool:
+    return not settings.max_bytes or made.size <= settings.max_bytes
+
+
+def _reaches(made: Made, settings: Settings) -> bool:
+    return settings.target_psnr is not None and made.psnr >= settings.target_psnr
+
+
+def _rank(made: Made, settings: Settings) -> tuple[bool, bool, float]:
+    """Less is better: what fits comes first, of that what reaches the target, of that the smallest; of what
+    does not fit the smallest, of what does not reach it the best.
+    """
+    if not _fits(made, settings):
+        return True, True, made.size
+    reaches = _reaches(made, settings)
+    return False, not reaches, made.size if reaches else -made.psnr
+
+
+def _next(tried: list[Made], settings: Settings) -> Change | None:
+    """What to do next; None where what there is will do."""
+    best = min(tried, key=lambda made: _rank(made, settings))
+    limit = settings.max_bytes or math.inf
+    if _reaches(best, settings) and _fits(best, settings):
+        assert settings.target_psnr
+        surplus = best.psnr - settings.target_psnr
+        slope, least = CUT_DB, CUT_MOST * best.size
+        failed = [made for made in tried[tried.index(best) + 1 :] if made.size < best.size]
+        if failed:
+            nearest = max(failed, key=lambda made: made.size)
+            slope = (best.psnr - nearest.psnr) / math.log2(best.size / nearest.size)
+            least = (2 * nearest.size + best.size) / 3
+        if surplus <= ENOUGH_DB or best.size - least < NEAR * best.size:
+            return None
+        wanted = best.size * 2 ** ((AIM_DB - surplus) / slope)
+        return Change(best, max(wanted, least), best.fit.per_pixel)
+    if best.size > FULL * limit and _fits(best, settings):
+        return None
+    large = [made for made in tried if not _fits(made, settings)]
+    if large:
+        base = min(large, key=lambda made: made.size)
+        return Change(base, max(AIM_FULL * limit, CUT_MOST * base.size), base.fit.per_pixel)
+    base = max(tried, key=lambda made: made.size)
+    per_pixel = base.fit.per_pixel
+    if len(base.fit.scene) >= settings.curves:
+        finer = [grid for grid in (*GRIDS, finest(settings)) if 2 * per_pixel <= grid <= finest(settings)]
+        return Change(base, base.size, min(finer)) if finer else None
+    wanted = GROW_MOST * base.size
+    if settings.target_psnr:
+        lack = max(settings.target_psnr - base.psnr, LEAST_LACK)
+        wanted = min(wanted, base.size * 2 ** (lack / DB_PER_DOUBLING))
+    wanted = min(wanted, AIM_FULL * limit)
+    return Change(base, wanted, per_pixel if wanted <= SAME_GRID * base.size else None)
