@@ -23,7 +23,7 @@ from warpsplat.scene import Basis, Kind
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
-    hex_color,
+    hex_colors,
     integers,
     number,
     path_data,
@@ -52,12 +52,13 @@ def test_numbers(value: float, decimals: int, text: str) -> None:
 
 def test_numbers_in_a_row() -> None:
     """A sign separates itself."""
-    assert integers(np.array([[1, -2], [-13, 0], [7, 8]])) == "1-2-13 0 7 8"
+    assert integers([(1, -2), (-13, 0), (7, 8)]) == "1-2-13 0 7 8"
 
 
 def test_colors() -> None:
-    assert hex_color(np.array([1, 1, 1], np.float32)) == "#fff"
-    assert hex_color(np.array([0, 0.5, 1.2], np.float32)) == "#0080ff"
+    colors = np.array([[1, 1, 1], [0, 0.5, 1.2], [0.2, 0.4, -1], [0.2, 0.4, 0.01]], np.float32)
+    assert hex_colors(colors) == ["#fff", "#0080ff", "#360", "#336603"]
+    assert hex_colors(colors[:0]) == []
 
 
 def steps_of(data: str, command: str) -> np.ndarray:
