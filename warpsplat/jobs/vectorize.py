@@ -195,7 +195,7 @@ TAIL_PER_PIXEL = 3e-7
 HEAD_BYTES = 400
 """Of a file, besides its shapes."""
 
-STYLE_BYTES = {Kind.FILL: 45, Kind.STROKE: 65}
+STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
 """Of a shape, besides its coordinates."""
 
 STEP = {Kind.FILL: 1.0, Kind.STROKE: 1 / 3}
