@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -126,6 +127,18 @@ def points_by_shape(scene: Scene) -> FloatArray:
     """Of a scene of alike shapes: (shape, point, 2), a copy."""
     (group,) = scene.alike()
     return group.points.copy()
+
+
+def started_alike(scene: Scene, like: Scene) -> Scene:
+    """``scene`` with its rings of splines rolled to start where those of ``like`` do: what a file says of a
+    ring is not where it starts.
+    """
+    points = scene.points.copy()
+    for i in np.flatnonzero((scene.basis == SPLINE) & (scene.kind == Kind.FILL)):
+        ring, other = scene.points_of(i), like.points_of(i)
+        rolled = [np.roll(ring, shift, axis=0) for shift in range(len(ring))]
+        points[scene.first[i] : scene.first[i + 1]] = min(rolled, key=lambda r: np.abs(r - other).sum())
+    return replace(scene, points=points)
 
 
 def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> Scene:

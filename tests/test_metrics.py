@@ -18,7 +18,7 @@ from warpsplat.metrics import EYES_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimu
 from warpsplat.scene import Kind
 from warpsplat.svg import strips
 from warpsplat.svg.inspect import inspect_svg
-from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import write_svg
 
 
@@ -149,6 +149,28 @@ def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) 
     # Another program's units need not be pixels: its files are drawn in one piece.
     foreign = text.replace("<metadata>warpsplat", "<metadata>another")
     np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
+
+
+@pytest.mark.parametrize("per_pixel", [0.5, 1.0, 5.0, 32.0])
+def test_strips_of_any_view_box(per_pixel: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strips begin where they should, whatever the units of the file: a tenth of a row would show."""
+    scene = random_scene(Kind.FILL, count=40, width=91, height=157)
+    text = write_svg(scene, per_pixel=per_pixel)
+    whole = strips.draw(text, 91, 157).astype(int)
+    drawn: list[str] = []
+
+    def counted(text: str) -> Image.Image:
+        drawn.append(text)
+        return render_own(text)
+
+    monkeypatch.setattr(strips, "STRIP_PIXELS", 91 * 20)
+    monkeypatch.setattr(strips, "WHOLE_PIXELS", 91 * 157 - 1)
+    monkeypatch.setattr(strips, "render_own", counted)
+    in_strips = strips.draw(text, 91, 157, own=True).astype(int)
+    assert len(drawn) == 8
+    row = np.abs(np.roll(whole, 1, axis=0) - whole).mean()
+    assert np.abs(in_strips - whole).mean() < 0.025 * row
+    assert np.abs(in_strips - whole).max() <= 32
 
 
 def test_transparent_files_are_scored_on_white() -> None:

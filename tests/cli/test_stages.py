@@ -22,6 +22,8 @@ pytestmark = pytest.mark.slow
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 GENTLE = [signal.SIGINT, signal.SIGTERM]
+TRAINING = {"vectorize": 60, "batch": 170}
+"""Launches of kernels until the middle of the training, of a batch that of its second image."""
 BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {QUICK[-1]}}}\njobs: [{{images: '*.png'}}]\n"
 
 
@@ -85,8 +87,8 @@ def test_a_signal_at_a_stage(
     runner: Runner, tmp_path: Path, command: str, moment: str, number: signal.Signals
 ) -> None:
     arguments = lay_out(tmp_path, command)
-    # Into the middle of the training; into the second half of a batch's images.
-    count = {"training": 300, "loading": 1}.get(moment, 2 if command == "batch" else 1)
+    # Of a batch, into its second image.
+    count = {"training": TRAINING[command], "loading": 1}.get(moment, 2 if command == "batch" else 1)
     code, _, said = runner.run(arguments, tmp_path, moment=moment, count=count, signal=number)
     assert code == CODES[number], said
     assert "Traceback" not in said
@@ -120,7 +122,7 @@ def test_an_old_result_is_kept_or_replaced(
 def test_an_ignored_ctrl_c_stays_ignored(runner: Runner, tmp_path: Path, command: str) -> None:
     """Under ``nohup``, or in the background of a script."""
     arguments = lay_out(tmp_path, command)
-    trip: dict[str, Any] = {"moment": "training", "count": 300, "signal": signal.SIGINT}
+    trip: dict[str, Any] = {"moment": "training", "count": TRAINING[command], "signal": signal.SIGINT}
     code, _, said = runner.run(arguments, tmp_path, ignored=True, **trip)
     assert code == 0, said
     assert results(tmp_path) == runner.whole[command]

@@ -7,8 +7,9 @@ import pytest
 
 from tests.fit.pictures import picture
 from warpsplat.fit.export import export
-from warpsplat.fit.goals import AIM_FULL, Change, Made, _curves_for, _next
+from warpsplat.fit.goals import AIM_FULL, _curves_for, _next
 from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.pursuit import Change, Made
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Scene

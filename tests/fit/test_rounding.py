@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
-from tests.scenes import mixed_scene
+from tests.scenes import mixed_scene, random_scene, started_alike
 from warpsplat.fit import rounding
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
-from warpsplat.fit.rounding import STAGES, choose_grid, hold_stage, stage_at
+from warpsplat.fit.rate import DB_PER_DOUBLING, byte_worth
+from warpsplat.fit.rounding import STAGES, choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -39,14 +41,14 @@ def test_stages_come_once_each_in_order_before_the_end(iterations: int) -> None:
     settings = make_settings(iterations=iterations)
     found = {step: stage_at(settings, step) for step in range(iterations)}
     due = {step: stage for step, stage in found.items() if stage is not None}
-    assert list(due.values()) == list(range(STAGES))
+    assert list(due.values()) == list(range(1, STAGES + 1))
     gaps = np.diff([*due, iterations])
     assert (gaps == gaps[0]).all(), "as many steps after each"
 
 
-@pytest.mark.parametrize("stage", range(STAGES))
+@pytest.mark.parametrize("stage", range(1, STAGES + 1))
 def test_a_stage_rounds_and_holds_its_share(device: str, stage: int) -> None:
-    """Stage 0: opacities. Then the points 0, 3, 6 ... of each shape, those after them, those before."""
+    """The points 0, 3, 6 ... of each shape, then those after them, then those before; all widths at once."""
     step = step_for(mixed_scene(64, 48), device, make_settings(iterations=100))
     state = step.state
     state.per_pixel = 2.0
@@ -58,23 +60,104 @@ def test_a_stage_rounds_and_holds_its_share(device: str, stage: int) -> None:
     held = number % 3 < stage
     np.testing.assert_array_equal(after.points[held], low.points[held])
     np.testing.assert_array_equal(after.points[~held], before.points[~held])
-    if stage == 0:
-        opaque = after.opacities == np.float32(OPACITY_RANGE[1])
-        assert (before.opacities[opaque] >= rounding.NEARLY_OPAQUE).all()
-        np.testing.assert_array_equal(after.opacities[~opaque], low.opacities[~opaque])
-    else:
-        np.testing.assert_array_equal(after.opacities, before.opacities)
+    np.testing.assert_array_equal(after.widths, low.widths)
+    assert (after.widths != before.widths).any()
+    for name in ("opacities", "colors"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
     for _ in range(3):
         step.advance()
     moved = state.scene()
     np.testing.assert_array_equal(moved.points[held], after.points[held])
     assert held.all() or (moved.points[~held] != after.points[~held]).any(axis=1).mean() > 0.8
-    assert (moved.opacities == after.opacities).all() == (stage == 0)
+    np.testing.assert_array_equal(moved.widths, after.widths)
+    assert (moved.opacities != after.opacities).any()
     assert (moved.colors != after.colors).any()
 
 
+OPAQUE = np.float32(OPACITY_RANGE[1])
+
+
+def opacity_step(device: str) -> Step:
+    """Shapes of which the image has all but one, and that one it does not show."""
+    scene = mixed_scene(64, 48)
+    hidden = random_scene(Kind.FILL, 1, 64, 48, seed=9)
+    hidden = replace(hidden, points=hidden.points - np.float32(1000))
+    image = render(scene, backend=Backend.on(device))
+    noise = np.random.default_rng(0).normal(0, 0.02, image.shape)
+    image = (image + noise).astype(np.float32)
+    return step_for(scene.append(hidden), device, make_settings(iterations=100), image)
+
+
+def test_opacities_are_held_at_tenths_or_opaque(device: str) -> None:
+    step = opacity_step(device)
+    state = step.state
+    before = state.scene()
+    hold_opacities(step)
+    after = state.scene()
+    opaque = after.opacities == OPAQUE
+    assert opaque[-1], "nobody sees it: it is worth no byte"
+    assert not opaque.all(), "others are"
+    wanted = np.clip(np.round(before.opacities[~opaque].astype(np.float64), 1), 0.1, OPACITY_RANGE[1])
+    np.testing.assert_array_equal(after.opacities[~opaque], wanted.astype(np.float32))
+    for name in ("points", "colors", "widths"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
+    for _ in range(3):
+        step.advance()
+    moved = state.scene()
+    np.testing.assert_array_equal(moved.opacities, after.opacities)
+    assert (moved.colors != after.colors).any()
+    assert (moved.points != after.points).any()
+
+
+@pytest.mark.parametrize(("worth", "all_opaque"), [(0.0, False), (1e6, True)])
+def test_the_worth_of_a_byte_decides_what_is_opaque(
+    device: str, worth: float, all_opaque: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = opacity_step(device)
+    before = step.state.scene().opacities
+    monkeypatch.setattr(rounding, "byte_worth", lambda square_error, size: worth)
+    hold_opacities(step)
+    opaque = step.state.scene().opacities == OPAQUE
+    assert (opaque == (all_opaque | (before > 0.95))).all()
+
+
+@pytest.mark.parametrize("opacity", [0.02, 0.051, 0.149, 0.5])
+def test_no_opacity_is_rounded_away(device: str, opacity: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rounding, "byte_worth", lambda square_error, size: 0.0)
+    step = opacity_step(device)
+    scene = step.state.scene()
+    step.state.parameters.assign(replace(scene, opacities=np.full(len(scene), opacity, np.float32)))
+    hold_opacities(step)
+    np.testing.assert_array_equal(step.state.scene().opacities, np.float32(max(0.1, round(opacity, 1))))
+
+
+@pytest.mark.parametrize("iterations", [7, 60, 1000, 2000])
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_opacities_are_held_once_shapes_stay_and_before_all_else(
+    iterations: int, quality: Literal["draft", "balanced"]
+) -> None:
+    settings = make_settings(quality, iterations=iterations)
+    at = opacities_at(settings)
+    first = min(step for step in range(iterations) if stage_at(settings, step) is not None)
+    assert 0 < at <= first
+    if iterations >= 60:
+        assert at > settings.density.stop * iterations
+        assert at > settings.coarse * iterations
+
+
+def test_a_byte_is_worth_what_more_shapes_gain() -> None:
+    """From ``size`` bytes to twice as many the error falls by so many decibels; scales with both."""
+    size, error, done = 1000, 1.0, 0
+    value = error
+    for done in range(size, 2 * size):
+        value -= byte_worth(value, done)
+    assert 10 * np.log10(error / value) == pytest.approx(DB_PER_DOUBLING, rel=2e-3)
+    assert byte_worth(3.0, 500) == pytest.approx(3 * byte_worth(1.0, 500))
+    assert byte_worth(1.0, 500) == pytest.approx(2 * byte_worth(1.0, 1000))
+
+
 @pytest.mark.parametrize("staged", [True, False])
-@pytest.mark.parametrize("loss", [0.003, 0.01, 0.1])
+@pytest.mark.parametrize("loss", [0.003, 0.01, 0.03])
 def test_the_coarsest_grid_within_the_loss(
     device: str, staged: bool, loss: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,13 +202,15 @@ def test_a_run_ends_with_what_the_file_holds(device: str, kind: Kind, basis: Bas
     made = fit(picture(), settings, Backend.on(device))
     held = rounded(made.scene, made.per_pixel)
     np.testing.assert_array_equal(made.scene.points, held.points)
-    opaque = made.scene.opacities == np.float32(OPACITY_RANGE[1])
+    np.testing.assert_array_equal(made.scene.widths, held.widths)
+    opaque = made.scene.opacities == OPAQUE
     np.testing.assert_array_equal(made.scene.opacities[~opaque], held.opacities[~opaque])
+    assert set(held.opacities[~opaque].tolist()) <= {float(np.float32(n / 10)) for n in range(1, 10)}
     assert (held.opacities[opaque] == 1).all()
     back, _ = load_scene(export(made.scene, settings, made.per_pixel), 64, 48, "a.svg")
     np.testing.assert_array_equal(back.basis, made.scene.basis)
     if (back.first == held.first).all():
-        np.testing.assert_allclose(back.points, held.points, rtol=3e-7, atol=1e-6)
+        np.testing.assert_allclose(started_alike(back, held).points, held.points, rtol=3e-7, atol=1e-6)
     else:  # cubics without extent are left out
         assert basis == Basis.CUBIC
 

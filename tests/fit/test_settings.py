@@ -5,14 +5,34 @@ from dataclasses import replace
 import pytest
 
 from warpsplat.errors import UsageError
-from warpsplat.fit.settings import PRESETS, Settings, make_settings, parse_bytes, parse_duration
+from warpsplat.fit.settings import (
+    FILL_POINT_RATE,
+    PRESETS,
+    Settings,
+    make_settings,
+    parse_bytes,
+    parse_duration,
+)
 from warpsplat.scene import Kind
 
 
 def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
     for name, changes in PRESETS.items():
         settings = make_settings(name)
-        assert settings == replace(Settings(), simplify=True, **changes)
+        rates = {**Settings().rates, "points": FILL_POINT_RATE}
+        assert settings == replace(Settings(), simplify=True, rates=rates, **changes)
+
+
+def test_splined_fills_take_larger_steps() -> None:
+    """Strokes and splats do not; nor does anything else differ; rates that are given stay."""
+    plain = Settings().rates
+    assert (
+        make_settings().rates == make_settings(kind=Kind.FILL).rates == {**plain, "points": FILL_POINT_RATE}
+    )
+    assert plain["points"] < FILL_POINT_RATE
+    assert make_settings(kind=Kind.STROKE).rates == plain
+    assert make_settings(renderer="splat").rates == plain
+    assert make_settings(rates={**plain, "points": 1.0}).rates["points"] == 1
 
 
 def test_splats_get_fewer_iterations_unless_told() -> None:

@@ -26,18 +26,20 @@ FINE = 16
 
 
 def removed(ring: FloatArray, k: int, moved: FloatArray) -> FloatArray:
-    """``ring`` without point ``k``, whose neighbours go to ``moved``."""
+    """A ring or chain without point ``k``, whose neighbours go to ``moved``."""
     points = ring.copy()
     points[[k - 1, (k + 1) % len(ring)]] = moved
     return np.delete(points, k, axis=0)
 
 
-def between(a: FloatArray, b: FloatArray) -> float:
-    """Area that lies in one of two splined rings and not in the other, by counting."""
+def between(a: FloatArray, b: FloatArray, kind: Kind = Kind.FILL) -> float:
+    """Area between two splined outlines, by counting; chains that start, and end, at the same points."""
     masks = []
-    for ring in (a, b):
+    for points in (a, b):
         mask = np.zeros((64 * FINE, 64 * FINE), np.uint8)
-        outline = flatten(ring[None], Kind.FILL, Basis.SPLINE, pieces=64)[0]
+        outline = flatten(points[None], kind, Basis.SPLINE, pieces=64)[0]
+        if kind == Kind.STROKE:  # closed below the canvas
+            outline = np.concatenate([outline, [[outline[-1, 0], 80], [outline[0, 0], 80]]])
         cv2.fillPoly(mask, [np.round(outline * FINE).astype(np.int32)], 1)
         masks.append(mask)
     return float((masks[0] != masks[1]).sum()) / FINE**2
@@ -57,7 +59,7 @@ def ring_of(kind: str) -> FloatArray:
 @pytest.mark.parametrize("kind", ["circle", "bean", "wobble"])
 def test_area_between_the_outlines(kind: str) -> None:
     ring = ring_of(kind)
-    moved, area = without(ring[None])
+    moved, area = without(ring[None], Kind.FILL)
     counted = [between(ring, removed(ring, k, moved[0, k])) for k in range(len(ring))]
     np.testing.assert_allclose(area[0], counted, rtol=0.12)
 
@@ -66,7 +68,7 @@ def test_area_between_the_outlines(kind: str) -> None:
 def test_neighbours_go_where_little_changes(kind: str) -> None:
     """Along the bulge that the point made, no distance leaves much less area between the outlines."""
     ring = ring_of(kind)
-    moved, _ = without(ring[None])
+    moved, _ = without(ring[None], Kind.FILL)
     found, best = 0.0, 0.0
     for k in range(len(ring)):
         stay = ring[[k - 1, (k + 1) % len(ring)]]
@@ -81,7 +83,7 @@ def test_neighbours_go_where_little_changes(kind: str) -> None:
 
 def test_a_point_of_a_circle_costs_little() -> None:
     ring = ring_of("circle")
-    moved, area = without(ring[None])
+    moved, area = without(ring[None], Kind.FILL)
     np.testing.assert_allclose(area[0], area[0, 0], rtol=1e-3)
     assert between(ring, removed(ring, 0, moved[0, 0])) < 0.01 * areas(one(ring))[0]
 
@@ -90,10 +92,47 @@ def test_a_point_of_a_straight_side_costs_nothing() -> None:
     side = np.stack([np.arange(8) * 6.0 + 8, np.full(8, 10.0)], axis=1)
     corner = np.array([[54, 30], [50, 50], [32, 56], [12, 50], [8, 30]], float)
     ring = np.concatenate([side, corner]).astype(np.float32)
-    moved, area = without(ring[None])
+    moved, area = without(ring[None], Kind.FILL)
     assert (area[0, 3:5] < 1e-3).all(), "three others on the side before and behind"
     np.testing.assert_allclose(moved[0, 3:5, :, 1], 10, atol=1e-4)
     assert area[0, 8:].min() > 1
+
+
+def chain_of(count: int) -> FloatArray:
+    """A wavy chain in 64 x 64."""
+    x = np.linspace(6, 58, count)
+    return np.stack([x, 32 + 14 * np.sin(x / 8)], axis=1).astype(np.float32)
+
+
+@pytest.mark.parametrize("count", [4, 5, 6, 11])
+def test_ends_of_a_stroke_stay(count: int) -> None:
+    """Neither removed nor moved, whichever point goes."""
+    chain = chain_of(count)
+    moved, area = without(chain[None], Kind.STROKE)
+    assert np.isinf(area[0, [0, -1]]).all()
+    assert np.isfinite(area[0, 1:-1]).all()
+    for k in range(1, count - 1):
+        left = removed(chain, k, moved[0, k])
+        np.testing.assert_array_equal(left[[0, -1]], chain[[0, -1]])
+
+
+def test_area_that_a_stroke_sweeps() -> None:
+    """Of the points whose neighbours are free to move."""
+    chain = chain_of(14)
+    moved, area = without(chain[None], Kind.STROKE)
+    for k in range(3, 11):
+        counted = between(chain, removed(chain, k, moved[0, k]), Kind.STROKE)
+        assert area[0, k] == pytest.approx(counted, rel=0.12, abs=0.2), k
+
+
+def test_a_point_of_a_straight_stroke_costs_nothing() -> None:
+    x = np.arange(9, dtype=np.float32) * 6 + 8
+    chain = np.stack([x, 0.5 * x + 10], axis=1)
+    _, area = without(chain[None], Kind.STROKE)
+    assert area[0, 1:-1].max() < 1e-3
+    bent = chain.copy()
+    bent[4, 1] += 5
+    assert without(bent[None], Kind.STROKE)[1][0, 4] > 1
 
 
 def one(ring: FloatArray) -> Scene:
@@ -115,16 +154,15 @@ def test_the_cheapest_points_go_and_all_else_stays() -> None:
             if not lost[i]:
                 np.testing.assert_array_equal(thin.points_of(i), scene.points_of(i))
             else:
-                assert (scene.kind[i], scene.basis[i]) == (Kind.FILL, Basis.SPLINE)
+                assert scene.basis[i] == Basis.SPLINE
         for name in ("kind", "basis", "colors", "opacities", "widths"):
             np.testing.assert_array_equal(getattr(thin, name), getattr(scene, name))
     (index,) = np.setdiff1d(np.arange(len(scene.points)), simplify(scene, worth, 1)[1])
     costs = []
     for i in range(len(scene)):
-        if (scene.kind[i], scene.basis[i]) == (Kind.FILL, Basis.SPLINE) and scene.point_counts()[
-            i
-        ] > LEAST_POINTS:
-            moved, area = without(scene.points_of(i)[None])
+        kind = Kind(int(scene.kind[i]))
+        if scene.basis[i] == Basis.SPLINE and scene.point_counts()[i] > LEAST_POINTS:
+            moved, area = without(scene.points_of(i)[None], kind)
             k = int(area[0].argmin())
             costs.append((area[0, k], scene.first[i] + k, removed(scene.points_of(i), k, moved[0, k]), i))
     _, cheapest, points, owner_of_it = min(costs, key=lambda c: c[0])
@@ -154,8 +192,22 @@ def test_points_removed_at_once_are_apart_and_enough_are_left(count: int) -> Non
         assert ((apart == 0) | ((apart > APART) & (apart < count - APART))).all()
 
 
+@pytest.mark.parametrize("beziers", range(1, 16))
+def test_strokes_lose_points_too(beziers: int) -> None:
+    scene = random_scene(Kind.STROKE, 5, basis=Basis.SPLINE, beziers=beziers, seed=beziers)
+    count = beziers + 2
+    thin, keep = simplify(scene, np.ones(5, np.float32), 10_000)
+    assert (thin.point_counts() >= min(count, LEAST_POINTS)).all()
+    if count > LEAST_POINTS:
+        assert (thin.point_counts() < count).all()
+    for i in range(5):
+        np.testing.assert_array_equal(thin.points_of(i)[[0, -1]], scene.points_of(i)[[0, -1]])
+        gone = np.setdiff1d(np.arange(count * i, count * (i + 1)), keep)
+        assert (np.diff(gone) > APART).all()
+
+
 def test_nothing_to_simplify() -> None:
-    for scene in (random_scene(Kind.FILL), random_scene(Kind.STROKE, basis=Basis.SPLINE)):
+    for scene in (random_scene(Kind.FILL), random_scene(Kind.STROKE, basis=Basis.SPLINE, beziers=2)):
         for some in (scene, scene.take(np.arange(0))):
             thin, keep = simplify(some, np.ones(len(some), np.float32), 10)
             np.testing.assert_array_equal(thin.points, some.points)

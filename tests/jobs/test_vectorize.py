@@ -199,8 +199,9 @@ def test_a_simple_image_gets_fewer_shapes_unless_told(device: str) -> None:
 
 def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str) -> None:
     """Splats leak: the file is worse than the render, and the estimate knows."""
-    settings = make_settings(curves=60, iterations=120, precision=0, renderer="splat")
+    settings = make_settings(curves=60, iterations=120, renderer="splat")
     result = vectorize(picture(), settings, Backend.on(device))
     assert result.score
     assert result.render_psnr > result.estimated_psnr + 0.1
-    assert abs(result.estimated_psnr - result.score.psnr) < abs(result.render_psnr - result.score.psnr)
+    wrong = abs(result.estimated_psnr - result.score.psnr)
+    assert wrong < 0.5 * abs(result.render_psnr - result.score.psnr)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import ragged_scene, random_scene
+from tests.scenes import ragged_scene, random_scene, started_alike
 from tests.svg.foreign import HEAD
 from warpsplat.metrics import psnr
 from warpsplat.scene import Basis, Kind, Scene
@@ -29,6 +29,7 @@ def check(back: Scene, scene: Scene, per_pixel: float) -> None:
     held = rounded(scene, per_pixel)
     for name in ("kind", "basis", "first"):
         np.testing.assert_array_equal(getattr(back, name), getattr(scene, name))
+    back = started_alike(back, held)
     for name in ("points", "colors", "opacities", "widths"):
         np.testing.assert_allclose(getattr(back, name), getattr(held, name), rtol=3e-7, atol=1e-6)
     np.testing.assert_allclose(back.canvas.background, scene.canvas.background, atol=0.5001 / 255)

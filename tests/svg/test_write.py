@@ -13,23 +13,27 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.scenes import disc, mixed_scene, random_scene
+from tests.scenes import disc, mixed_scene, random_scene, started_alike
 from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.models import SplatModel
 from warpsplat.render.renderer import render
 from warpsplat.scene import Basis, Kind
+from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
-    hex_color,
+    NAMESPACE,
+    hex_colors,
     integers,
     number,
     path_data,
     read_metadata,
     resized,
     rounded,
+    spline_data,
+    width_decimals,
     write_svg,
 )
 
@@ -52,12 +56,13 @@ def test_numbers(value: float, decimals: int, text: str) -> None:
 
 def test_numbers_in_a_row() -> None:
     """A sign separates itself."""
-    assert integers(np.array([[1, -2], [-13, 0], [7, 8]])) == "1-2-13 0 7 8"
+    assert integers([(1, -2), (-13, 0), (7, 8)]) == "1-2-13 0 7 8"
 
 
 def test_colors() -> None:
-    assert hex_color(np.array([1, 1, 1], np.float32)) == "#fff"
-    assert hex_color(np.array([0, 0.5, 1.2], np.float32)) == "#0080ff"
+    colors = np.array([[1, 1, 1], [0, 0.5, 1.2], [0.2, 0.4, -1], [0.2, 0.4, 0.01]], np.float32)
+    assert hex_colors(colors) == ["#fff", "#0080ff", "#360", "#336603"]
+    assert hex_colors(colors[:0]) == []
 
 
 def steps_of(data: str, command: str) -> np.ndarray:
@@ -108,6 +113,92 @@ def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -
     root = ElementTree.fromstring(text)
     assert (root.attrib["width"], root.attrib["height"]) == ("41", "37")
     assert [float(x) for x in root.attrib["viewBox"].split()] == [0, 0, 41 * per_pixel, 37 * per_pixel]
+
+
+def without_sharing(text: str) -> str:
+    """The file with each opacity at its path."""
+    root = ElementTree.fromstring(text)
+    for group in root.findall(f"{{{NAMESPACE}}}g"):
+        for index, child in reversed(list(enumerate(group))):
+            if child.tag.endswith("}g"):
+                (said,) = child.attrib
+                for path in child:
+                    path.set(said, child.attrib[said])
+                group[index : index + 1] = list(child)
+    ElementTree.register_namespace("", NAMESPACE)
+    return ElementTree.tostring(root, encoding="unicode").replace(" />", "/>") + "\n"
+
+
+@pytest.mark.parametrize("run", range(1, 8))
+@pytest.mark.parametrize("kind", list(Kind))
+def test_neighbours_of_one_opacity_share_a_group_where_it_is_shorter(kind: Kind, run: int) -> None:
+    """Runs of ``run`` shapes, a single one and opaque ones between them."""
+    levels = [0.9] * run + [0.5] + [1.0] * 3 + [0.45] * run + [0.9] * run
+    scene = random_scene(kind, len(levels), basis=Basis.SPLINE)
+    scene = replace(scene, opacities=np.float32(levels))
+    text = write_svg(scene, per_pixel=5)
+    plain = without_sharing(text)
+    assert len(text) <= len(plain)
+    assert (len(text) < len(plain)) == (run > 1)
+    name = {Kind.FILL: "fill", Kind.STROKE: "stroke"}[kind]
+    shared = [f'<g {name}-opacity="{x}">' for x in (".9", ".45", ".9")]
+    assert re.findall(r"<g \w+-opacity=[^>]*>", text) == (shared if run > 1 else [])
+    back, _ = load_scene(text, 40, 36, "a.svg")
+    apart, _ = load_scene(plain, 40, 36, "a.svg")
+    held = rounded(scene, 5)
+    for got in (back, apart):
+        np.testing.assert_array_equal(got.opacities, held.opacities)
+        np.testing.assert_allclose(got.colors, held.colors, atol=1e-6)
+        np.testing.assert_allclose(started_alike(got, held).points, held.points, atol=1e-5)
+    assert write_svg(back, per_pixel=5) == text
+    np.testing.assert_array_equal(on_white(render_svg(text)), on_white(render_svg(plain)))
+
+
+def test_groups_are_never_longer_than_none() -> None:
+    """Of any opacities, in any order, of fills and strokes by turns."""
+    rng = np.random.default_rng(0)
+    for levels in (1, 2, 3, 10, 100):
+        scene = mixed_scene(seed=levels).append(mixed_scene(seed=levels + 1))
+        scene = scene.take(np.sort(rng.integers(0, len(scene), 50)))
+        values = (rng.integers(1, levels + 1, len(scene)) / levels).astype(np.float32)
+        scene = replace(scene, opacities=values)
+        text = write_svg(scene, per_pixel=5)
+        assert len(text) <= len(without_sharing(text))
+        for kind in Kind:
+            part = scene.take(np.flatnonzero(scene.kind == kind))
+            back, _ = load_scene(write_svg(part, per_pixel=5), 40, 36, "a.svg")
+            np.testing.assert_array_equal(back.opacities, rounded(part, 5).opacities)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
+    """No longer than from any other; and the same text wherever its points start."""
+    rng = np.random.default_rng(seed)
+    ring = np.round(rng.uniform(-15, 40, (9, 2)) * 2).astype(np.int64)
+    half = [(int(x), int(y)) for x, y in ring]
+    data = spline_data(half, closed=True)
+    lengths = []
+    for start in range(len(half)):
+        turned = half[start:] + half[:start]
+        assert len(spline_data(turned, closed=True)) == len(data)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("warpsplat.svg.write._cheapest_start", lambda half: 0)
+            lengths.append(len(spline_data(turned, closed=True)))
+    assert len(data) == min(lengths)
+    assert len(set(lengths)) > 1, "it matters"
+
+
+@pytest.mark.parametrize(("per_pixel", "decimals"), [(0.125, 1), (1, 1), (3, 1), (4, 0), (100, 0)])
+def test_decimals_of_widths(per_pixel: float, decimals: int) -> None:
+    """Of the file and of what is held alike: a quarter of a pixel, or finer."""
+    assert width_decimals(per_pixel) == decimals
+    scene = random_scene(Kind.STROKE, count=20)
+    text = write_svg(scene, per_pixel=per_pixel)
+    written = re.findall(r'stroke-width="([^"]*)"', text)
+    assert any("." in width for width in written) == (decimals == 1)
+    held = rounded(scene, per_pixel).widths
+    np.testing.assert_allclose([float(width) / per_pixel for width in written], held, rtol=1e-6)
+    assert np.abs(held - scene.widths).max() <= 0.5 * max(0.25, 0.1 / per_pixel) + 1e-6
 
 
 @pytest.mark.parametrize("opacity", [0.9949, 0.995, 0.9981, 1.0])

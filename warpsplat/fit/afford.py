@@ -15,7 +15,7 @@ from warpsplat.scene import Basis, Kind
 HEAD_BYTES = 400
 """Of a file, besides its shapes."""
 
-STYLE_BYTES = {Kind.FILL: 45, Kind.STROKE: 65}
+STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
 """Of a shape, besides its coordinates."""
 
 SEPARATOR = 1.6

@@ -99,7 +99,7 @@ def fit(
     step: Step | None = None
     phase = None
     interrupted = False
-    rounding = False
+    settled = rounding = False
     while True:
         entered = phase_at(settings, plan, state.step)
         if step is None or entered is not phase:
@@ -123,14 +123,15 @@ def fit(
                 state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
                 rounding = True
             hold_stage(step, stage)
-        if done == max(opacities_at(settings), begin + 1) and settings.renderer == "exact":
+        if not settled and done >= max(opacities_at(settings), begin + 1) and settings.renderer == "exact":
             hold_opacities(step)
+            settled = True
         density = settings.density
         surgical = done < density.stop * settings.iterations
         if settings.viewer and finest and not surgical and not rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
         due = density.interval > 0 and done % density.interval == 0
-        if due and budget and phase is plan[0]:
+        if due and budget and phase is plan[0] and surgical:  # then what is due when stays as it is
             slowness = (time.monotonic() - started) / (done * budget.costs[0])
             settings = budget.fit(settings, done, slowness)
             step.configure(settings)

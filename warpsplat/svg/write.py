@@ -124,11 +124,12 @@ def spline_data(half: list[Pair], closed: bool) -> str:
 
 def _cheapest_start(half: list[Pair]) -> int:
     """The point of a ring before which to start: the start, and the control point that is written besides,
-    are shortest there. The steps are the same from everywhere.
+    are shortest there. The steps are the same from everywhere, but the second needs no separator.
     """
+    near = zip([half[-1], *half[:-1]], half, [*half[2:], *half[:2]], strict=True)
     lengths = [
-        len(f"{a + c}{b + d}{c - a}{d - b}")
-        for (a, b), (c, d) in zip([half[-1], *half[:-1]], half, strict=True)
+        len(f"{a + c} {b + d} {c - a} {d - b}") - (b + d < 0) - (d - b < 0) - (e >= c)
+        for (a, b), (c, d), (e, _) in near
     ]
     return lengths.index(min(lengths))
 

@@ -1,0 +1,131 @@
+"""An order of painting that brings equal opacities together and shows the same."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import mixed_scene, random_scene
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene.geometry import bounds
+from warpsplat.svg import order
+from warpsplat.svg.order import MARGIN, by_opacity
+from warpsplat.svg.write import write_svg
+
+WIDTH, HEIGHT = 192, 160
+
+
+def scattered(count: int, *, seed: int = 0, levels: int = 4) -> Scene:
+    """Fills and strokes by turns in a picture where some overlap and some do not, of few opacities."""
+    rng = np.random.default_rng(seed)
+    fills = random_scene(Kind.FILL, count, WIDTH, HEIGHT, seed=seed)
+    strokes = random_scene(Kind.STROKE, count // 3, WIDTH, HEIGHT, seed=seed + 1)
+    scene = fills.append(strokes)
+    scene = scene.take(rng.permutation(len(scene)))
+    opacities = rng.integers(1, levels + 1, len(scene)) / (levels + 1)
+    return replace(scene, opacities=opacities.astype(np.float32))
+
+
+def runs(scene: Scene) -> int:
+    """Groups of neighbours of one kind and opacity."""
+    return len(list(itertools.groupby(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True))))
+
+
+def overlapping(boxes: FloatArray) -> list[tuple[int, int]]:
+    """Pairs of boxes less than ``MARGIN`` apart, each said plainly."""
+    pairs = []
+    for i, j in itertools.combinations(range(len(boxes)), 2):
+        a, b = boxes[i].astype(np.float64), boxes[j].astype(np.float64)
+        gap_x = max(a[0], b[0]) - min(a[2], b[2])
+        gap_y = max(a[1], b[1]) - min(a[3], b[3])
+        if max(gap_x, gap_y) < MARGIN - 1e-4:
+            pairs.append((i, j))
+    return pairs
+
+
+def check(scene: Scene, found: IndexArray) -> None:
+    """``found`` is a permutation in which overlapping shapes keep their order."""
+    np.testing.assert_array_equal(np.sort(found), np.arange(len(scene)))
+    place = np.argsort(found)
+    for i, j in overlapping(bounds(scene)):
+        assert place[i] < place[j], (i, j)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_overlaps_keeps_its_order_and_runs_grow(seed: int) -> None:
+    scene = scattered(90, seed=seed)
+    found = by_opacity(scene)
+    check(scene, found)
+    assert len(overlapping(bounds(scene))) > len(scene), "there is something to keep"
+    assert runs(scene.take(found)) < 0.5 * runs(scene)
+    assert len(write_svg(scene.take(found))) < len(write_svg(scene))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_picture_stays(device: str, seed: int) -> None:
+    """And would not in any order."""
+    scene = scattered(60, seed=seed)
+    backend = Backend.on(device)
+    before = render(scene, backend=backend)
+    found = by_opacity(scene)
+    assert (found != np.arange(len(scene))).any()
+    np.testing.assert_allclose(render(scene.take(found), backend=backend), before, rtol=0, atol=1e-6)
+    by_key = np.lexsort((scene.opacities, scene.kind))
+    assert np.abs(render(scene.take(by_key), backend=backend) - before).max() > 0.1
+
+
+def test_shapes_of_both_bases_and_kinds(device: str) -> None:
+    scene = mixed_scene(96, 80).append(mixed_scene(96, 80, seed=1))
+    scene = replace(scene, opacities=np.where(np.arange(len(scene)) % 2, 0.5, 0.9).astype(np.float32))
+    found = by_opacity(scene)
+    check(scene, found)
+    backend = Backend.on(device)
+    shown = render(scene.take(found), backend=backend)
+    np.testing.assert_allclose(shown, render(scene, backend=backend), rtol=0, atol=1e-6)
+
+
+def test_shapes_apart_are_sorted_and_shapes_in_one_place_stay() -> None:
+    scene = scattered(12)
+    places = np.repeat(np.arange(len(scene)), scene.point_counts())
+    moved = (scene.points + 500 * places[:, None]).astype(np.float32)
+    apart = replace(scene, points=moved)
+    kinds = len(set(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True)))
+    assert runs(apart) > kinds
+    assert runs(apart.take(by_opacity(apart))) == kinds
+    centre = replace(scene, points=(scene.points * np.float32(0.01)))
+    np.testing.assert_array_equal(by_opacity(centre), np.arange(len(scene)))
+
+
+@pytest.mark.parametrize("gap", [0.5 * MARGIN, 1.5 * MARGIN])
+def test_soft_edges_of_neighbours_keep_their_order(gap: float) -> None:
+    """Shapes in one pixel overlap there, even if they do not touch; a pixel apart they do not."""
+    one = random_scene(Kind.FILL, 1)
+    box = bounds(one)[0]
+    right = replace(one, points=one.points + np.array([box[2] - box[0] + gap, 0], np.float32))
+    far = replace(one, points=one.points + np.array([300, 300], np.float32))
+    scene = replace(one.append(right).append(far), opacities=np.float32([0.5, 0.9, 0.9]))
+    assert by_opacity(scene).tolist() == ([0, 1, 2] if gap < MARGIN else [1, 2, 0])
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_hardly_any_shapes(count: int) -> None:
+    scene = random_scene(Kind.FILL, count)
+    found = by_opacity(scene)
+    assert found.dtype == np.intp
+    assert found.tolist() == list(range(count))
+
+
+@pytest.mark.parametrize("block", [1, 7, 40, 80, 1000])
+def test_many_shapes_are_ordered_in_blocks(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scattered(60)
+    whole = runs(scene.take(by_opacity(scene)))
+    monkeypatch.setattr(order, "BLOCK", block)
+    found = by_opacity(scene)
+    check(scene, found)
+    np.testing.assert_array_equal(found // block, np.arange(len(scene)) // block)
+    assert (runs(scene.take(found)) == whole) == (block >= len(scene))
