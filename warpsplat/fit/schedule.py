@@ -10,7 +10,10 @@ from warpsplat.fit.settings import Density, Settings
 SIZE_CHOICES = 12
 """How many lengths of the shorter side are tried for a reduced image."""
 
-COARSE_SLACK = 2.0
+FINE_SLACK = 2.0
+"""``Phase.slack`` of the last steps: 0.08 px, which costs no more than what a viewer rounds."""
+
+COARSE_SLACK = 3.0
 """``Phase.slack`` of the coarse phase: what it fits to corners of polylines, the fine one mends."""
 
 CHECK_INTERVAL = 10
@@ -46,7 +49,11 @@ def phases(settings: Settings, width: int, height: int) -> list[Phase]:
         return (best, other) if width <= height else (other, best)
 
     coarse, fine = fit(settings.coarse_pixels), fit(settings.fine_pixels)
-    return [Phase(*fine)] if coarse == fine else [Phase(*coarse, COARSE_SLACK), Phase(*fine)]
+    return (
+        [Phase(*fine, FINE_SLACK)]
+        if coarse == fine
+        else [Phase(*coarse, COARSE_SLACK), Phase(*fine, FINE_SLACK)]
+    )
 
 
 def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:

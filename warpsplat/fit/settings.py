@@ -34,7 +34,7 @@ class Density:
     """Shapes at the most, over those that are left in the end."""
     thin: float = 0.6
     """Fraction of the run from which on the surplus is removed, until ``stop``."""
-    mean_points: float = 10.6
+    mean_points: float = 10.4
     """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
@@ -69,7 +69,7 @@ class Settings:
     iterations: int = 1000
     coarse: float = 0.72
     """Fraction of the iterations on a reduced image."""
-    coarse_pixels: int = 100_000
+    coarse_pixels: int = 90_000
     """Size of that image [pixels]; a smaller image is not reduced."""
     fine_pixels: int = 1_600_000
     """Largest size of the image that the last iterations see [pixels]."""
