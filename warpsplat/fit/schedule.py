@@ -13,7 +13,7 @@ SIZE_CHOICES = 12
 FINE_SLACK = 2.0
 """``Phase.slack`` of the last steps: 0.08 px, which costs no more than what a viewer rounds."""
 
-COARSE_SLACK = 3.0
+COARSE_SLACK = 2.0
 """``Phase.slack`` of the coarse phase: what it fits to corners of polylines, the fine one mends."""
 
 CHECK_INTERVAL = 10

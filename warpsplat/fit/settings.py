@@ -69,7 +69,7 @@ class Settings:
     iterations: int = 1000
     coarse: float = 0.72
     """Fraction of the iterations on a reduced image."""
-    coarse_pixels: int = 90_000
+    coarse_pixels: int = 100_000
     """Size of that image [pixels]; a smaller image is not reduced."""
     fine_pixels: int = 1_600_000
     """Largest size of the image that the last iterations see [pixels]."""
