@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from warpsplat.fit.export import export
 from warpsplat.fit.rounding import USUAL_GRID, choose_grid, finest
-from warpsplat.fit.schedule import COARSE_SLACK, mean_points_at
+from warpsplat.fit.schedule import mean_points_at
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
 from warpsplat.scene import Basis, Kind
@@ -53,7 +53,7 @@ def affordable(step: Step) -> Settings:
     if state.step <= settings.density.thin * settings.iterations:
         return settings
     scene = state.scene()
-    coarse = step.target.slack >= COARSE_SLACK
+    coarse = state.step < settings.coarse * settings.iterations
     grid = min(USUAL_GRID, finest(settings)) if coarse else choose_grid(step, staged=True, thrifty=True)
     per_shape = (len(export(scene, settings, grid)) - HEAD_BYTES) / max(len(scene), 1)
     splines = scene.basis == Basis.SPLINE
