@@ -193,7 +193,7 @@ def parse_bytes(value: str | int) -> int:
 
 
 PRESETS: dict[Quality, dict[str, Any]] = {
-    "draft": {"iterations": 200, "coarse": 0.9, "coarse_pixels": 50_000, "fine_pixels": 400_000},
+    "draft": {"iterations": 200, "coarse": 0.9, "coarse_pixels": 65_000, "fine_pixels": 400_000},
     "balanced": {},
     "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
 }
