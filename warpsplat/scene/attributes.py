@@ -17,9 +17,9 @@ class Kind(IntEnum):
     """What a path is painted with."""
 
     FILL = constants.FILL
-    """A closed ring of cubics, painted inside."""
+    """A closed ring of Béziers, painted inside."""
     STROKE = constants.STROKE
-    """A chain of cubics, painted along its course, with round caps and joins."""
+    """A chain of Béziers, painted along its course, with round caps and joins."""
 
 
 class Basis(IntEnum):
