@@ -1,4 +1,4 @@
-"""Béziers of either basis as cubics, and index arithmetic: ``@wp.func`` only, callable from plain Python for tests."""
+"""Béziers and index arithmetic: ``@wp.func`` only, callable from plain Python for tests."""
 
 from typing import Any
 
