@@ -30,6 +30,20 @@ def cubic_tangent_weights(t: wp.float32) -> wp.vec4:
 
 
 @wp.func
+def fair_weights(t: wp.float32, pieces: wp.int32) -> wp.vec4:
+    """Weights of the vertex at ``t`` of a cubic flattened to ``pieces`` chords of equal steps h of t.
+
+    A chord with both ends on the curve lies h^2/8 |B''| inside at most, h^2/12 |B''| in the mean. Vertices
+    moved out by that mean, B - h^2/12 B'', leave a polyline that is off by it at its vertices and by half of
+    it between them, on either side in turn: it encloses what the curve encloses.
+    """
+    s = 1.0 - t
+    shift = 0.5 / (float(pieces) * float(pieces))
+    curved = wp.vec4(s, 3.0 * t - 2.0, 1.0 - 3.0 * t, t)
+    return cubic_weights(t) - shift * curved
+
+
+@wp.func
 def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
     """Place of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from point 0,
     chain 1 backwards; both end in the middle of the ring.
@@ -113,12 +127,11 @@ def add_bezier_grad(
 
 @wp.func
 def point_weight(
-    kind: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, t: wp.float32
+    kind: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, w: wp.vec4
 ) -> wp.float32:
-    """Weight of control point ``j`` of Bézier ``local`` at ``t`` in [0, 1]: the adjoint of ``bezier_points``
-    and of the cubic's weights together.
+    """Weight of control point ``j`` of Bézier ``local`` where its cubic's have the weights ``w``, which sum
+    to 1: the adjoint of ``bezier_points``.
     """
-    w = cubic_weights(t)
     if basis == CUBIC:
         return w[j]
     before = chain_end(kind != FILL and local == 0) * (w[0] + w[1] / 3.0)

@@ -1,14 +1,16 @@
 """Shapes -> polylines, and the adjoint.
 
-Béziers are drawn as cubics, whatever the basis. A cubic split into n equal steps of t leaves its curve by at
-most max |B''| / (8 n^2), and |B''| is at most 6 times the larger second difference of its control points
-(Sederberg, Computer Aided Geometric Design, 10.6). The n is taken as a constant by the adjoint.
+Béziers are drawn as cubics, whatever the basis. A cubic is split into n equal steps of t; its vertices lie
+beside it so that the polyline is on either side of the curve in turn (``bezier.fair_weights``) and leaves it
+by at most max |B''| / (12 n^2), where |B''| is at most 6 times the larger second difference of its control
+points (Sederberg, Computer Aided Geometric Design, 10.6). Where two Béziers meet, the vertex is half-way
+between what either asks for; a chain's ends lie on the curve. The n is taken as a constant by the adjoint.
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import bezier_points, cubic_weights, point_weight
+from warpsplat.kernels.bezier import bezier_points, control_points, cubic_weights, fair_weights, point_weight
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -53,7 +55,7 @@ def plan_outline(
     for bezier in range(bezier_first[shape], bezier_first[shape + 1]):
         p = bezier_points(points, kind[shape], basis[shape], first, count, bezier - bezier_first[shape])
         worst = wp.max(wp.length(p[0] - 2.0 * p[1] + p[2]), wp.length(p[1] - 2.0 * p[2] + p[3]))
-        wanted = wp.ceil(wp.sqrt(0.75 * scale * worst / flatness))
+        wanted = wp.ceil(wp.sqrt(0.5 * scale * worst / flatness))
         pieces = wp.clamp(int(wp.min(wanted, 1.0e6)), least, PIECES_MAX)
         bezier_vertex[bezier] = vertices
         bezier_pieces[bezier] = pieces
@@ -69,6 +71,12 @@ def within_reach(x: wp.float32) -> wp.float32:
     if not wp.isfinite(x):
         return 0.0
     return wp.clamp(x, -REACH_MAX, REACH_MAX)
+
+
+@wp.func
+def weighted(p: control_points, w: wp.vec4) -> wp.vec2:
+    """Sum of a cubic's control points by weight."""
+    return w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3]
 
 
 @wp.kernel
@@ -92,14 +100,15 @@ def outline_forward(
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     extent: wp.array[wp.vec2],  # [vertex_capacity] px; how far the shape may reach beyond the vertex
 ):
-    """B(k / n), one thread a Bézier."""
+    """One thread a Bézier: the vertices at k / n of it, its end being the next one's, but for the last's."""
     bezier = offset + wp.tid()
     shape = bezier_shape[bezier]
     if vertex_last[shape] == vertex_first[shape]:
         return
     first = point_first[shape]
+    point_count = point_first[shape + 1] - first
     local = bezier - bezier_first[shape]
-    p = scale * bezier_points(points, kind[shape], basis[shape], first, point_first[shape + 1] - first, local)
+    p = scale * bezier_points(points, kind[shape], basis[shape], first, point_count, local)
     base = vertex_first[shape] + bezier_vertex[bezier]
     pieces = bezier_pieces[bezier]
     count = pieces
@@ -109,9 +118,19 @@ def outline_forward(
         if bezier + 1 == bezier_first[shape + 1]:
             count += 1
     for k in range(count):
-        weights = cubic_weights(float(k) / float(pieces))
+        t = float(k) / float(pieces)
+        position = weighted(p, fair_weights(t, pieces))
+        if kind[shape] != FILL and (k == pieces or (k == 0 and local == 0)):
+            position = weighted(p, cubic_weights(t))
+        elif k == 0:
+            before = bezier - 1
+            if local == 0:
+                before = bezier_first[shape + 1] - 1
+            q = scale * bezier_points(
+                points, kind[shape], basis[shape], first, point_count, before - bezier_first[shape]
+            )
+            position = 0.5 * (position + weighted(q, fair_weights(1.0, bezier_pieces[before])))
         vertex_shape[base + k] = shape
-        position = weights[0] * p[0] + weights[1] * p[1] + weights[2] * p[2] + weights[3] * p[3]
         vertex[base + k] = wp.vec2(within_reach(position[0]), within_reach(position[1]))
         extent[base + k] = wp.vec2(reach, reach)
 
@@ -166,13 +185,34 @@ def outline_backward(
                 bezier = bezier_first[shape] + local
                 base = vertex_first[shape] + bezier_vertex[bezier]
                 pieces = bezier_pieces[bezier]
-                # An edge belongs to the Bézier in which it lies; its two ends are weighed there.
-                before = point_weight(kind[shape], basis[shape], count, local, j, 0.0)
-                for k in range(pieces):
-                    t = float(k + 1) / float(pieces)
-                    after = point_weight(kind[shape], basis[shape], count, local, j, t)
-                    total += before * start_grad[base + k] + after * end_grad[base + k]
-                    before = after
+                last = base + pieces
+                if ring and last == vertex_last[shape]:
+                    last = vertex_first[shape]
+                if ring or local > 0:
+                    previous = base - 1
+                    if local == 0:
+                        previous = vertex_last[shape] - 1
+                    w = fair_weights(0.0, pieces)
+                    total += (0.5 * point_weight(kind[shape], basis[shape], count, local, j, w)) * (
+                        start_grad[base] + end_grad[previous]
+                    )
+                else:
+                    w = cubic_weights(0.0)
+                    total += point_weight(kind[shape], basis[shape], count, local, j, w) * start_grad[base]
+                for k in range(1, pieces):
+                    w = fair_weights(float(k) / float(pieces), pieces)
+                    total += point_weight(kind[shape], basis[shape], count, local, j, w) * (
+                        start_grad[base + k] + end_grad[base + k - 1]
+                    )
+                end = end_grad[base + pieces - 1]
+                if ring or local + 1 < beziers:
+                    w = fair_weights(1.0, pieces)
+                    total += (0.5 * point_weight(kind[shape], basis[shape], count, local, j, w)) * (
+                        start_grad[last] + end
+                    )
+                else:
+                    w = cubic_weights(1.0)
+                    total += point_weight(kind[shape], basis[shape], count, local, j, w) * end
             latest -= 1
             j += step
     points_grad[point] = scale * total

@@ -19,11 +19,14 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 
 FILL = wp.constant(constants.FILL)
 TILE = wp.constant(constants.TILE)
+TILE_LAST = wp.constant(constants.TILE - 1)
+TILE_BITS = wp.constant(constants.TILE.bit_length() - 1)  # of a pixel within its tile
 FULL = wp.constant(constants.FULL)
 PARTIAL = wp.constant(constants.PARTIAL)
 UNCOVERED = wp.constant(constants.UNCOVERED)
 FLAT = wp.constant(1.0e-30)  # [px] an edge that rises less is horizontal: its slope would not be finite
 MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
+NEVER = wp.constant(4.0)  # beyond the parameters of an edge, which are 0 to 1
 MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as touching it
 
 
@@ -150,20 +153,22 @@ def add_piece(
 
     ``x0``, ``x1``: its ends, right of the left border of ``slot``; ``width``: of the row of tiles [px].
     """
-    low = wp.clamp(wp.min(x0, x1), 0.0, float(width))
-    high = wp.min(wp.max(x0, x1), float(width))
+    least = wp.min(x0, x1)
+    low = wp.clamp(least, 0.0, float(width))
+    most = wp.max(x0, x1)
+    high = wp.min(most, float(width))
     index = int(low)
-    if low >= high:
-        # Vertical, or wholly left or right of the shape's tiles.
+    if low >= high or (least >= 0.0 and most <= float(index + 1)):
+        # In one pixel, or wholly left or right of the shape's tiles.
         if index < width:
-            fraction = low - float(index)
+            fraction = 0.5 * (low + wp.max(low, high)) - float(index)
             add_area(pixels, slot, index, row, height * (1.0 - fraction))
             if index + 1 < width:
                 add_area(pixels, slot, index + 1, row, height * fraction)
         return
     per_x = height / wp.abs(x1 - x0)
     # What lies left of the shape's tiles acts at their left border.
-    outside = wp.max(-wp.min(x0, x1), 0.0) * per_x
+    outside = wp.max(-least, 0.0) * per_x
     if outside != 0.0:
         add_area(pixels, slot, 0, row, outside)
     at = low
@@ -318,50 +323,35 @@ def fill_forward(
 
 
 @wp.func
-def inside_canvas(a: wp.vec2, d: wp.vec2, width: wp.int32, height: wp.int32) -> wp.vec2:
-    """Parameters between which the edge from ``a`` along ``d`` is inside the canvas; first > second: none."""
+def inside_box(a: wp.vec2, d: wp.vec2, box: wp.vec4) -> wp.vec2:
+    """Parameters between which the edge from ``a`` along ``d`` is inside a box (left, top, right, bottom);
+    first > second: none.
+    """
     s = float(0.0)
     s_end = float(1.0)
     for axis in range(2):
-        size = float(width)
-        if axis == 1:
-            size = float(height)
         if d[axis] != 0.0:
-            s0 = (0.0 - a[axis]) / d[axis]
-            s1 = (size - a[axis]) / d[axis]
+            s0 = (box[axis] - a[axis]) / d[axis]
+            s1 = (box[axis + 2] - a[axis]) / d[axis]
             s = wp.max(s, wp.min(s0, s1))
             s_end = wp.min(s_end, wp.max(s0, s1))
-        elif a[axis] < 0.0 or a[axis] >= size:
+        elif a[axis] < box[axis] or a[axis] >= box[axis + 2]:
             s_end = -1.0
     return wp.vec2(s, s_end)
 
 
 @wp.func
-def direction_of(d: wp.float32) -> wp.int32:
-    """1, -1 or 0: how the pixel's index changes along ``d``."""
+def leaves_at(border: wp.int32, a: wp.float32, d: wp.float32, inverse: wp.float32) -> wp.float32:
+    """Parameter at which an edge from ``a`` along ``d`` reaches a border; beyond all where it never does."""
     if d == 0.0:
-        return 0
-    if d < 0.0:
-        return -1
-    return 1
-
-
-@wp.func
-def leaves_at(
-    pixel: wp.int32, step: wp.int32, a: wp.float32, inverse: wp.float32, s_end: wp.float32
-) -> wp.float32:
-    """Parameter at which an edge from ``a`` leaves ``pixel`` along an axis; ``s_end`` where it does not."""
-    if step == 0:
-        return s_end
-    return (float(pixel + (step + 1) / 2) - a) * inverse
+        return NEVER
+    return (float(border) - a) * inverse
 
 
 @wp.kernel
 def fill_backward(
     # In:
     offset: wp.int32,
-    width: wp.int32,  # px
-    height: wp.int32,  # px
     kind: wp.array[wp.int32],  # [shape_count]
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
@@ -386,43 +376,47 @@ def fill_backward(
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
-    a = vertex[i]
-    d = vertex[next_vertex(i, vertex_first[shape], vertex_last[shape])] - a
+    d = vertex[next_vertex(i, vertex_first[shape], vertex_last[shape])] - vertex[i]
     if slot_last[shape] > slot_first[shape] and wp.abs(d[0]) + wp.abs(d[1]) > 0.0:
-        x0 = shape_tiles[shape, 0]
-        y0 = shape_tiles[shape, 1]
-        x1 = shape_tiles[shape, 2]
-        y1 = shape_tiles[shape, 3]
-        span = inside_canvas(a, d, width, height)
+        # From here on, pixels are counted from the corner of the shape's tiles. Those of them that lie
+        # outside the canvas have no gradient.
+        across = shape_tiles[shape, 2] - shape_tiles[shape, 0]
+        wide = TILE * across
+        high = TILE * (shape_tiles[shape, 3] - shape_tiles[shape, 1])
+        a = vertex[i] - float(TILE) * wp.vec2(float(shape_tiles[shape, 0]), float(shape_tiles[shape, 1]))
+        span = inside_box(a, d, wp.vec4(0.0, 0.0, float(wide), float(high)))
         s = span[0]
         s_end = span[1]
-        step_x = direction_of(d[0])
-        step_y = direction_of(d[1])
+        x = wp.clamp(int(wp.floor(a[0] + s * d[0])), 0, wide - 1)
+        y = wp.clamp(int(wp.floor(a[1] + s * d[1])), 0, high - 1)
+        # The way to the next pixel, and from a pixel to its border on that side.
+        step_x = int(wp.sign(d[0]))
+        step_y = int(wp.sign(d[1]))
+        ahead_x = (step_x + 1) / 2
+        ahead_y = (step_y + 1) / 2
         inverse_x = 1.0 / d[0]
         inverse_y = 1.0 / d[1]
-        x = wp.clamp(int(wp.floor(a[0] + s * d[0])), 0, width - 1)
-        y = wp.clamp(int(wp.floor(a[1] + s * d[1])), 0, height - 1)
-        while s < s_end:
-            s_x = leaves_at(x, step_x, a[0], inverse_x, s_end)
-            s_y = leaves_at(y, step_y, a[1], inverse_y, s_end)
+        s_x = leaves_at(x + ahead_x, a[0], d[0], inverse_x)
+        s_y = leaves_at(y + ahead_y, a[1], d[1], inverse_y)
+        first = slot_first[shape]
+        area = float(0.0)
+        moment = float(0.0)
+        while s < s_end and x >= 0 and x < wide and y >= 0 and y < high:
             s_next = wp.max(wp.min(wp.min(s_x, s_y), s_end), s)
-            # Rounding may take the walk a pixel beyond the shape's tiles.
-            out = x < TILE * x0 or x >= TILE * x1 or y < TILE * y0 or y >= TILE * y1
-            slot = slot_first[shape] + (y / TILE - y0) * (x1 - x0) + x / TILE - x0
-            if not out and slot_state[slot] == PARTIAL:
-                g = sum_grad[slot, TILE * (x % TILE) + y % TILE] * (s_next - s)
-                move = wp.vec2(-d[1] * g, d[0] * g)
-                middle = 0.5 * (s + s_next)
-                at_start += (1.0 - middle) * move
-                at_end += middle * move
+            slot = first + (y >> TILE_BITS) * across + (x >> TILE_BITS)
+            if slot_state[slot] == PARTIAL:
+                g = sum_grad[slot, TILE * (x & TILE_LAST) + (y & TILE_LAST)] * (s_next - s)
+                area += g
+                moment += g * (s + s_next)
             s = s_next
-            if s_y < s_x and s_y < s_end:
-                y += step_y
-            elif s_x < s_end:
+            if s_x < s_y:
                 x += step_x
+                s_x = (float(x + ahead_x) - a[0]) * inverse_x
             else:
-                s = s_end
-            if x < 0 or x >= width or y < 0 or y >= height:
-                s = s_end
+                y += step_y
+                s_y = (float(y + ahead_y) - a[1]) * inverse_y
+        move = wp.vec2(-d[1], d[0])
+        at_start = (area - 0.5 * moment) * move
+        at_end = (0.5 * moment) * move
     start_grad[i] = at_start
     end_grad[i] = at_end
