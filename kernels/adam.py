@@ -6,6 +6,7 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+NONE = wp.constant(constants.NONE)
 BETA1 = wp.constant(0.9)
 BETA2 = wp.constant(0.99)
 EPSILON = wp.constant(1.0e-12)  # the gradients of a mean over 10^6 pixels are about 1e-7
@@ -38,6 +39,23 @@ def advance(
         clock[0] = clock[0] + 1
         progress = wp.min(float(clock[0]) / float(step_count), 1.0)
         decay[0] = final + (1.0 - final) * 0.5 * (1.0 + wp.cos(PI * progress))
+
+
+@wp.kernel
+def tie_twins(
+    # In:
+    offset: wp.int32,
+    point_twin: wp.array[wp.int32],  # [point_count] the same point of the shape behind, or NONE
+    # Out:
+    points_grad: wp.array[wp.vec2],  # [point_count] updated
+):
+    """Two rows that are one point get the gradient of both, and move as one."""
+    i = offset + wp.tid()
+    j = point_twin[i]
+    if j != NONE:
+        both = points_grad[i] + points_grad[j]
+        points_grad[i] = both
+        points_grad[j] = both
 
 
 @wp.kernel

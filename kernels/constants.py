@@ -12,6 +12,22 @@ SPLINE = 1
 uniform quadratic B-spline (each point is the control point of one quadratic Bézier, whose ends lie midway to
 the neighbouring points)."""
 
+NONZERO = 0
+EVENODD = 1
+"""Rules of what is inside of a fill."""
+
+ROUND = 0
+BUTT = 1
+SQUARE = 2
+"""Caps of strokes."""
+
+MITER = 1
+BEVEL = 2
+"""Joins of strokes, besides ROUND."""
+
+NONE = -1
+"""No such row."""
+
 TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
 

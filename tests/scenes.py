@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
+from warpsplat.scene.scene import starts_of
 
 CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
 FILL_CUBICS, STROKE_CUBICS = 4, 3
@@ -116,6 +118,34 @@ MIXED: tuple[Outline, ...] = (
 def mixed_scene(width: int = 40, height: int = 36, *, seed: int = 0, splines: bool = True) -> Scene:
     """Of fills and strokes of different lengths; without splines, such as splats can show."""
     return ragged_scene(MIXED if splines else MIXED_CUBICS, width, height, seed=seed)
+
+
+def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> Scene:
+    """Shapes of several contours each, of both bases, closed and open, that overlap their own."""
+    shapes = []
+    for i, basis in enumerate((CUBIC, SPLINE, CUBIC)):
+        parts = [
+            random_scene(like, 1, seed=seed + 10 * i + k, basis=basis, beziers=5 + k)
+            for k, like in enumerate((Kind.FILL, Kind.STROKE, Kind.FILL))
+        ]
+        points = [part.points - part.points.mean(axis=0) + [12 + 8 * i, 18] for part in parts]
+        counts = [len(own) for own in points]
+        shapes.append(
+            Scene.of(
+                canvas(40, 36),
+                np.array([kind], np.int32),
+                np.array([0, sum(counts)], np.int32),
+                np.array([basis], np.int32),
+                starts=starts_of(np.array(counts)),
+                closed=np.array([part.kind[0] == Kind.FILL for part in parts], np.int32),
+                rule=np.array([rule], np.int32),
+                points=np.concatenate(points).astype(np.float32),
+                colors=parts[0].colors,
+                opacities=parts[0].opacities,
+                widths=np.full(1, 2.5 if kind == Kind.STROKE else 0, np.float32),
+            )
+        )
+    return functools.reduce(Scene.append, shapes)
 
 
 def with_points(scene: Scene, points: FloatArray) -> FloatArray:

@@ -100,10 +100,10 @@ def record_xing(program: Program, parameters: Parameters, settings: Settings) ->
     if settings.xing > 0:
         program.launch(
             shape.xing_backward,
-            parameters.shape_count,
+            parameters.contour_count,
             parameters.arrays,
             weight=settings.xing,
-            shape_loss=parameters.backend.array(wp.float32, parameters.shape_count),
+            contour_loss=parameters.backend.array(wp.float32, parameters.contour_count),
         )
 
 
@@ -113,10 +113,10 @@ def record_bending(program: Program, parameters: Parameters, settings: Settings)
         canvas = parameters.canvas
         program.launch(
             shape.bending_backward,
-            parameters.shape_count,
+            parameters.contour_count,
             parameters.arrays,
             weight=settings.bending / (3 * canvas.width * canvas.height),
-            shape_loss=parameters.backend.array(wp.float32, parameters.shape_count),
+            contour_loss=parameters.backend.array(wp.float32, parameters.contour_count),
         )
 
 

@@ -32,6 +32,8 @@ def record_adam(
 
     ``clock``: steps so far, on the device, shape (1,).
     """
+    if parameters.has_twins:
+        program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,

@@ -26,6 +26,8 @@ class OutlineBuffers:
     vertex_first: wp.array = buffer(wp.int32, "shapes")
     vertex_last: wp.array = buffer(wp.int32, "shapes")
     vertex_shape: wp.array = buffer(wp.int32, "vertices")
+    vertex_next: wp.array = buffer(wp.int32, "vertices")
+    """Where the edge that starts at a vertex ends."""
     vertex: wp.array = buffer(wp.vec2, "vertices")
     """[px]"""
     extent: wp.array = buffer(wp.vec2, "vertices")

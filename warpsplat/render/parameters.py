@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
+from warpsplat.kernels.constants import NONE
 from warpsplat.render.backend import Backend, view
 from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene.scene import starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3}
 """What kernels read a row of so many numbers as."""
@@ -45,21 +47,31 @@ class Parameters:
         self, scene: Scene, moments: tuple[dict[str, FloatArray], dict[str, FloatArray]], ages: np.ndarray
     ) -> None:
         self._scene = scene
-        counts = scene.point_counts()
-        beziers = scene.bezier_counts()
         shapes = np.arange(len(scene))
+        owner = scene.contour_shapes()
+        contours = np.arange(len(owner))
+        in_contour, in_shape = scene.contour_beziers(), scene.bezier_counts()
         self.shape_count, self.point_count = len(scene), len(scene.points)
-        self.bezier_count = int(beziers.sum())
+        self.contour_count, self.bezier_count = len(owner), int(in_shape.sum())
         self.arrays: dict[str, wp.array] = {
             "kind": self._ints(scene.kind),
             "basis": self._ints(scene.basis),
+            "rule": self._ints(scene.rule),
             "point_first": self._ints(scene.first),
-            "point_shape": self._ints(np.repeat(shapes, counts)),
-            "bezier_first": self._ints(np.concatenate([[0], np.cumsum(beziers)])),
-            "bezier_shape": self._ints(np.repeat(shapes, beziers)),
+            "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
+            "point_contour": self._ints(np.repeat(contours, np.diff(scene.starts))),
+            "contour_shape": self._ints(owner),
+            "contour_first": self._ints(scene.starts),
+            "contour_closed": self._ints(scene.closed),
+            "contour_bezier": self._ints(starts_of(in_contour)),
+            "bezier_first": self._ints(starts_of(in_shape)),
+            "bezier_contour": self._ints(np.repeat(contours, in_contour)),
             "ages": self._ints(ages),
         }
         """What kernels bind by name: the layout of the shapes, and each attribute with its gradient."""
+        self.has_twins = bool(scene.twin.any())
+        if self.has_twins:
+            self.arrays["point_twin"] = self._ints(_twins(scene))
         owners = {"point": self.arrays["point_shape"], "shape": self._ints(shapes)}
         self.groups: dict[str, Group] = {}
         for a in ATTRIBUTES:
@@ -157,3 +169,10 @@ class Parameters:
         moments = carried("moment1"), carried("moment2")
         self._upload(before.take(keep).append(added), moments, ages)
         self.revision += 1
+
+
+def _twins(scene: Scene) -> IndexArray:
+    """For each point the same point of the shape that its shape is the twin of, or NONE."""
+    owner = np.repeat(np.arange(len(scene)), scene.point_counts())
+    behind = np.arange(len(owner)) - scene.point_counts()[owner]
+    return np.where(scene.twin[owner] == 1, behind, NONE)

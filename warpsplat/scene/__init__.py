@@ -1,17 +1,34 @@
 """What is optimised and what a file holds: shapes on a canvas. NumPy only."""
 
-from warpsplat.scene.attributes import ATTRIBUTES, OPACITY_RANGE, Attribute, Basis, Kind, Unit
+from warpsplat.scene.attributes import (
+    ATTRIBUTES,
+    NO_DASHES,
+    OPACITY_RANGE,
+    TRAITS,
+    Attribute,
+    Basis,
+    Cap,
+    Join,
+    Kind,
+    Rule,
+    Unit,
+)
 from warpsplat.scene.scene import Canvas, FloatArray, IndexArray, Scene
 
 __all__ = [
     "ATTRIBUTES",
+    "NO_DASHES",
     "OPACITY_RANGE",
+    "TRAITS",
     "Attribute",
     "Basis",
     "Canvas",
+    "Cap",
     "FloatArray",
     "IndexArray",
+    "Join",
     "Kind",
+    "Rule",
     "Scene",
     "Unit",
 ]
