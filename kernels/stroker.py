@@ -231,13 +231,14 @@ def put_dot(
     at: wp.int32,
     write: wp.int32,
     segment: wp.int32,
+    along: wp.float32,
     half: wp.float32,
     cap: wp.int32,
     corner_segments: wp.array[wp.vec2i],
     corner_place: wp.array[wp.vec4],
     corner_next: wp.array[wp.int32],
 ) -> wp.int32:
-    """Add what a contour without length shows: its caps, along the x axis."""
+    """Add what a contour or a dash without length shows: its caps, along the x axis, as viewers have it."""
     if cap == BUTT:
         return at
     pieces = int(4)
@@ -247,7 +248,7 @@ def put_dot(
         radius = 1.0
     n = at
     for k in range(pieces):
-        place = wp.vec4(0.0, 0.0, 0.5 * HALF_PI + 2.0 * PI * float(k) / float(pieces), radius)
+        place = wp.vec4(along, 0.0, 0.5 * HALF_PI + 2.0 * PI * float(k) / float(pieces), radius)
         n = put_corner(n, write, segment, NONE, place, corner_segments, corner_place)
     close_polygon(at, n, write, corner_next)
     return n
@@ -354,7 +355,7 @@ def walk_contour(
                 room = own
     if seg == NONE:
         if stretch == 0.0:
-            n = put_dot(n, write, base + bezier_vertex[bezier_start], half, cap, s, p, corner_next)
+            n = put_dot(n, write, base + bezier_vertex[bezier_start], 0.0, half, cap, s, p, corner_next)
         return n
     ring = closed != 0 and stretch == 0.0
     t = segment_direction(vertex, vertex_next, seg)
@@ -395,10 +396,13 @@ def walk_contour(
                 while more != 0:
                     ends = left <= own - gone
                     step = wp.min(left, own - gone)
-                    if index % 2 == 0 and passing == 0:
-                        from_here = float(0.0)
-                        if seg == NONE and fresh == 0:
-                            from_here = wp.clamp(gone / own, INSIDE, 1.0 - INSIDE)
+                    drawn = index % 2 == 0 and passing == 0
+                    from_here = float(0.0)
+                    if seg == NONE and fresh == 0:
+                        from_here = wp.clamp(gone / own, INSIDE, 1.0 - INSIDE)
+                    if drawn and step == 0.0 and seg == NONE:
+                        n = put_dot(n, write, i, from_here, half, cap, s, p, corner_next)
+                    elif drawn:
                         to_here = float(1.0)
                         if ends:
                             to_here = wp.clamp((gone + step) / own, INSIDE, 1.0 - INSIDE)

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
+from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Rule, Scene
+from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.scene.scene import starts_of
 
 CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
@@ -185,4 +186,27 @@ def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> 
         (np.array(points)[None] * radius + centre).astype(np.float32),
         colors=np.ones((1, 3), np.float32),
         opacities=np.ones(1, np.float32),
+    )
+
+
+DASHES = (
+    (0.0, 7.0, 5.0),
+    (-3.0, 9.0, 6.5, 2.0, 7.0),
+    (2.5, 0.0, 6.0),
+    (1.0, 300.0, 5.0),
+)
+"""Patterns that begin anywhere, of several dashes, of dots, and longer than what they are on."""
+
+
+def styled_scene(cap: Cap, join: Join, dash: int = NO_DASHES, *, seed: int = 0, limit: float = 4.0) -> Scene:
+    """Shapes of several contours, closed and open, smooth and with corners, drawn in a style."""
+    scene = contours_scene(Kind.STROKE, seed=seed)
+    count = len(scene)
+    return replace(
+        scene,
+        cap=np.full(count, cap, np.int32),
+        join=np.full(count, join, np.int32),
+        miter_limits=np.full(count, limit, np.float32),
+        dash=np.full(count, dash, np.int32),
+        dashes=DASHES,
     )
