@@ -6,8 +6,8 @@ from the segment's by ``angle`` and by ``share`` of the turn to a second segment
 radius that the two offset lines meet at.
 
 Adjoint: what moves a corner moves its point, turns one of the two segments, or changes half the width. A
-segment from a to b turns by (b - a) x (db - da) / |b - a|^2. A dash's end keeps its distance from the contour's
-start along the line, so it moves back along its segment by as much as what lies before it grows.
+segment from a to b turns by (b - a) x (db - da) / |b - a|^2. A dash's end keeps its distance from the
+contour's start along the line, so it moves back along its segment by as much as what lies before it grows.
 """
 
 import warp as wp

@@ -74,11 +74,9 @@ def arc_pieces(angle: wp.float32, half: wp.float32) -> wp.int32:
 
 
 @wp.func
-def meet(
-    turn: wp.float32, room: wp.float32, half: wp.float32, join: wp.int32, limit: wp.float32
-) -> wp.vec3i:
-    """How two pieces meet: whether they share their corner on the -90 degrees' side, on the +90 degrees' side,
-    and what fills the gap.
+def meet(turn: wp.float32, room: wp.float32, half: wp.float32, join: wp.int32, limit: wp.float32) -> wp.vec3i:
+    """How two pieces meet: whether they share their corner on the -90 degrees' side, on the +90 degrees'
+    side, and what fills the gap.
 
     ``room``: how far from the joint their inner corners may be.
     """
@@ -180,16 +178,16 @@ def put_piece(
 
     Where only one corner of an end is shared, the end has a corner on the centre line as well.
     """
-    s = corner_segments
-    p = corner_place
-    n = put_side(at, write, segment, start, -HALF_PI, shared[0], before, segment, s, p)
-    n = put_side(n, write, segment, stop, -HALF_PI, shared[2], segment, after, s, p)
+    n = put_side(
+        at, write, segment, start, -HALF_PI, shared[0], before, segment, corner_segments, corner_place
+    )
+    n = put_side(n, write, segment, stop, -HALF_PI, shared[2], segment, after, corner_segments, corner_place)
     if shared[2] != shared[3]:
-        n = put_corner(n, write, segment, segment, wp.vec4(1.0, 0.0, 0.0, 0.0), s, p)
-    n = put_side(n, write, segment, stop, HALF_PI, shared[3], segment, after, s, p)
-    n = put_side(n, write, segment, start, HALF_PI, shared[1], before, segment, s, p)
+        n = put_corner(n, write, segment, segment, wp.vec4(1.0, 0.0, 0.0, 0.0), corner_segments, corner_place)
+    n = put_side(n, write, segment, stop, HALF_PI, shared[3], segment, after, corner_segments, corner_place)
+    n = put_side(n, write, segment, start, HALF_PI, shared[1], before, segment, corner_segments, corner_place)
     if shared[0] != shared[1]:
-        n = put_corner(n, write, before, before, wp.vec4(1.0, 0.0, 0.0, 0.0), s, p)
+        n = put_corner(n, write, before, before, wp.vec4(1.0, 0.0, 0.0, 0.0), corner_segments, corner_place)
     close_polygon(at, n, write, corner_next)
     return n
 
@@ -255,7 +253,9 @@ def put_dot(
 
 
 @wp.func
-def dash_stretch(dashes: wp.array[wp.float32], first: wp.int32, last: wp.int32, scale: wp.float32) -> wp.float32:
+def dash_stretch(
+    dashes: wp.array[wp.float32], first: wp.int32, last: wp.int32, scale: wp.float32
+) -> wp.float32:
     """Pixels a unit of a pattern; 0 for one without length, which is solid.
 
     A pattern that is too short to be seen is repeated as one dash and gap in each of its places: its mean is
@@ -333,8 +333,6 @@ def walk_contour(
     ``stretch``: 0 for solid ones. A dash that goes on over the start of a closed contour is one dash, drawn
     at the end; one that is all there is of it has two ends, as viewers have it.
     """
-    s = corner_segments
-    p = corner_place
     n = int(at)
     length = float(0.0)
     # The last piece that was made and not yet added: its neighbour comes first.
@@ -355,7 +353,17 @@ def walk_contour(
                 room = own
     if seg == NONE:
         if stretch == 0.0:
-            n = put_dot(n, write, base + bezier_vertex[bezier_start], 0.0, half, cap, s, p, corner_next)
+            n = put_dot(
+                n,
+                write,
+                base + bezier_vertex[bezier_start],
+                0.0,
+                half,
+                cap,
+                corner_segments,
+                corner_place,
+                corner_next,
+            )
         return n
     ring = closed != 0 and stretch == 0.0
     t = segment_direction(vertex, vertex_next, seg)
@@ -401,7 +409,9 @@ def walk_contour(
                     if seg == NONE and fresh == 0:
                         from_here = wp.clamp(gone / own, INSIDE, 1.0 - INSIDE)
                     if drawn and step == 0.0 and seg == NONE:
-                        n = put_dot(n, write, i, from_here, half, cap, s, p, corner_next)
+                        n = put_dot(
+                            n, write, i, from_here, half, cap, corner_segments, corner_place, corner_next
+                        )
                     elif drawn:
                         to_here = float(1.0)
                         if ends:
@@ -415,16 +425,48 @@ def walk_contour(
                             if first_seg != NONE or not ring:
                                 shared = wp.vec4i(sides[0], sides[1], met[0], met[1])
                                 n = put_piece(
-                                    n, write, before, seg, i, start, stop, shared, s, p, corner_next
+                                    n,
+                                    write,
+                                    before,
+                                    seg,
+                                    i,
+                                    start,
+                                    stop,
+                                    shared,
+                                    corner_segments,
+                                    corner_place,
+                                    corner_next,
                                 )
                             if met[2] != WHOLE:
-                                n = put_wedge(n, write, seg, i, turn, half, met[2], s, p, corner_next)
+                                n = put_wedge(
+                                    n,
+                                    write,
+                                    seg,
+                                    i,
+                                    turn,
+                                    half,
+                                    met[2],
+                                    corner_segments,
+                                    corner_place,
+                                    corner_next,
+                                )
                             if style == MITER:
                                 reach = half * miter_ratio(turn)
                                 if reach <= half * limit:
                                     reach_out(write, vertex_next[seg], i, reach + 1.0, extent)
                         else:
-                            n = put_cap(n, write, i, from_here, PI, half, cap, s, p, corner_next)
+                            n = put_cap(
+                                n,
+                                write,
+                                i,
+                                from_here,
+                                PI,
+                                half,
+                                cap,
+                                corner_segments,
+                                corner_place,
+                                corner_next,
+                            )
                         if first_seg == NONE:
                             first_seg = i
                             first_room = own
@@ -438,8 +480,31 @@ def walk_contour(
                         corner = 0
                         if ends:
                             shared = wp.vec4i(sides[0], sides[1], 0, 0)
-                            n = put_piece(n, write, before, seg, NONE, start, stop, shared, s, p, corner_next)
-                            n = put_cap(n, write, seg, stop, 0.0, half, cap, s, p, corner_next)
+                            n = put_piece(
+                                n,
+                                write,
+                                before,
+                                seg,
+                                NONE,
+                                start,
+                                stop,
+                                shared,
+                                corner_segments,
+                                corner_place,
+                                corner_next,
+                            )
+                            n = put_cap(
+                                n,
+                                write,
+                                seg,
+                                stop,
+                                0.0,
+                                half,
+                                cap,
+                                corner_segments,
+                                corner_place,
+                                corner_next,
+                            )
                             seg = NONE
                     fresh = 0
                     gone += step
@@ -459,10 +524,14 @@ def walk_contour(
         turn = turn_between(t, segment_direction(vertex, vertex_next, first_seg))
         met = meet(turn, 0.5 * wp.min(room, first_room), half, join, limit)
         shared = wp.vec4i(sides[0], sides[1], met[0], met[1])
-        return put_piece(n, write, before, seg, first_seg, start, stop, shared, s, p, corner_next)
+        return put_piece(
+            n, write, before, seg, first_seg, start, stop, shared, corner_segments, corner_place, corner_next
+        )
     shared = wp.vec4i(sides[0], sides[1], 0, 0)
-    n = put_piece(n, write, before, seg, NONE, start, stop, shared, s, p, corner_next)
-    return put_cap(n, write, seg, 1.0, 0.0, half, cap, s, p, corner_next)
+    n = put_piece(
+        n, write, before, seg, NONE, start, stop, shared, corner_segments, corner_place, corner_next
+    )
+    return put_cap(n, write, seg, 1.0, 0.0, half, cap, corner_segments, corner_place, corner_next)
 
 
 @wp.kernel

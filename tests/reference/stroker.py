@@ -1,7 +1,7 @@
 """Polygons whose union is a stroke with caps, joins and dashes, in float64 with autograd.
 
-The rules by which neighbours share corners are those of ``kernels.stroker``; all else is said anew, contour by
-contour and dash by dash.
+The rules by which neighbours share corners are those of ``kernels.stroker``; all else is said anew, contour
+by contour and dash by dash.
 """
 
 from __future__ import annotations
@@ -101,11 +101,12 @@ def intervals(dashes: tuple[float, ...], length: float) -> list[tuple[float, flo
     at, found = -((offset * stretch) % (period * stretch)), []
     for k in itertools.count():
         if at > length:
-            return found
+            break
         end = at + stretch * pattern[k % len(pattern)]
         if k % 2 == 0 and (end > 0 or at == end == 0):
             found.append((max(at, 0.0), min(end, length)))
         at = end
+    return found
 
 
 def dashed(pieces: list[Piece], closed: bool, dashes: tuple[float, ...]) -> list[list[Piece]]:

@@ -96,9 +96,7 @@ class FillCoverage:
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
-        program.launch(
-            fill.fill_states, self._stages.slots, *self._sources, own_part=self.part, split=True
-        )
+        program.launch(fill.fill_states, self._stages.slots, *self._sources, own_part=self.part, split=True)
 
     def values(self, program: Program) -> None:
         """See ``Coverage``."""
