@@ -10,11 +10,12 @@ import numpy.typing as npt
 import warp as wp
 
 from warpsplat.kernels.constants import NONE
+from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
-from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
-ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3}
+ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
 
 
@@ -57,6 +58,9 @@ class Parameters:
             "kind": self._ints(scene.kind),
             "basis": self._ints(scene.basis),
             "rule": self._ints(scene.rule),
+            "paint": self._ints(scene.paint),
+            "spread": self._ints(scene.spread),
+            "stop_first": self._ints(scene.stop_first),
             "point_first": self._ints(scene.first),
             "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
             "point_contour": self._ints(np.repeat(contours, np.diff(scene.starts))),
@@ -72,7 +76,11 @@ class Parameters:
         self.has_twins = bool(scene.twin.any())
         if self.has_twins:
             self.arrays["point_twin"] = self._ints(_twins(scene))
-        owners = {"point": self.arrays["point_shape"], "shape": self._ints(shapes)}
+        owners = {
+            "point": self.arrays["point_shape"],
+            "shape": self._ints(shapes),
+            "stop": self._ints(np.repeat(shapes, np.diff(scene.stop_first))),
+        }
         self.groups: dict[str, Group] = {}
         for a in ATTRIBUTES:
             value, m1, m2 = (
@@ -96,6 +104,11 @@ class Parameters:
     def kinds(self) -> frozenset[Kind]:
         """Kinds of shapes that there are."""
         return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+
+    @property
+    def paints(self) -> frozenset[Paint]:
+        """Paints of shapes that there are."""
+        return frozenset(Paint(k) for k in np.unique(self._scene.paint))
 
     @property
     def canvas(self) -> Canvas:
