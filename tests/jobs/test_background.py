@@ -37,7 +37,7 @@ def badge(opaque: bool = False) -> bytes:
 
 def made(tmp_path: Path, device: str, source: bytes, **settings: object) -> tuple[Result, str]:
     output = tmp_path / "o.svg"
-    chosen = make_settings(curves=6, iterations=150, **settings)
+    chosen = make_settings(curves=24, iterations=200, **settings)
     return vectorize_file(source, output, chosen, Backend.on(device)), output.read_text()
 
 
