@@ -67,6 +67,8 @@ def adam_update(
     held: wp.array[wp.int32],  # [row_count] 1: stays as it is
     kind: wp.array[wp.int32],  # [shape_count]
     kinds: wp.int32,  # the kinds that have the attribute, a bit each
+    paint: wp.array[wp.int32],  # [shape_count]
+    paints: wp.int32,  # the paints that have it, a bit each
     bias1: wp.array[wp.float32],  # [shape_count]
     bias2: wp.array[wp.float32],  # [shape_count]
     decay: wp.array[wp.float32],  # [1]
@@ -82,7 +84,7 @@ def adam_update(
     i, j = wp.tid()
     row = offset + i
     shape = owner[row]
-    if (kinds >> kind[shape]) & 1 == 0 or held[row] != 0:
+    if (kinds >> kind[shape]) & (paints >> paint[shape]) & 1 == 0 or held[row] != 0:
         return
     current = rate * decay[0]
     g = grad[row, j]

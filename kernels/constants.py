@@ -29,6 +29,16 @@ MITER = 1
 BEVEL = 2
 """Joins of strokes, besides ROUND."""
 
+FLAT = 0
+LINEAR = 1
+RADIAL = 2
+"""Paints of shapes."""
+
+PAD = 0
+REFLECT = 1
+REPEAT = 2
+"""How gradients go on beyond their ends."""
+
 NONE = -1
 """No such row."""
 

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Rule, Scene
+from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Rule, Scene
 from warpsplat.scene.attributes import NO_DASHES
+from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import starts_of
 
 CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
@@ -148,6 +149,31 @@ def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> S
             )
         )
     return functools.reduce(Scene.append, shapes)
+
+
+def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:
+    """Every shape but the last has a gradient: linear and radial by turns, of one to three stops."""
+    rng = np.random.default_rng(seed)
+    count = len(scene)
+    stops = np.arange(count) % 3 + 1
+    stops[-1] = 0
+    total = int(stops.sum())
+    low, high = bounds(scene)[:, :2], bounds(scene)[:, 2:]
+    axes = rng.uniform(0.3, 0.5, (count, 2)) * (high - low)
+    turned = np.stack([-axes[:, 1], axes[:, 0]], axis=1) * rng.uniform(0.6, 1.4, (count, 1)) + 0.1 * axes
+    offsets = [np.sort(rng.uniform(0.1, 0.9, n)) for n in stops]
+    paint = np.where(stops == 0, Paint.FLAT, 1 + np.arange(count) % 2)
+    return replace(
+        scene,
+        paint=paint.astype(np.int32),
+        spread=(np.arange(count) % 3).astype(np.int32),
+        frames=np.concatenate([(low + high) / 2, axes, turned], axis=1).astype(np.float32),
+        focus=(rng.uniform(0, 0.3, (count, 3)) * (paint == Paint.RADIAL)[:, None]).astype(np.float32),
+        stop_first=starts_of(stops),
+        stop_offsets=np.concatenate(offsets).astype(np.float32),
+        stop_colors=rng.uniform(0.05, 0.95, (total, 3)).astype(np.float32),
+        stop_opacities=rng.uniform(0.3, 1.0, total).astype(np.float32),
+    )
 
 
 def with_points(scene: Scene, points: FloatArray) -> FloatArray:

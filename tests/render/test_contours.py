@@ -30,7 +30,7 @@ def test_the_rules_differ_where_contours_overlap(device: str) -> None:
 
 
 def test_a_fill_closes_its_open_contours(device: str) -> None:
-    """As if a straight cubic led back, but for the corners, which rings round off by a hundredth of a pixel."""
+    """As if a straight cubic led back, but for corners, which a ring rounds off by a hundredth of a px."""
     chain = random_scene(Kind.STROKE, 1, seed=4)
     fill = replace(chain, kind=np.zeros(1, np.int32), widths=np.zeros(1, np.float32))
     start, end = chain.points[0], chain.points[-1]

@@ -106,6 +106,7 @@ def test_against_a_supersampled_truth(device: str, kind: Kind, basis: Basis, siz
     scene = replace(scene, widths=scene.widths * np.float32(size))
     big = on_white(render_svg(write_svg(scene), zoom=16))
     truth = cv2.resize(big, (96, 80), interpolation=cv2.INTER_AREA)
+    assert scene.canvas.background is not None
     background = (np.round(scene.canvas.background * 255) / 255).astype(np.float32)
     held = rounded(replace(scene, canvas=replace(scene.canvas, background=background)), GRIDS[-1])
     mine = render(held, backend=Backend.on(device)).astype(np.float64) * 255

@@ -81,7 +81,7 @@ def test_fewer_points_keep_their_moments(device: str) -> None:
     np.testing.assert_array_equal(parameters.arrays["ages"].numpy(), ages)
     for attribute in ATTRIBUTES:
         group = parameters.groups[attribute.name]
-        rows = keep if attribute.per == "point" else np.arange(len(scene))
+        rows = keep if attribute.per == "point" else np.arange(len(moments[attribute.name][0]))
         for moment, old in zip((group.moment1, group.moment2), moments[attribute.name], strict=True):
             np.testing.assert_array_equal(moment.numpy(), old[rows])
     assert parameters.revision == 1

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import MIXED, canvas, contours_scene, mixed_scene, random_scene
+from tests.scenes import MIXED, canvas, contours_scene, mixed_scene, random_scene, with_gradients
 from warpsplat.scene import ATTRIBUTES, NO_DASHES, TRAITS, Basis, Cap, Kind, Rule, Scene
 
 POINTS, COLORS = (next(a for a in ATTRIBUTES if a.name == name) for name in ("points", "colors"))
 
 
 def test_arrays_must_fit() -> None:
-    scene = random_scene(Kind.FILL)
+    scene = with_gradients(random_scene(Kind.FILL))
     for attribute in ATTRIBUTES:
         value = getattr(scene, attribute.name)
         with pytest.raises(ValueError, match=f"{attribute.name} "):

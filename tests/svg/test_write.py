@@ -20,14 +20,13 @@ from warpsplat.render.backend import Backend
 from warpsplat.render.models import SplatModel
 from warpsplat.render.renderer import render
 from warpsplat.scene import Basis, Kind
+from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
     NAMESPACE,
-    hex_colors,
     integers,
-    number,
     path_data,
     read_metadata,
     resized,

@@ -11,12 +11,13 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.constants import NONE
+from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
-from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
 from warpsplat.scene.scene import starts_of
 
-ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3}
+ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
 
 
@@ -60,6 +61,9 @@ class Parameters:
             "part": self._ints(parts := _parts(scene)),
             "basis": self._ints(scene.basis),
             "rule": self._ints(scene.rule),
+            "paint": self._ints(scene.paint),
+            "spread": self._ints(scene.spread),
+            "stop_first": self._ints(scene.stop_first),
             "point_first": self._ints(scene.first),
             "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
             "point_contour": self._ints(np.repeat(contours, np.diff(scene.starts))),
@@ -79,7 +83,11 @@ class Parameters:
         """Of exact coverage, that there are shapes of."""
         if constants.STYLED in self.parts:
             self._upload_styles(scene)
-        owners = {"point": self.arrays["point_shape"], "shape": self._ints(shapes)}
+        owners = {
+            "point": self.arrays["point_shape"],
+            "shape": self._ints(shapes),
+            "stop": self._ints(np.repeat(shapes, np.diff(scene.stop_first))),
+        }
         self.groups: dict[str, Group] = {}
         for a in ATTRIBUTES:
             value, m1, m2 = (
@@ -115,6 +123,11 @@ class Parameters:
     def kinds(self) -> frozenset[Kind]:
         """Kinds of shapes that there are."""
         return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+
+    @property
+    def paints(self) -> frozenset[Paint]:
+        """Paints of shapes that there are."""
+        return frozenset(Paint(k) for k in np.unique(self._scene.paint))
 
     @property
     def canvas(self) -> Canvas:

@@ -2,6 +2,7 @@
 
 from warpsplat.scene.attributes import (
     ATTRIBUTES,
+    GRADIENTS,
     NO_DASHES,
     OPACITY_RANGE,
     TRAITS,
@@ -10,13 +11,16 @@ from warpsplat.scene.attributes import (
     Cap,
     Join,
     Kind,
+    Paint,
     Rule,
+    Spread,
     Unit,
 )
 from warpsplat.scene.scene import Canvas, FloatArray, IndexArray, Scene
 
 __all__ = [
     "ATTRIBUTES",
+    "GRADIENTS",
     "NO_DASHES",
     "OPACITY_RANGE",
     "TRAITS",
@@ -28,7 +32,9 @@ __all__ = [
     "IndexArray",
     "Join",
     "Kind",
+    "Paint",
     "Rule",
     "Scene",
+    "Spread",
     "Unit",
 ]

@@ -59,6 +59,25 @@ class Join(IntEnum):
     BEVEL = constants.BEVEL
 
 
+class Paint(IntEnum):
+    """What a shape is coloured with (SVG 1.1, 13)."""
+
+    FLAT = constants.FLAT
+    """``colors``."""
+    LINEAR = constants.LINEAR
+    """Stops along the first axis of the shape's frame."""
+    RADIAL = constants.RADIAL
+    """Stops from the frame's focus to its unit circle."""
+
+
+class Spread(IntEnum):
+    """How a gradient goes on beyond its ends."""
+
+    PAD = constants.PAD
+    REFLECT = constants.REFLECT
+    REPEAT = constants.REPEAT
+
+
 class Unit(Enum):
     """What a number of the table is counted in."""
 
@@ -75,8 +94,8 @@ class Attribute:
 
     name: str
     """Of the field of ``Scene``."""
-    per: Literal["point", "shape"]
-    """What has a row of it: each control point, or each shape."""
+    per: Literal["point", "shape", "stop"]
+    """What has a row of it: each control point, each shape, or each stop of a gradient."""
     size: int
     """Numbers in a row."""
     rate: float
@@ -88,6 +107,8 @@ class Attribute:
     """Largest value."""
     kinds: tuple[Kind, ...] = (Kind.FILL, Kind.STROKE)
     """The shapes that have it; of others it is 0 and not updated."""
+    paints: tuple[Paint, ...] = (Paint.FLAT, Paint.LINEAR, Paint.RADIAL)
+    """The same by paint."""
 
 
 @dataclass(frozen=True)
@@ -111,16 +132,29 @@ TRAITS = (
     Trait("dash", NO_DASHES),
     Trait("twin", 0),
     Trait("layer", 0),
+    Trait("paint", Paint.FLAT),
+    Trait("spread", Spread.PAD),
 )
 
 OPACITY_RANGE = (0.02, 0.9985)
 """Bounds of an opacity. The upper one rounds to opaque in the file and keeps 1 - alpha away from 0."""
+
+GRADIENTS = (Paint.LINEAR, Paint.RADIAL)
 
 ATTRIBUTES = (
     Attribute("points", "point", 2, 3.0, Unit.PIXEL, (-1.0, Unit.CANVAS), (2.0, Unit.CANVAS)),
     Attribute("colors", "shape", 3, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE)),
     Attribute(
         "opacities", "shape", 1, 0.04, Unit.ONE, (OPACITY_RANGE[0], Unit.ONE), (OPACITY_RANGE[1], Unit.ONE)
+    ),
+    Attribute(
+        "frames", "shape", 6, 1.0, Unit.PIXEL, (-9.0, Unit.CANVAS), (9.0, Unit.CANVAS), paints=GRADIENTS
+    ),
+    Attribute("focus", "shape", 3, 0.0, Unit.ONE, (-1.0, Unit.ONE), (1.0, Unit.ONE), paints=(Paint.RADIAL,)),
+    Attribute("stop_offsets", "stop", 1, 0.01, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS),
+    Attribute("stop_colors", "stop", 3, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS),
+    Attribute(
+        "stop_opacities", "stop", 1, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS
     ),
     Attribute("widths", "shape", 1, 0.3, Unit.PIXEL, (1.0, Unit.PIXEL), (1.0, Unit.CANVAS), (Kind.STROKE,)),
 )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene.attributes import ATTRIBUTES, TRAITS, Attribute, Basis, Kind
+from warpsplat.scene.attributes import ATTRIBUTES, TRAITS, Attribute, Basis, Kind, Paint
 
 FloatArray = npt.NDArray[np.float32]
 IndexArray = npt.NDArray[np.intp]
@@ -24,8 +24,8 @@ class Canvas:
     """[px of the input image], which are the canvas units."""
     height: int
     """[px]"""
-    background: FloatArray
-    """sRGB in [0, 1], shape (3,)."""
+    background: FloatArray | None
+    """sRGB in [0, 1], shape (3,); None: transparent."""
 
 
 class Alike(NamedTuple):
@@ -90,6 +90,25 @@ class Scene:
     (shape,)."""
     layer: IntArray = None  # type: ignore[assignment]
     """Number of the group that each shape is in, ascending, shape (shape,)."""
+    paint: IntArray = None  # type: ignore[assignment]
+    """``Paint`` of each shape, shape (shape,); what follows says something of gradients only."""
+    spread: IntArray = None  # type: ignore[assignment]
+    """``Spread`` of each shape, shape (shape,)."""
+    frames: FloatArray = None  # type: ignore[assignment]
+    """Where a gradient's unit space lies on the canvas: origin, first axis and second axis [canvas units],
+    shape (shape, 6). A linear one goes from the origin along the first axis; a radial one ends at the unit
+    circle."""
+    focus: FloatArray = None  # type: ignore[assignment]
+    """Centre and radius of the circle where a radial gradient begins, in its unit space, shape (shape, 3)."""
+    stop_first: IntArray = None  # type: ignore[assignment]
+    """First stop of each shape's gradient and, last, the number of stops, shape (shape + 1,)."""
+    stop_offsets: FloatArray = None  # type: ignore[assignment]
+    """Where along the gradient the stops lie, in [0, 1], shape (stop,). One that lies before the one before
+    it counts as lying there."""
+    stop_colors: FloatArray = None  # type: ignore[assignment]
+    """sRGB in [0, 1], shape (stop, 3)."""
+    stop_opacities: FloatArray = None  # type: ignore[assignment]
+    """In [0, 1], besides the shape's, shape (stop,)."""
     dashes: tuple[tuple[float, ...], ...] = ()
     """Patterns of dashes [canvas units]: where in the pattern a stroke begins, then dashes and gaps in turn,
     as many of these as of those."""
@@ -104,12 +123,12 @@ class Scene:
             raise ValueError(
                 f"first does not run from 0 to {len(self.points)} points in {len(self) + 1} numbers"
             )
+        self._fill_in()
         for attribute in ATTRIBUTES:
             shape = np.shape(getattr(self, attribute.name))
             wanted = self.shape_of(attribute)
             if shape != wanted:
                 raise ValueError(f"{attribute.name} has shape {shape}, not {wanted}")
-        self._fill_in()
         for name in ("basis", *(trait.name for trait in TRAITS)):
             if getattr(self, name).shape != self.kind.shape:
                 raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {self.kind.shape}")
@@ -119,9 +138,13 @@ class Scene:
         defaults: dict[str, Any] = {t.name: np.full(len(self), t.default, t.dtype) for t in TRAITS}
         defaults["starts"] = self.first
         defaults["closed"] = (self.kind == Kind.FILL).astype(np.int32)
+        defaults["stop_first"] = np.zeros(len(self) + 1, np.int32)
         for name, value in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
+        for attribute in ATTRIBUTES:
+            if getattr(self, attribute.name) is None:
+                object.__setattr__(self, attribute.name, np.zeros(self.shape_of(attribute), np.float32))
 
     def _check_contours(self) -> None:
         starts, counts = self.starts, np.diff(self.starts)
@@ -134,6 +157,9 @@ class Scene:
             bad = int(np.flatnonzero(wrong)[0])
             name = Kind(self.kind[owner[bad]]).name.lower()
             raise ValueError(f"a {name} cannot have {counts[bad]} control points")
+        stops = np.diff(self.stop_first)
+        if ((stops < 1) & (self.paint != Paint.FLAT)).any() or (stops < 0).any():
+            raise ValueError("a gradient has no stops")
         alone = self.twin.astype(np.bool_) & (
             np.concatenate([[0], self.point_counts()[:-1]]) != self.point_counts()
         )
@@ -161,10 +187,10 @@ class Scene:
             attributes: of the table, ``points`` among them; those left out are 0. Traits and contours as
                 well; those left out are the default.
         """
-        rows: dict[str, Any] = {}
-        for a in ATTRIBUTES:
-            if a.per == "shape":
-                rows[a.name] = np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
+        rows: dict[str, Any] = {
+            name: np.zeros((len(kind), 3) if name == "colors" else len(kind), np.float32)
+            for name in ("colors", "opacities", "widths")
+        }
         if basis is None:
             basis = np.full(len(kind), Basis.CUBIC, np.int32)
         return Scene(canvas, kind, basis, first, **(rows | attributes))
@@ -198,7 +224,9 @@ class Scene:
 
     def shape_of(self, attribute: Attribute) -> tuple[int, ...]:
         """Shape of the array of ``attribute``."""
-        rows = len(self.points) if attribute.per == "point" else len(self)
+        rows = {"point": len(self.points), "shape": len(self), "stop": int(self.stop_first[-1])}[
+            attribute.per
+        ]
         return (rows, attribute.size) if attribute.size > 1 else (rows,)
 
     def point_counts(self) -> IntArray:
@@ -246,6 +274,8 @@ class Scene:
         """Rows of ``attribute``'s array that belong to the shapes ``index``, in that order."""
         if attribute.per == "shape":
             return index
+        if attribute.per == "stop":
+            return ranges(self.stop_first[index], np.diff(self.stop_first)[index])
         return ranges(self.first[index], self.point_counts()[index])
 
     def take(self, index: IndexArray) -> Scene:
@@ -263,6 +293,7 @@ class Scene:
             first=starts_of(self.point_counts()[index]),
             starts=starts_of(np.diff(self.starts)[contours]),
             closed=self.closed[contours],
+            stop_first=starts_of(np.diff(self.stop_first)[index]),
             **values,
         )
 
@@ -283,6 +314,7 @@ class Scene:
             first=starts_of(np.concatenate([self.point_counts(), other.point_counts()])),
             starts=starts_of(np.concatenate([np.diff(self.starts), np.diff(other.starts)])),
             closed=np.concatenate([self.closed, other.closed]),
+            stop_first=starts_of(np.concatenate([np.diff(self.stop_first), np.diff(other.stop_first)])),
             **values,
         )
 

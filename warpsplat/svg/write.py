@@ -16,6 +16,8 @@ import numpy.typing as npt
 
 from warpsplat import __version__
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.svg.numbers import hex_colors, number
+from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
@@ -32,16 +34,6 @@ GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25,
 """Units of the view box a pixel of the picture: sizes of the view box have few decimals with each."""
 
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
-
-
-def number(value: float, decimals: int) -> str:
-    """Shortest decimal form: no trailing zeros, no leading zero, no negative zero."""
-    text = f"{value:.{decimals}f}"
-    if "." in text:
-        text = text.rstrip("0").rstrip(".")
-    if text in {"-0", ""}:
-        return "0"
-    return re.sub(r"^(-?)0\.", r"\1.", text)
 
 
 def width_decimals(per_pixel: float) -> int:
@@ -62,6 +54,9 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
         points=(np.round(points * per_unit) / per_unit).astype(np.float32),
         colors=(np.round(colors * 255) / 255).astype(np.float32),
         opacities=shown.astype(np.float32),
+        stop_offsets=np.round(scene.stop_offsets, SHARE_DECIMALS),
+        stop_colors=(np.round(scene.stop_colors * 255) / 255).astype(np.float32),
+        stop_opacities=np.round(scene.stop_opacities, SHARE_DECIMALS),
         widths=(np.round(widths * per_pixel, width_decimals(per_pixel)) / per_pixel).astype(np.float32),
     )
 
@@ -134,13 +129,6 @@ def _cheapest_start(half: list[Pair]) -> int:
     return lengths.index(min(lengths))
 
 
-def hex_colors(colors: FloatArray) -> list[str]:
-    """sRGB in [0, 1], shape (n, 3) -> ``#rrggbb``, or ``#rgb`` where that is the same."""
-    levels = np.clip(np.round(colors.astype(np.float64) * 255), 0, 255).astype(np.int64)
-    texts = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in levels.tolist()]
-    return [f"#{t[1]}{t[3]}{t[5]}" if t[1] == t[2] and t[3] == t[4] and t[5] == t[6] else t for t in texts]
-
-
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
@@ -156,6 +144,14 @@ def _path(scene: Scene, shape: int, color: str, per_pixel: float, opacity: str) 
     return f'<path d="{data}" {style}{opacity}/>'
 
 
+def _colors(scene: Scene, per_pixel: float) -> list[str]:
+    """The paint of each shape."""
+    colors = hex_colors(scene.colors)
+    for shape, name in gradients(scene, per_pixel)[1].items():
+        colors[shape] = f"url(#{name})"
+    return colors
+
+
 def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
     """The attribute of each shape's opacity; empty for opaque ones."""
     shown = np.minimum(scene.opacities.astype(np.float64) * opacity_scale, 1.0).tolist()
@@ -167,7 +163,7 @@ def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
-    colors, opacities = hex_colors(scene.colors), _opacities(scene, 1.0)
+    colors, opacities = _colors(scene, per_pixel), _opacities(scene, 1.0)
     paths = (_path(scene, i, colors[i], per_pixel, opacities[i]) for i in range(len(scene)))
     return np.array([len(path) for path in paths], np.int64)
 
@@ -176,7 +172,7 @@ def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[st
     """Neighbours of one kind share a group, and what it says of them; neighbours of one opacity a group in it
     where that is shorter.
     """
-    colors, opacities = hex_colors(scene.colors), _opacities(scene, opacity_scale)
+    colors, opacities = _colors(scene, per_pixel), _opacities(scene, opacity_scale)
     for kind, shapes in itertools.groupby(range(len(scene)), lambda i: Kind(int(scene.kind[i]))):
         yield f"<g {STROKE_ATTRIBUTES}>" if kind == Kind.STROKE else "<g>"
         for opacity, run in itertools.groupby(shapes, lambda i: opacities[i]):
@@ -205,19 +201,24 @@ def write_svg(
         metadata: text for the ``metadata`` element, besides the program's name and version.
         opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
             below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
-        background: whether to write it; without, the picture is transparent where no shape is.
+        background: whether to write it, if the canvas has one; without, the picture is transparent where no
+            shape is.
     """
     canvas = scene.canvas
-    fill = hex_colors(canvas.background[None])[0]
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
-    behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n' if background else ""
+    behind = ""
+    if background and canvas.background is not None:
+        fill = hex_colors(canvas.background[None])[0]
+        behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n'
+    elements, _ = gradients(scene, per_pixel)
+    defs = f"<defs>{''.join(elements)}</defs>\n" if elements else ""
     shapes = "".join(_groups(scene, per_pixel, opacity_scale))
     note = f"warpsplat {__version__} {metadata}".strip()
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
         f'viewBox="0 0 {width} {height}">\n'
         f"<metadata>{note}</metadata>\n"
-        f"{behind}{shapes}\n</svg>\n"
+        f"{defs}{behind}{shapes}\n</svg>\n"
     )
 
 
