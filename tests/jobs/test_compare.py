@@ -46,6 +46,7 @@ def test_rows_of_both_programs_are_measured_alike() -> None:
         assert row.image == "a.png"
         assert row.score == score_svg(row.svg, target)
         assert row.seconds > 0
+        assert row.cpu_seconds > 0
         assert row.as_dict().items() >= row.score.as_dict().items()
     assert [row.score.paths for row in rows if row.score] == [4, 8, 1, 4]
 

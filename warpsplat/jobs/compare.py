@@ -37,6 +37,8 @@ class Row:
     """Empty where the program failed."""
     seconds: float
     """From the pixels to the SVG, on the clock; not the score."""
+    cpu_seconds: float
+    """The same by the processor: of all threads, and whatever else the machine does."""
     score: Score | None
     """None where there is no file, or one that no viewer can show."""
     error: str = ""
@@ -46,7 +48,8 @@ class Row:
         """For JSON."""
         figures = self.score.as_dict() if self.score else {"error": self.error}
         names = {"image": self.image, "program": self.program, "setting": self.setting}
-        return {**names, **figures, "seconds": round(self.seconds, 2)}
+        times = {"seconds": round(self.seconds, 2), "cpu_seconds": round(self.cpu_seconds, 2)}
+        return {**names, **figures, **times}
 
 
 @dataclass(frozen=True)
@@ -101,23 +104,34 @@ def compare(
         yield their_row(image, target, file.getvalue(), tracer, setting, eyes=eyes)
 
 
+class Watch:
+    """Measures time from when it is made."""
+
+    def __init__(self) -> None:
+        self.begin = time.monotonic(), time.process_time()
+
+    def read(self) -> tuple[float, float]:
+        """Seconds since then on the clock, and by the processor."""
+        return time.monotonic() - self.begin[0], time.process_time() - self.begin[1]
+
+
 def our_row(image: str, target: FloatArray, settings: Settings, run: Run) -> Row:
     """Our file, of at most ``settings.curves`` shapes.
 
     Raises:
         Stopped: the run was interrupted.
     """
-    begin = time.monotonic()
-    end = begin
+    watch = Watch()
+    spent = watch.read()
 
     def note_end(_: str) -> None:
-        nonlocal end
-        end = time.monotonic()
+        nonlocal spent
+        spent = watch.read()
 
     result = run(target, settings, note_end)
     if result.stopped or result.score is None:
         raise Stopped
-    return Row(image, OURS, str(settings.curves), result.svg, end - begin, result.score)
+    return Row(image, OURS, str(settings.curves), result.svg, *spent, result.score)
 
 
 def their_row(image: str, target: FloatArray, png: bytes, tracer: Tracer, setting: str, *, eyes: bool) -> Row:
@@ -125,7 +139,7 @@ def their_row(image: str, target: FloatArray, png: bytes, tracer: Tracer, settin
 
     Whatever the tracer throws is its own failure at this setting.
     """
-    begin = time.monotonic()
+    watch = Watch()
     try:
         svg = tracer.trace(png, tracer.settings[setting])
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
@@ -133,13 +147,13 @@ def their_row(image: str, target: FloatArray, png: bytes, tracer: Tracer, settin
     except BaseException as error:  # a panic of Rust code derives from no Exception
         cause = (str(error).strip().splitlines() or ["no cause given"])[0]
         message = printable(f"failed: {type(error).__name__}: {cause}")
-        return Row(image, tracer.name, setting, "", time.monotonic() - begin, None, message)
-    seconds = time.monotonic() - begin
+        return Row(image, tracer.name, setting, "", *watch.read(), None, message)
+    spent = watch.read()
     try:
         score = score_svg(svg, target, eyes=eyes)
     except ImageError as error:
-        return Row(image, tracer.name, setting, svg, seconds, None, f"its file: {error}")
-    return Row(image, tracer.name, setting, svg, seconds, score)
+        return Row(image, tracer.name, setting, svg, *spent, None, f"its file: {error}")
+    return Row(image, tracer.name, setting, svg, *spent, score)
 
 
 def warm_up(settings: Settings, backend: Backend) -> None:

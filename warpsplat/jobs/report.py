@@ -33,13 +33,16 @@ COLUMNS: dict[str, tuple[str, Callable[[float], str]]] = {
     "paths": ("paths", _decimals(0)),
     "nodes": ("nodes", _decimals(0)),
     "seconds": ("s", _decimals(1)),
+    "cpu_seconds": ("CPU s", _decimals(1)),
 }
 """Figures of a table: heading, and how a value is written."""
 
 
 def figures(row: Row) -> Figures:
     """What was measured; nothing of a row that failed."""
-    return {**asdict(row.score), "seconds": row.seconds} if row.score else {}
+    if row.score is None:
+        return {}
+    return {**asdict(row.score), "seconds": row.seconds, "cpu_seconds": row.cpu_seconds}
 
 
 def means(found: Comparison) -> list[tuple[str, str, Figures]]:
