@@ -95,6 +95,18 @@ def test_an_interruption_shows_what_there_is(
     assert "| Bands " in captured.out
 
 
+def test_a_run_that_is_cut_short_is_no_result(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch)
+    monkeypatch.setattr("warpsplat.cli.signals.Interrupt.__call__", lambda self: True)
+    assert run("compare", image, *QUICK, "-o", tmp_path / "out") == 130
+    captured = capsys.readouterr()
+    assert one_line(captured.err) == "warpsplat: interrupted"
+    assert captured.out == ""
+    assert not list((tmp_path / "out").iterdir())
+
+
 @pytest.mark.parametrize(("module", "folder"), [("vtracer", []), ("matplotlib", ["-o", "out"])])
 def test_packages_that_are_missing(
     image: Path,

@@ -43,12 +43,9 @@ VTRACER_SETTINGS: dict[str, Options] = {
 """Of VTracer. The defaults, and what does best for its size or its figures out of some 60 that were tried on
 photographs, drawings and logos (docs/comparison.md)."""
 
-EXTRA = "compare"
-"""The optional dependencies that comparisons need."""
-
 
 def require(module: str) -> Any:
-    """Import an optional dependency.
+    """Import an optional dependency, of the extra ``compare``.
 
     Raises:
         UsageError: it is not installed; the message says how to install it.
@@ -56,10 +53,9 @@ def require(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        hint = f"pip install {module.partition('.')[0]}, or warpsplat with its extra: '.[{EXTRA}]'"
-        raise UsageError(
-            f"compare needs {module.partition('.')[0]}, which is not installed: {hint}"
-        ) from error
+        name = module.partition(".")[0]
+        hint = f"pip install {name}, or warpsplat with its extra: '.[compare]'"
+        raise UsageError(f"compare needs {name}, which is not installed: {hint}") from error
 
 
 def vtracer() -> Tracer:
