@@ -149,7 +149,12 @@ def draw_panel(axes: Any, image: str, rows: Sequence[Row], tracer: str) -> None:
             axes.annotate(setting, (x, y), (4, 4 if i % 2 else -9), textcoords="offset points", fontsize=7)
     axes.set_title(image, parse_math=False)
     axes.set(xscale="log", xlabel="file [kB]", ylabel="PSNR [dB]")
+    axes.xaxis.set_major_locator(require("matplotlib.ticker").LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(
+        ""
+    )  # or they are labelled where there are few: as powers, one over the other
     axes.grid(visible=True, alpha=0.3)
+    axes.tick_params(labelsize=8)
     axes.margins(0.15)
     axes.legend()

@@ -40,7 +40,7 @@ VTRACER_SETTINGS: dict[str, Options] = {
     "fine": {**POLYGON, "color_precision": 8, "layer_difference": 8, "filter_speckle": 2},
     "pixel": {"mode": "none", "path_precision": 0},
 }
-"""Of VTracer. The defaults, and what does best for its size or its figures out of some 60 that were tried on
+"""Of VTracer: the defaults, and what is best for its size or its figures out of forty that were tried on
 photographs, drawings and logos (docs/comparison.md)."""
 
 
