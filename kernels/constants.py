@@ -38,6 +38,12 @@ TRANSMITTANCE_MIN = 1.0e-4
 SPREAD = 2.0 / 3.0
 """1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""
 
+WIDTH_SIGMA = 0.4
+"""Standard deviation across a soft stroke, over its width: opaque, it covers half at half the width."""
+
+PIXEL_VARIANCE = 1.0 / 12.0
+"""Of a pixel's area [px squared]: what looking at a soft Gaussian through it adds to its variance."""
+
 PIXEL_SIGMA = 0.13
 """Standard deviation [px] added in quadrature to both scales, so that no Gaussian vanishes. The softer the
 edges, the better splats fit a photograph and the less the file, whose edges are hard, looks like them: 0.13

@@ -7,14 +7,14 @@ import json
 import math
 import re
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from warpsplat.errors import UsageError
 from warpsplat.scene import ATTRIBUTES, Basis, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
-Renderer = Literal["exact", "splat"]
+Renderer = Literal["exact", "splat", "gaussian"]
 
 
 def default_rates() -> dict[str, float]:
@@ -77,7 +77,12 @@ class Settings:
     chain_cubics: int = 2
     """Cubics in each of the two chains of a closed curve."""
     renderer: Renderer = "exact"
-    """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
+    """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
+    look like the paths, or the paper's own soft ones."""
+    softness: float = 0.6
+    """Standard deviation that soft Gaussians have at least [px of the canvas]."""
+    gaussian_density: float = 1.0
+    """Soft Gaussians along and across a shape over their usual number."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
     ssim: float = 0.0
@@ -145,7 +150,7 @@ class Settings:
             raise UsageError(f"kind must be a Kind, not {self.kind!r}")
         choices = (
             ("order", self.order, ("age", "area")),
-            ("renderer", self.renderer, ("exact", "splat")),
+            ("renderer", self.renderer, get_args(Renderer)),
         )
         for name, choice, allowed in choices:
             if choice not in allowed:
@@ -205,6 +210,13 @@ FILL_POINT_RATE = 6.0
 SPLAT_SHARE = 0.5
 """Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
 
+GAUSSIAN: dict[str, Any] = {
+    "basis": Basis.CUBIC,
+    "texture": 0.0,
+    "viewer": False,
+}
+"""What the soft renderer changes in every preset: its own render is what counts, by its squared error."""
+
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 DEFAULT_QUALITY: Quality = "balanced"
@@ -232,6 +244,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     if given.get("renderer") == "splat":
         preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
+    elif given.get("renderer") == "gaussian":
+        preset = replace(preset, **GAUSSIAN)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
     return replace(preset, **given)

@@ -72,5 +72,6 @@ ATTRIBUTES = (
     Attribute(
         "opacities", "shape", 1, 0.04, Unit.ONE, (OPACITY_RANGE[0], Unit.ONE), (OPACITY_RANGE[1], Unit.ONE)
     ),
+    Attribute("fades", "shape", 3, 0.04, Unit.ONE, (-1.0, Unit.ONE), (1.0, Unit.ONE), (Kind.STROKE,)),
     Attribute("widths", "shape", 1, 0.3, Unit.PIXEL, (1.0, Unit.PIXEL), (1.0, Unit.CANVAS), (Kind.STROKE,)),
 )

@@ -64,6 +64,9 @@ class Scene:
     """In [0, 1], shape (shape,)."""
     widths: FloatArray
     """Stroke widths [canvas units], shape (shape,); 0 for fills."""
+    fades: FloatArray
+    """What is added to a stroke's opacity in each of its thirds (of three cubics: in each), shape (shape, 3).
+    Soft Gaussians alone know of it: a path has one opacity."""
 
     def __post_init__(self) -> None:
         """Check that the arrays fit one another.
