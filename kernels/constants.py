@@ -28,6 +28,9 @@ Q_INNER = 6.0
 off (g < 0.05) raises 1 - coverage by a seventh of its 0.015; and it is where inner rows would reach out of
 the shape."""
 
+Q_SOFT = 9.0
+"""The cut of soft Gaussians, at three standard deviations as in 3D Gaussian splatting."""
+
 GAUSSIAN_MAX = 0.99
 """Peak of one Gaussian. Below 1 so that 1 - g can divide in the adjoint; the clamp is the same forward and
 backward, and a clamped Gaussian has no gradient."""

@@ -28,7 +28,7 @@ STROKE = wp.constant(constants.STROKE)
 PLAN_SAMPLES = wp.constant(constants.PLAN_SAMPLES)
 SPREAD = wp.constant(constants.SPREAD)
 EPSILON = wp.constant(constants.EPSILON)
-Q_MAX = wp.constant(constants.Q_MAX)
+Q_SOFT = wp.constant(constants.Q_SOFT)
 GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
 WIDTH_SIGMA = wp.constant(constants.WIDTH_SIGMA)
 PIXEL_VARIANCE = wp.constant(constants.PIXEL_VARIANCE)
@@ -197,10 +197,10 @@ def soft_gaussians_forward(
     ss = e[1] * e[1]
     cs = e[0] * e[1]
     conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
-    cut[i] = Q_MAX
+    cut[i] = Q_SOFT
     extent[i] = wp.vec2(
-        wp.sqrt(Q_MAX * (cc * variance_x + ss * variance_y)),
-        wp.sqrt(Q_MAX * (ss * variance_x + cc * variance_y)),
+        wp.sqrt(Q_SOFT * (cc * variance_x + ss * variance_y)),
+        wp.sqrt(Q_SOFT * (ss * variance_x + cc * variance_y)),
     )
     opacity = opacities[shape] + fades[shape][third(station, stations)]
     strength[i] = GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)

@@ -59,7 +59,7 @@ def coverages(
         fill = scene.kind[shape] == Kind.FILL
         grid = scale * (fill_grid(points, plan) if fill else stroke_row(points, plan.columns))
         made = gaussians(grid, scale * p["widths"][shape], scale * softness, detach)
-        cut = torch.full((plan.rows * plan.columns,), k.Q_MAX)
+        cut = torch.full((plan.rows * plan.columns,), k.Q_SOFT)
         g = gaussian_values(*made, cut, width, height, most=1.0)
         covers.append(1 - torch.prod(1 - strengths(p, shape, plan)[:, None, None] * g, dim=0))
     return covers

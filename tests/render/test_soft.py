@@ -54,8 +54,8 @@ def compare(scene: Scene, device: str, scale: float, model: GaussianModel, lanes
         detach=not model.through_scales,
     )
     image = composite(covers, p | {"opacities": torch.ones(len(scene))}, scene)
-    # The cut at Q_MAX makes single pixels differ where float32 and float64 decide differently.
-    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-3)
+    # The cut makes single pixels differ where float32 and float64 decide differently.
+    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-2)
     assert np.abs(renderer.read_image() - image.detach().numpy()).mean() < 5e-6
     weights = np.random.default_rng(1).normal(size=(*image.shape,))
     (image * torch.tensor(weights)).sum().backward()
