@@ -1,15 +1,17 @@
 """Shapes -> soft Gaussians (the paper's own model), and the adjoint.
 
-Fills are the strips of ``grid.fill``. A stroke is one row of Gaussians along its course, whose scale across is
-learnt: the stroke's width. With Dx and Dr the differences along and across rows, as in ``grid.gaussians``:
+Fills are the strips of ``grid.fill``. A stroke is one row of Gaussians along its course, whose scale across
+is learnt: the stroke's width. With Dx and Dr the differences along and across rows, as in ``grid.gaussians``:
 
     scale_x^2 = (SPREAD straightness |Dx|)^2 + softness^2 + PIXEL_VARIANCE
     scale_y^2 = (SPREAD cross(Dx, Dr) / |Dx|)^2 + (WIDTH_SIGMA width)^2 + softness^2 + PIXEL_VARIANCE
 
 Dr is 0 for strokes, width is 0 for fills. Grids are planned and the softness is counted in canvas units: at
-any scale it is the same picture, seen through the area of a pixel. What each Gaussian lets through is its own: its **strength** is the
-opacity of its shape, or of its third of a stroke, inside the product over the shape's Gaussians (paper eq. 8
-and 9: a shape's Gaussians share one depth, and so lie side by side in the order of blending).
+any scale it is the same picture, seen through the area of a pixel.
+
+What each Gaussian lets through is its own: its **strength** is the opacity of its shape, or of its third of a
+stroke, inside the product over the shape's Gaussians (paper eq. 8 and 9: a shape's Gaussians share one depth,
+and so lie side by side in the order of blending).
 """
 
 import warp as wp

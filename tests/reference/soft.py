@@ -21,7 +21,7 @@ def stroke_row(points: torch.Tensor, stations: int) -> torch.Tensor:
 def gaussians(
     grid: torch.Tensor, width: torch.Tensor, softness: float, detach: bool
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, stations, 2], width and softness, in px."""
+    """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, stations, 2]; all in px."""
     source = grid.detach() if detach else grid
     dx = differences(source.transpose(0, 1)).transpose(0, 1)
     dr = differences(source)

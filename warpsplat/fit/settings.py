@@ -81,7 +81,7 @@ class Settings:
     look like the paths, or the paper's own soft ones."""
     softness: float = 0.6
     """Standard deviation that soft Gaussians have at least [px of the canvas]."""
-    gaussian_density: float = 1.0
+    gaussian_density: float = 0.5
     """Soft Gaussians along and across a shape over their usual number."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""

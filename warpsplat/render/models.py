@@ -104,8 +104,8 @@ class GaussianModel:
     """The paper's own soft model: an opacity for each Gaussian, one soft row for a stroke."""
 
     softness: float = 0.6
-    """Standard deviation that every Gaussian has at least [canvas units], besides what a pixel's area adds."""
-    density: float = 1.0
+    """Standard deviation that every Gaussian has at least [canvas units]; a pixel's area adds to it."""
+    density: float = 0.5
     """Gaussians along and across a shape over their usual number."""
     through_scales: bool = True
     """Whether gradients flow through the Gaussians' scales and angles."""
