@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
@@ -15,6 +16,46 @@ from warpsplat.scene import ATTRIBUTES, Basis, Kind
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Renderer = Literal["exact", "splat", "gaussian"]
+
+
+FRACTION = (0.0, 1.0)
+WEIGHT = (0.0, 1e6)
+RANGES: dict[str, tuple[float, float]] = {
+    **dict.fromkeys(("coarse", "final_rate", "texture"), FRACTION),
+    **dict.fromkeys(("ssim", "xing", "bending"), WEIGHT),
+    **dict.fromkeys(("fold_start", "fold_end"), (1e-6, 1e6)),
+    "softness": (0.0, 100.0),
+    "gaussian_density": (0.05, 20.0),
+}
+"""Least and largest values of the settings that are numbers."""
+DENSITY_RANGES: dict[str, tuple[float, float]] = {
+    **dict.fromkeys(("grown", "thin", "stop", "opacity_start", "opacity_end", "replace"), FRACTION),
+    **dict.fromkeys(("duplicate_color", "duplicate_overlap"), (0.0, 2.0)),
+    "start": (1e-3, 1.0),
+    "surplus": (1.0, 10.0),
+    "mean_points": (3.0, 100.0),
+    "area": (0.0, 1e9),
+}
+
+
+def check_whole(name: str, value: object, low: int, high: int) -> None:
+    """Whether a setting is a whole number in its range.
+
+    Raises:
+        UsageError: it is not.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+
+
+def check_number(name: str, value: object, low: float, high: float) -> None:
+    """Whether a setting is a number in its range.
+
+    Raises:
+        UsageError: it is not.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise UsageError(f"{name} must be a number from {low:g} to {high:g}, not {value!r}")
 
 
 def default_rates() -> dict[str, float]:
@@ -51,6 +92,16 @@ class Density:
     """... and above this overlap (intersection over union) of their boxes."""
     replace: float = 0.1
     """Replace at least this fraction of the curves each turn: those without which the error grows least."""
+
+    def __post_init__(self) -> None:
+        """Check ranges.
+
+        Raises:
+            UsageError: a value is out of its range.
+        """
+        check_whole("density interval", self.interval, 0, 1_000_000)
+        for name, (low, high) in DENSITY_RANGES.items():
+            check_number(f"density {name.replace('_', '-')}", getattr(self, name), low, high)
 
 
 @dataclass(frozen=True)
@@ -132,10 +183,16 @@ class Settings:
             ("precision", 0 if self.precision is None else self.precision, 0, 6),
             ("seed", self.seed, 0, 2**32 - 1),
             ("chain-cubics", self.chain_cubics, 1, 8),
+            ("spline-points", self.spline_points, 3, 64),
+            ("coarse-pixels", self.coarse_pixels, 1, 10**9),
+            ("fine-pixels", self.fine_pixels, 1, 10**9),
         )
         for name, value, low, high in checks:
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+            check_whole(name, value, low, high)
+        for name, (least, most) in RANGES.items():
+            check_number(name.replace("_", "-"), getattr(self, name), least, most)
+        for name, rate in self.rates.items():
+            check_number(f"rates {name}", rate, 0.0, 1e6)
         goals = (
             ("target-psnr", self.target_psnr),
             ("time-budget", self.time_budget),
@@ -146,10 +203,14 @@ class Settings:
                 isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < math.inf
             ):
                 raise UsageError(f"{name} must be a positive number, not {goal!r}")
-        if not isinstance(self.kind, Kind):
-            raise UsageError(f"kind must be a Kind, not {self.kind!r}")
+        for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
+            if not isinstance(value, kind):
+                raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
+        for name, given in (("through-scales", self.through_scales), ("viewer", self.viewer)):
+            if not isinstance(given, bool):
+                raise UsageError(f"{name} must be true or false, not {given!r}")
         choices = (
-            ("order", self.order, ("age", "area")),
+            ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
         )
         for name, choice, allowed in choices:
@@ -212,6 +273,7 @@ SPLAT_SHARE = 0.5
 
 GAUSSIAN: dict[str, Any] = {
     "basis": Basis.CUBIC,
+    "order": "area",
     "texture": 0.0,
     "viewer": False,
 }
@@ -248,4 +310,30 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         preset = replace(preset, **GAUSSIAN)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
-    return replace(preset, **given)
+    if "rates" in given:
+        given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
+    if isinstance(given.get("density"), Mapping):
+        names = tuple(f.name for f in fields(Density))
+        given["density"] = replace(preset.density, **_known("density", given["density"], names))
+    if isinstance(given.get("basis"), str):
+        if given["basis"].upper() not in Basis.__members__:
+            choices = ", ".join(Basis.__members__).lower()
+            raise UsageError(f"basis must be one of {choices}, not {given['basis']!r}")
+        given["basis"] = Basis[given["basis"].upper()]
+    settings = replace(preset, **given)
+    if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
+        raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
+    return settings
+
+
+def _known(name: str, given: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Any]:
+    """``given`` with underscores in its keys.
+
+    Raises:
+        UsageError: one is not ``known``.
+    """
+    values = {key.replace("-", "_"): value for key, value in given.items()}
+    for key in values:
+        if key not in known:
+            raise UsageError(f"unknown setting {key!r} in {name}")
+    return values
