@@ -10,9 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.kernels import constants
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import Kind, Scene
+
+Floats = npt.NDArray[np.floating]
 
 REACH = 3
 """Neighbours on each side that a Gaussian overlaps with: 1.5 standard deviations apart, the cut is at 3."""
@@ -21,14 +24,14 @@ LEVELS = np.linspace(0, 1, 201)
 """Opacities at which profiles are integrated."""
 
 
-def _row_profile(opacity: FloatArray, distance: FloatArray) -> FloatArray:
+def _row_profile(opacity: Floats, distance: Floats) -> Floats:
     """Coverage at a distance from a row of Gaussians [standard deviations], shape (opacity, distance)."""
     along = np.arange(-REACH, REACH + 1) / constants.SPREAD
     g = np.exp(-0.5 * (along[:, None] ** 2 + distance**2))
     return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None, None] * g, axis=1))
 
 
-def _plateau(opacity: FloatArray) -> FloatArray:
+def _plateau(opacity: Floats) -> Floats:
     """Coverage well inside a grid of Gaussians."""
     along = np.arange(-REACH, REACH + 1) / constants.SPREAD
     g = np.exp(-0.5 * (along[:, None] ** 2 + along**2)).ravel()

@@ -269,10 +269,9 @@ FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
 SPLAT_SHARE = 0.5
-"""Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
+"""Iterations with Gaussians over those of the exact renderer: a step takes several times as long."""
 
 GAUSSIAN: dict[str, Any] = {
-    "basis": Basis.CUBIC,
     "order": "area",
     "texture": 0.0,
     "viewer": False,
@@ -304,10 +303,9 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     if "max_bytes" in given:
         given["max_bytes"] = parse_bytes(given["max_bytes"])
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
-    if given.get("renderer") == "splat":
+    if given.get("renderer") in ("splat", "gaussian"):
         preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
-    elif given.get("renderer") == "gaussian":
-        preset = replace(preset, **GAUSSIAN)
+        preset = replace(preset, **(GAUSSIAN if given["renderer"] == "gaussian" else {}))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
     if "rates" in given:
