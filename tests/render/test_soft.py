@@ -21,8 +21,8 @@ from warpsplat.scene import Kind, Scene
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
 SOFT = GaussianModel()
-CASES = [(FILL, n, 1.0) for n in (2, 4)] + [(STROKE, n, 1.0) for n in (1, 3, 4)]
-CASES += [(FILL, 4, 0.6), (STROKE, 3, 1.7)]
+CASES = [(FILL, 2, 1.0, True), (STROKE, 1, 1.0, True), (STROKE, 4, 1.0, True)]
+CASES += [(FILL, 4, 0.6, True), (STROKE, 3, 1.7, True), (FILL, 2, 1.0, False), (STROKE, 3, 1.0, False)]
 
 
 def plans_of(renderer: Renderer) -> list[Plan]:
@@ -71,8 +71,7 @@ def compare(scene: Scene, device: str, scale: float, model: GaussianModel, lanes
         assert not want.size or relative_error(got, want) < 2e-3, name
 
 
-@pytest.mark.parametrize(("kind", "cubics", "scale"), CASES)
-@pytest.mark.parametrize("through_scales", [True, False])
+@pytest.mark.parametrize(("kind", "cubics", "scale", "through_scales"), CASES)
 def test_image_and_gradients(
     device: str, kind: Kind, cubics: int, scale: float, through_scales: bool
 ) -> None:
