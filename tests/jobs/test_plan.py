@@ -172,7 +172,7 @@ def test_examples_are_valid(tmp_path: Path) -> None:
     examples = sorted(Path(p) for p in warpsplat.configs.__path__)[0]
     files = sorted(examples.glob("*.yaml"))
     assert files
-    for name in ("photos/a.jpg", "photos/b.png", "more/x/c.png", "portrait.png"):
+    for name in ("photos/a.jpg", "photos/b.png", "more/x/c.png", "portrait.png", "kodak/a.png"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     for file in files:
