@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ CAT = ROOT / "docs" / "images" / "cat.jpg"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("renderer", ["exact", "splat"])
+@pytest.mark.parametrize("renderer", get_args(Renderer))
 def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: Renderer) -> None:
     settings = make_settings(
         kind=kind, renderer=renderer, curves=16, iterations=40, seed=3, coarse_pixels=1000
@@ -212,6 +213,8 @@ def test_soft_gaussians_have_two_figures(device: str, kind: Kind) -> None:
     assert (result.render_psnr, result.render_ssim) == again
     assert result.render_psnr > 24
     assert result.render_psnr > result.score.psnr > 14
+    reduced = vectorize(picture(), replace(settings, fine_pixels=500, iterations=3), Backend.on(device))
+    assert reduced.render_ssim is None, "an image that is larger than what was trained on"
     larger, _ = render_figures(result.scene, picture(), settings, Backend.on(device), scale=2)
     assert larger == pytest.approx(result.render_psnr, abs=1)
     said = summary(Path("a.svg"), values)

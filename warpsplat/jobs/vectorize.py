@@ -41,8 +41,8 @@ class Result:
     score: Score | None
     """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
     render_psnr: float
-    """Of the last training render against the image, at its size [dB]; of soft Gaussians, of their own
-    render of the finished scene, at the image's size in 8 bits as the file's is.
+    """Of the last training render against the image, at its size [dB]; of soft Gaussians, where the image is no
+    larger than that size, of the finished scene in 8 bits, as the file's is.
     """
     estimated_psnr: float
     """Of the file at that size, as the training saw it: the last look at it may be 25 steps old [dB]."""
@@ -138,7 +138,7 @@ def vectorize(
         write(svg)
     score = _score(svg, target, settings, stop, interrupted=made.interrupted)
     render_psnr, render_ssim = made.render_psnr, None
-    if settings.renderer == "gaussian":
+    if settings.renderer == "gaussian" and target.shape[0] * target.shape[1] <= settings.fine_pixels:
         render_psnr, render_ssim = render_figures(made.scene, target, settings, backend)
     seconds = time.monotonic() - started
     return Result(
