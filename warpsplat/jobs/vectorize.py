@@ -41,8 +41,8 @@ class Result:
     score: Score | None
     """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
     render_psnr: float
-    """Of the last training render against the image, at its size [dB]; of soft Gaussians, where the image is no
-    larger than that size, of the finished scene in 8 bits, as the file's is.
+    """Of the last training render against the image, at its size [dB]. Of soft Gaussians, where the image is
+    no larger than that size: of the finished scene in 8 bits, as the file's is.
     """
     estimated_psnr: float
     """Of the file at that size, as the training saw it: the last look at it may be 25 steps old [dB]."""
