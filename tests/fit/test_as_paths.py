@@ -59,4 +59,16 @@ def test_a_fill_is_as_opaque_as_its_middle(device: str, opacity: float) -> None:
     soft = seen(scene, device, soft=True)[inner, inner]
     path = as_paths(scene, SOFT.softness)
     assert path.opacities[0] == pytest.approx(soft.mean(), abs=0.06)
-    np.testing.assert_array_equal(path.points, scene.points)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("radius", [5, 15])
+def test_a_fill_keeps_its_mass(device: str, radius: int, turned: bool) -> None:
+    """Its soft edges lie outside of its outline, and so does the path; whichever way the outline runs."""
+    scene = disc(radius, 2 * radius + 16, radius + 8.2)
+    if turned:
+        scene = replace(scene, points=np.roll(scene.points[::-1], 1, axis=0))
+    soft = seen(scene, device, soft=True).sum()
+    assert seen(scene, device, soft=False).sum() < 0.9 * soft
+    path = seen(as_paths(scene, SOFT.softness), device, soft=False).sum()
+    assert path == pytest.approx(soft, rel=0.06)
