@@ -6,7 +6,6 @@ because a picture that silently lost something is worse than none.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -195,8 +194,8 @@ def _check(style: Style, tag: str, subpaths: list[Subpath], line: Line | None) -
         raise ImageError(f"uses shape-rendering {style['shape-rendering'][:40]!r}, not supported")
     if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")
-    reach = max(line.width if line else 0.0, *(float(np.abs(subpath.points).max()) for subpath in subpaths))
-    if not (math.isfinite(reach) and reach <= MAX_EXTENT):
+    reach = np.array([line.width if line else 0.0, *(np.abs(s.points).max() for s in subpaths)])
+    if not (reach <= MAX_EXTENT).all():  # what is no number is not either
         raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
 
 
