@@ -70,8 +70,14 @@ class _End:
     """Corners of what is seen of it, shape (4, 2)."""
 
 
-def read_shapes(text: str, width: int, height: int) -> list[Shape]:
+def read_shapes(text: str, width: int, height: int, scale: float | None = None) -> list[Shape]:
     """The shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
+
+    Args:
+        text: the SVG.
+        width: of the picture.
+        height: of the picture.
+        scale: magnification; None: the SVG fills the picture, which has its proportions.
 
     Raises:
         ImageError: not an SVG, of other proportions, or with something that would be lost. The message says
@@ -80,7 +86,7 @@ def read_shapes(text: str, width: int, height: int) -> list[Shape]:
     facts = inspect_svg(text)
     try:
         with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
-            return _Walk(Document(text)).shapes_in(*_canvas(facts.root, width, height))
+            return _Walk(Document(text)).shapes_in(*_canvas(facts.root, width, height, scale))
     except (ImageError, MemoryError):
         raise
     except Exception as error:  # arithmetic on absurd numbers overflows in many ways
@@ -88,14 +94,19 @@ def read_shapes(text: str, width: int, height: int) -> list[Shape]:
         raise ImageError(f"not an SVG that can be read: {cause or type(error).__name__}") from error
 
 
-def _canvas(root: dict[str, str], width: int, height: int) -> tuple[Matrix, Viewport]:
+def _canvas(
+    root: dict[str, str], width: int, height: int, magnified: float | None
+) -> tuple[Matrix, Viewport]:
     """Map of user units to canvas units, and what lengths refer to."""
     size = svg_size(root)
     if size is None:
         raise ImageError("says neither its size nor a viewBox")
-    if abs(size[0] / size[1] - width / height) > 0.02 * width / height + 0.5 / min(size):
-        raise ImageError(f"{size[0]:g}x{size[1]:g} does not have the proportions of the image")
-    scale = np.diag([width / size[0], height / size[1], 1.0])
+    if magnified is None:
+        if abs(size[0] / size[1] - width / height) > 0.02 * width / height:
+            raise ImageError(f"{size[0]:g}x{size[1]:g} does not have the proportions of the image")
+        scale = np.diag([width / size[0], height / size[1], 1.0])
+    else:
+        scale = np.diag([magnified, magnified, 1.0])
     view, box = view_box_map(root, *size), view_box(root)
     if view is None or box is None:
         return scale, Viewport(*size)
