@@ -9,8 +9,10 @@ import re
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal
 
+import numpy as np
+
 from warpsplat.errors import UsageError
-from warpsplat.scene import ATTRIBUTES, Basis, Kind
+from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
@@ -99,6 +101,9 @@ class Settings:
     """Whether gradients flow through the Gaussians' scales and angles."""
     viewer: bool = True
     """Whether the last steps take what a viewer shows, its rounding included, for the render."""
+    background: str = "auto"
+    """``auto``: that of the image, transparent where it has opacity; ``none``: transparent in any case; or a
+    colour, ``#rrggbb``, that shows through as well."""
     precision: int | None = None
     """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
     (``fit.rounding``)."""
@@ -147,6 +152,10 @@ class Settings:
             ("order", self.order, ("age", "area")),
             ("renderer", self.renderer, ("exact", "splat")),
         )
+        if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
+            raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
+        if self.background == "none" and self.renderer != "exact":
+            raise UsageError(f"the renderer {self.renderer} has no transparent background")
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
@@ -155,6 +164,16 @@ class Settings:
         """A short hash of all that decides the result."""
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+def solid_color(background: str) -> FloatArray | None:
+    """The colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if it names none."""
+    if not COLOR.fullmatch(background):
+        return None
+    return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
 
 
 DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
