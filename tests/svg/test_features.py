@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.svg.foreign import HEAD, ROUND
+from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
@@ -161,9 +162,10 @@ def test_twins_are_one_path() -> None:
     assert write_svg(scene).count("<path") == 2
 
 
-def test_links_that_multiply_are_refused() -> None:
+def test_links_that_multiply_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpsplat.svg.structure.MAX_LINKED", 1000)
     layers = '<g id="g0"><path d="M1 1h9v9z"/></g>'
     for i in range(9):
         layers += f'<g id="g{i + 1}">' + f'<use href="#g{i}"/>' * 10 + "</g>"
-    with pytest.raises(Exception, match="links add up to more than"):
+    with pytest.raises(ImageError, match="links add up to more than"):
         _read(f"<defs>{layers}</defs><use href='#g9'/>")

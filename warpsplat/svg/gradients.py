@@ -10,9 +10,9 @@ import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.svg.document import Document, Element, name_of
-from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, translation
+from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, tight_box, translation
 from warpsplat.svg.inspect import NUMBER
-from warpsplat.svg.paths import Points
+from warpsplat.svg.paths import Subpath
 from warpsplat.svg.style import Style
 from warpsplat.svg.values import Color, Viewport, fraction, parse_color
 
@@ -53,7 +53,7 @@ LINK = re.compile(r"""url\(\s*(["']?)\s*#?(.*?)\s*\1\s*\)\s*(.*)""", re.DOTALL)
 
 
 def resolve_paint(
-    text: str, style: Style, document: Document, viewport: Viewport, box: Points, matrix: Matrix
+    text: str, style: Style, document: Document, viewport: Viewport, subpaths: list[Subpath], matrix: Matrix
 ) -> Colouring | None:
     """What a shape is painted with; None for nothing.
 
@@ -62,7 +62,7 @@ def resolve_paint(
         style: of the shape.
         document: where gradients are.
         viewport: what lengths refer to.
-        box: of the shape [user units], see ``tight_box``.
+        subpaths: of the shape [user units].
         matrix: map of user units to those of the canvas.
 
     Raises:
@@ -79,7 +79,7 @@ def resolve_paint(
         raise ImageError(f"uses <{name_of(element)}>, not supported")
     if name_of(element) not in GRADIENTS:
         return None
-    return _gradient(element, document, viewport, box, matrix, fallback)
+    return _gradient(element, document, viewport, subpaths, matrix, fallback)
 
 
 def flat_paint(text: str, style: Style) -> Flat | None:
@@ -99,7 +99,7 @@ def _gradient(
     element: Element,
     document: Document,
     viewport: Viewport,
-    box: Points,
+    subpaths: list[Subpath],
     matrix: Matrix,
     fallback: Flat | None,
 ) -> Colouring | None:
@@ -118,6 +118,7 @@ def _gradient(
         return next((e.attrib[name] for e in alike if name_of(e) in GRADIENTS), None)
 
     of_box = said("gradientUnits") != "userSpaceOnUse"
+    box = tight_box(subpaths)
     extent = box[1] - box[0]
     if of_box and not (extent > 0).all():
         return fallback

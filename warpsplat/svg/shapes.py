@@ -95,9 +95,8 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
     own = cubics(data, keep_dots=line is not None and line.cap != Cap.BUTT)
     if not own:
         return []
-    box = tight_box(own)
     fill, stroke = (
-        _paint(name, style, document, place, box) if wanted else None
+        _paint(name, style, document, place, own) if wanted else None
         for name, wanted in (("fill", tag != "line"), ("stroke", line is not None))
     )
     subpaths = [subpath.moved(place.matrix[:2, :2], place.matrix[:2, 2]) for subpath in own]
@@ -121,7 +120,7 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
 ANIMATIONS = {"animate", "animateTransform", "animateMotion", "set"}
 
 
-def _paint(name: str, style: Style, document: Document, place: Place, box: Points) -> Colouring | None:
+def _paint(name: str, style: Style, document: Document, place: Place, own: list[Subpath]) -> Colouring | None:
     """What a shape is filled or stroked with; None for nothing."""
     text = style[name].strip()
     if text in CONTEXTS:
@@ -130,7 +129,7 @@ def _paint(name: str, style: Style, document: Document, place: Place, box: Point
             raise ImageError("uses the gradient of a context, not supported")
     if name == "stroke" and "url(" not in text and text.lower() not in {"none", "currentcolor"}:
         text = text if parse_color(text) else "none"
-    return resolve_paint(text, style, document, place.viewport, box, place.matrix)
+    return resolve_paint(text, style, document, place.viewport, own, place.matrix)
 
 
 CONTEXTS = ("context-fill", "context-stroke")

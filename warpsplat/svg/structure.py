@@ -27,7 +27,7 @@ from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
 from warpsplat.svg.style import DRAWN, ROOT, Style
 from warpsplat.svg.values import Viewport, fraction, parse_color
 
-MAX_LINKED = 200_000
+MAX_LINKED = 100_000
 """Most elements that links may add up to: they may multiply."""
 
 MAX_DEPTH = 1000
