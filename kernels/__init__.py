@@ -16,6 +16,8 @@ Conventions and glossary, here once:
   not fit into the capacity.
 * Gaussians lie on a grid of **rows** across a shape and **stations** along it, number
   ``gaussian_first + row * stations + station``. Stations fall into **runs**: neighbours only inside a run.
+* The **strength** of a soft Gaussian is its opacity inside the product over its shape's Gaussians; the
+  **fades** of a stroke are what its thirds add to its opacity.
 * A **slot** is one (shape, tile) pair. The slots of a shape are the tiles of its bounding rectangle, row by
   row, shapes from the front to the back, so that the slot of a pixel is found by arithmetic. Its **state**
   says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there is a coverage to
@@ -36,5 +38,6 @@ Data flow of a step (forward, then its adjoint in reverse order)::
 
     points         --outline-->  vertices    --bins-->  slots by tile  --coverage/fill, stroke-->  coverage
     points, widths --grid-->     Gaussians   --bins-->  slots by tile  --coverage/splat-->         coverage
+    shapes         --grid/soft--> Gaussians  --bins-->  slots by tile  --coverage/gaussian-->      coverage
     coverage, paint --composite--> image --loss--> image_grad      gradients --adam--> new parameters
 """

@@ -6,6 +6,10 @@ FILL = 0
 STROKE = 1
 """Kinds of shapes: a closed ring of cubics that is painted inside, a chain of cubics painted along."""
 
+STYLED = 2
+"""Of exact coverage, the part of those strokes that are drawn as polygons, as they have dashes, or caps or
+joins that are not round; the others' parts are their kinds."""
+
 CUBIC = 0
 SPLINE = 1
 """Bases of a shape's control points: a chain of cubic Béziers (points 0, 3, 6 ... lie on the outline), or a
@@ -38,6 +42,18 @@ REPEAT = 2
 NONE = -1
 """No such row."""
 
+SEGMENT_MIN = 1.0e-3
+"""Length [px] below which a piece of a stroke's centre line has no direction, and no part in its length."""
+
+DASH_PERIOD_MIN = 0.5
+"""Shortest pattern of dashes that is drawn [px]; shorter ones are drawn a whole number of times larger."""
+
+CORNERS_MAX = 2**25
+"""Corners of a stroke's polygons beyond which they are not counted further: more than any capacity."""
+
+MITERED = -1.0
+"""Radius of a corner of a stroke that is the tip of a mitre."""
+
 TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
 
@@ -54,6 +70,9 @@ Q_INNER = 6.0
 off (g < 0.05) raises 1 - coverage by a seventh of its 0.015; and it is where inner rows would reach out of
 the shape."""
 
+Q_SOFT = 9.0
+"""The cut of soft Gaussians, at three standard deviations as in 3D Gaussian splatting."""
+
 GAUSSIAN_MAX = 0.99
 """Peak of one Gaussian. Below 1 so that 1 - g can divide in the adjoint; the clamp is the same forward and
 backward, and a clamped Gaussian has no gradient."""
@@ -63,6 +82,12 @@ TRANSMITTANCE_MIN = 1.0e-4
 
 SPREAD = 2.0 / 3.0
 """1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""
+
+WIDTH_SIGMA = 0.4
+"""Standard deviation across a soft stroke, over its width: opaque, it covers half at half the width."""
+
+PIXEL_VARIANCE = 1.0 / 12.0
+"""Of a pixel's area [px squared]: what looking at a soft Gaussian through it adds to its variance."""
 
 PIXEL_SIGMA = 0.13
 """Standard deviation [px] added in quadrature to both scales, so that no Gaussian vanishes. The softer the

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Rule, Scene
+from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Rule, Scene
+from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import starts_of
 
@@ -211,4 +213,63 @@ def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> 
         (np.array(points)[None] * radius + centre).astype(np.float32),
         colors=np.ones((1, 3), np.float32),
         opacities=np.ones(1, np.float32),
+    )
+
+
+DASHES = (
+    (0.0, 7.0, 5.0),
+    (-3.0, 9.0, 6.5, 2.0, 7.0),
+    (2.5, 0.0, 6.0),
+    (1.0, 300.0, 5.0),
+)
+"""Patterns that begin anywhere, of several dashes, of dots, and longer than what they are on."""
+
+
+def styled_scene(cap: Cap, join: Join, dash: int = NO_DASHES, *, seed: int = 0, limit: float = 4.0) -> Scene:
+    """Shapes of several contours, closed and open, smooth and with corners, drawn in a style."""
+    scene = contours_scene(Kind.STROKE, seed=seed)
+    count = len(scene)
+    return replace(
+        scene,
+        cap=np.full(count, cap, np.int32),
+        join=np.full(count, join, np.int32),
+        miter_limits=np.full(count, limit, np.float32),
+        dash=np.full(count, dash, np.int32),
+        dashes=DASHES,
+    )
+
+
+def polyline_scene(
+    contours: Sequence[tuple[Sequence[tuple[float, float]], bool]],
+    width: float,
+    size: tuple[int, int] = (64, 64),
+    *,
+    cap: Cap,
+    join: Join,
+    miter_limits: float = 4.0,
+    dash: int = NO_DASHES,
+    dashes: tuple[tuple[float, ...], ...] = (),
+) -> Scene:
+    """A white stroke on black along straight lines, closed or not."""
+    points = []
+    for corners, closed in contours:
+        ring = np.array([*corners, corners[0]] if closed else corners, np.float64)
+        sides = [a + (b - a) * t for a, b in itertools.pairwise(ring) for t in (0, 1 / 3, 2 / 3)]
+        points.append(np.array(sides if closed else [*sides, ring[-1]]))
+    counts = np.array([len(own) for own in points])
+    return Scene.of(
+        Canvas(*size, np.zeros(3, np.float32)),
+        np.array([Kind.STROKE], np.int32),
+        np.array([0, counts.sum()], np.int32),
+        starts=starts_of(counts),
+        closed=np.array([closed for _, closed in contours], np.int32),
+        points=np.concatenate(points).astype(np.float32),
+        colors=np.ones((1, 3), np.float32),
+        opacities=np.ones(1, np.float32),
+        widths=np.array([width], np.float32),
+        cap=np.array([cap], np.int32),
+        join=np.array([join], np.int32),
+        miter_limits=np.array([miter_limits], np.float32),
+        dash=np.array([dash], np.int32),
+        dashes=dashes,
     )

@@ -18,7 +18,6 @@ from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FILL = wp.constant(constants.FILL)
 NONZERO = wp.constant(constants.NONZERO)
 EVENODD = wp.constant(constants.EVENODD)
 TILE = wp.constant(constants.TILE)
@@ -66,7 +65,8 @@ def crossing(a: wp.vec2, b: wp.vec2, y: wp.float32) -> wp.int32:
 def fill_states(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
+    own_part: wp.int32,  # of the shapes to cover
+    part: wp.array[wp.int32],  # [shape_count]
     rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [shape_count]
@@ -89,7 +89,7 @@ def fill_states(
     shape = row[0]
     if shape < 0:
         return
-    if kind[shape] != FILL:
+    if part[shape] != own_part:
         return
     wide = row[2]
     low = float(TILE * row[3])
@@ -282,7 +282,8 @@ def fill_forward(
     # In:
     offset: wp.int32,
     lane_rows: wp.int32,  # pixel rows of a tile that a thread handles: one, or all
-    kind: wp.array[wp.int32],  # [shape_count]
+    own_part: wp.int32,  # of the shapes to cover
+    part: wp.array[wp.int32],  # [shape_count]
     rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [shape_count]
@@ -306,7 +307,7 @@ def fill_forward(
     shape = row[0]
     if shape < 0:
         return
-    if kind[shape] != FILL:
+    if part[shape] != own_part:
         return
     end = slot + row[2]
     if not any_visible(slot_state, slot, end):
@@ -362,7 +363,8 @@ def leaves_at(border: wp.int32, a: wp.float32, d: wp.float32, inverse: wp.float3
 def fill_backward(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
+    own_part: wp.int32,  # of the shapes to cover
+    part: wp.array[wp.int32],  # [shape_count]
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
     vertex_first: wp.array[wp.int32],  # [shape_count]
@@ -383,7 +385,7 @@ def fill_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if kind[shape] != FILL or i < vertex_first[shape] or i >= vertex_last[shape]:
+    if part[shape] != own_part or i < vertex_first[shape] or i >= vertex_last[shape]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)

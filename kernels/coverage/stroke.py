@@ -276,7 +276,7 @@ def stroke_forward(
     lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [shape_count]
-    kind: wp.array[wp.int32],  # [shape_count]
+    part: wp.array[wp.int32],  # [shape_count]
     widths: wp.array[wp.float32],  # [shape_count] canvas units
     scale: wp.float32,
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
@@ -300,7 +300,7 @@ def stroke_forward(
     shape = row[0]
     if shape < 0:
         return
-    if kind[shape] != STROKE:
+    if part[shape] != STROKE:
         return
     half = half_width(widths[shape], scale)
     reach = half + HALF_DIAGONAL
@@ -356,7 +356,7 @@ def stroke_backward(
     offset: wp.int32,
     width: wp.int32,  # px
     height: wp.int32,  # px
-    kind: wp.array[wp.int32],  # [shape_count]
+    part: wp.array[wp.int32],  # [shape_count]
     widths: wp.array[wp.float32],  # [shape_count] canvas units
     scale: wp.float32,
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
@@ -381,7 +381,7 @@ def stroke_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if kind[shape] != STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
+    if part[shape] != STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
@@ -437,7 +437,7 @@ def stroke_backward(
 def widths_backward(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
+    part: wp.array[wp.int32],  # [shape_count]
     scale: wp.float32,
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
@@ -447,7 +447,7 @@ def widths_backward(
 ):
     """One thread a shape sums its segments in order."""
     shape = offset + wp.tid()
-    if kind[shape] != STROKE:
+    if part[shape] != STROKE:
         return
     total = float(0.0)
     for i in range(vertex_first[shape], vertex_last[shape]):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import torch
 
+from tests.reference import stroker
 from tests.reference.composite import pixel_centres
 from tests.reference.curves import Tensors, points_of
 from tests.reference.outline import polyline
-from warpsplat.scene import Basis, Kind, Rule, Scene
+from warpsplat.scene import Basis, Cap, Join, Kind, Rule, Scene
+from warpsplat.scene.attributes import NO_DASHES
 
 
 def ramp_integral(u: torch.Tensor) -> torch.Tensor:
@@ -89,12 +91,33 @@ def coverages(
     for shape, count in enumerate(pieces):
         basis = Basis(int(scene.basis[shape]))
         points, rest, lines = scale * points_of(scene, p, shape), count, []
+        corners = []
         for own, closed in scene.contours_of(shape):
             beziers = len(own) // 3 if basis == Basis.CUBIC else len(own) - 2 * (not closed)
             lines.append(polyline(points[: len(own)], rest[:beziers], closed, basis))
+            corners.append([k == 0 for n in rest[:beziers] for k in range(n)])
             points, rest = points[len(own) :], rest[beziers:]
+        half = scale * p["widths"][shape] / 2
         if scene.kind[shape] == Kind.FILL:
             covers.append(inside(fill_area(lines, width, height), Rule(int(scene.rule[shape]))))
+        elif style := style_of(scene, shape, half, scale):
+            closed_ones = [closed for _, closed in scene.contours_of(shape)]
+            drawn = [
+                torch.stack(polygon)
+                for each in zip(lines, corners, closed_ones, strict=True)
+                for polygon in stroker.polygons(*each, style)
+            ]
+            area = fill_area(drawn, width, height) if drawn else torch.zeros((height, width))
+            covers.append(inside(area, Rule.NONZERO))
         else:
-            covers.append(stroke_coverage(lines, scale * p["widths"][shape] / 2, width, height))
+            covers.append(stroke_coverage(lines, half, width, height))
     return covers
+
+
+def style_of(scene: Scene, shape: int, half: torch.Tensor, scale: float) -> stroker.Style | None:
+    """Of a stroke that is not round throughout."""
+    cap, join, row = Cap(int(scene.cap[shape])), Join(int(scene.join[shape])), int(scene.dash[shape])
+    if cap == Cap.ROUND and join == Join.ROUND and row == NO_DASHES:
+        return None
+    dashes = () if row == NO_DASHES else tuple(scale * x for x in scene.dashes[row])
+    return stroker.Style(half, cap, join, float(scene.miter_limits[shape]), dashes)

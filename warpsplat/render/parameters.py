@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
+from warpsplat.kernels import constants
 from warpsplat.kernels.constants import NONE
 from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
 from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
+from warpsplat.scene.attributes import NO_DASHES, Cap, Join
 from warpsplat.scene.scene import starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
@@ -56,6 +58,7 @@ class Parameters:
         self.contour_count, self.bezier_count = len(owner), int(in_shape.sum())
         self.arrays: dict[str, wp.array] = {
             "kind": self._ints(scene.kind),
+            "part": self._ints(parts := _parts(scene)),
             "basis": self._ints(scene.basis),
             "rule": self._ints(scene.rule),
             "paint": self._ints(scene.paint),
@@ -76,6 +79,10 @@ class Parameters:
         self.has_twins = bool(scene.twin.any())
         if self.has_twins:
             self.arrays["point_twin"] = self._ints(_twins(scene))
+        self.parts = tuple(np.unique(parts).tolist())
+        """Of exact coverage, that there are shapes of."""
+        if constants.STYLED in self.parts:
+            self._upload_styles(scene)
         owners = {
             "point": self.arrays["point_shape"],
             "shape": self._ints(shapes),
@@ -92,6 +99,18 @@ class Parameters:
             rows = (value.shape[0],)
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
+
+    def _upload_styles(self, scene: Scene) -> None:
+        lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
+        numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
+        self.arrays |= {
+            "cap": self._ints(scene.cap),
+            "join": self._ints(scene.join),
+            "miter_limits": wp.array(scene.miter_limits, dtype=wp.float32, device=self.backend.device),
+            "dash": self._ints(scene.dash),
+            "dash_first": self._ints(starts_of(lengths)),
+            "dashes": wp.array(numbers, dtype=wp.float32, device=self.backend.device),
+        }
 
     def _ints(self, values: np.ndarray) -> wp.array:
         return wp.array(np.ascontiguousarray(values, np.int32), dtype=wp.int32, device=self.backend.device)
@@ -182,6 +201,12 @@ class Parameters:
         moments = carried("moment1"), carried("moment2")
         self._upload(before.take(keep).append(added), moments, ages)
         self.revision += 1
+
+
+def _parts(scene: Scene) -> np.ndarray:
+    """Which part of exact coverage each shape belongs to."""
+    plain = (scene.cap == Cap.ROUND) & (scene.join == Join.ROUND) & (scene.dash == NO_DASHES)
+    return np.where((scene.kind == Kind.STROKE) & ~plain, constants.STYLED, scene.kind)
 
 
 def _twins(scene: Scene) -> IndexArray:
