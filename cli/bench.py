@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Any
+from typing import Any, get_args
 
 import click
 
 from warpsplat.cli.options import threads_option
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
+from warpsplat.fit.settings import Renderer
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -53,7 +54,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @click.option("--curves", type=click.IntRange(1, 100_000), default=512, show_default=True, metavar="N")
 @click.option("--size", default="768x512", show_default=True, metavar="WxH", help="Of the canvas [px].")
 @click.option("--kind", type=click.Choice(["closed", "open"]), default="closed", show_default=True)
-@click.option("--renderer", type=click.Choice(["exact", "splat"]), default="exact", show_default=True)
+@click.option("--renderer", type=click.Choice(get_args(Renderer)), default="exact", show_default=True)
 @click.option("--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True)
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, or cuda:N.")
 @threads_option

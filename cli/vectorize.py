@@ -31,6 +31,8 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
     ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
+    if values["renderer"] == "gaussian":
+        psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
         f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "

@@ -70,6 +70,9 @@ Q_INNER = 6.0
 off (g < 0.05) raises 1 - coverage by a seventh of its 0.015; and it is where inner rows would reach out of
 the shape."""
 
+Q_SOFT = 9.0
+"""The cut of soft Gaussians, at three standard deviations as in 3D Gaussian splatting."""
+
 GAUSSIAN_MAX = 0.99
 """Peak of one Gaussian. Below 1 so that 1 - g can divide in the adjoint; the clamp is the same forward and
 backward, and a clamped Gaussian has no gradient."""
@@ -79,6 +82,12 @@ TRANSMITTANCE_MIN = 1.0e-4
 
 SPREAD = 2.0 / 3.0
 """1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""
+
+WIDTH_SIGMA = 0.4
+"""Standard deviation across a soft stroke, over its width: opaque, it covers half at half the width."""
+
+PIXEL_VARIANCE = 1.0 / 12.0
+"""Of a pixel's area [px squared]: what looking at a soft Gaussian through it adds to its variance."""
 
 PIXEL_SIGMA = 0.13
 """Standard deviation [px] added in quadrature to both scales, so that no Gaussian vanishes. The softer the

@@ -1,6 +1,6 @@
 """The scenes of the tests to look at: ``python -m tests.look [FOLDER]`` writes ``scenes.png`` and their SVGs.
 
-A row a scene: by the exact model, by splats, and its file by resvg.
+A row a scene: by the exact model, by splats, by soft Gaussians, and its file by resvg.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from PIL import Image
 
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.render.backend import Backend
-from warpsplat.render.models import EXACT, Model, SplatModel
+from warpsplat.render.models import EXACT, GaussianModel, Model, SplatModel
 from warpsplat.render.renderer import render
 from warpsplat.scene import Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
@@ -34,7 +34,7 @@ GAP = 8
 
 def row(scene: Scene, text: str) -> np.ndarray:
     """The scene by each renderer, side by side, every pixel as a square of ZOOM x ZOOM."""
-    models: tuple[Model, ...] = (EXACT, SplatModel())
+    models: tuple[Model, ...] = (EXACT, SplatModel(), GaussianModel())
     ours = [255.0 * render(scene, model=model, backend=Backend.on("cpu")) for model in models]
     shown = [np.round(pixels).astype(np.uint8) for pixels in (*ours, on_white(render_svg(text)))]
     large = [pixels.repeat(ZOOM, axis=0).repeat(ZOOM, axis=1) for pixels in shown]

@@ -13,7 +13,7 @@ from warpsplat.fit.settings import (
     parse_bytes,
     parse_duration,
 )
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind
 
 
 def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
@@ -40,6 +40,27 @@ def test_splats_get_fewer_iterations_unless_told() -> None:
     assert make_settings(renderer="splat", iterations=77).iterations == 77
 
 
+def test_rates_and_density_may_be_given_in_part() -> None:
+    settings = make_settings(rates={"points": 1.5}, density={"interval": 400, "opacity-start": 0.3})
+    plain = make_settings()
+    assert settings.rates == {**plain.rates, "points": 1.5}
+    assert settings.density == replace(plain.density, interval=400, opacity_start=0.3)
+    for bad in ({"rates": {"point": 1.0}}, {"density": {"intervall": 3}}):
+        with pytest.raises(UsageError, match=r"unknown setting .(point|intervall)"):
+            make_settings(**bad)
+
+
+def test_soft_gaussians_are_trained_on_their_own_render() -> None:
+    settings = make_settings(renderer="gaussian")
+    assert (settings.basis, settings.order, settings.viewer) == (Basis.CUBIC, "area", False)
+    assert make_settings(renderer="gaussian", order="age").order == "age"
+
+
+def test_splats_and_splines_do_not_go_together() -> None:
+    with pytest.raises(UsageError, match="splat needs the basis cubic"):
+        make_settings(renderer="splat", basis="spline")
+
+
 def test_overrides_win_and_none_is_left_out() -> None:
     settings = make_settings("draft", curves=7, seed=None)
     assert (settings.curves, settings.seed) == (7, Settings().seed)
@@ -48,7 +69,9 @@ def test_overrides_win_and_none_is_left_out() -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [("curves", 0), ("curves", -3), ("curves", 1.5), ("curves", "many"), ("curves", True), ("seed", -1)]
-    + [("iterations", 0), ("precision", 9), ("kind", "round"), ("colour", 3)],
+    + [("iterations", 0), ("precision", 9), ("kind", "round"), ("colour", 3)]
+    + [("coarse", 1.5), ("xing", -1), ("texture", "no"), ("viewer", 1), ("basis", "quartic"), ("basis", 7)]
+    + [("order", "size"), ("softness", float("nan")), ("density", {"stop": 2}), ("rates", {"points": -1})],
 )
 def test_bad_values(name: str, value: object) -> None:
     with pytest.raises(UsageError, match=name):

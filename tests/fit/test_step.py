@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from tests.scenes import mixed_scene
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases
-from warpsplat.fit.settings import Density, Settings, make_settings
+from warpsplat.fit.settings import Density, Renderer, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
@@ -76,7 +78,7 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
 def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     """All that the package has, found by walking it: a graph can hold it, and something launches it."""
     launched = {"removal_cost"}  # between steps
-    for renderer in ("exact", "splat"):
+    for renderer in get_args(Renderer):
         settings = make_settings(renderer=renderer, iterations=50, xing=0.01)
         scene = mixed_scene(64, 48, splines=renderer == "exact")
         step = step_for(picture(), settings, device, threads=1, scene=scene)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -12,11 +13,12 @@ from tests.cli.helpers import run
 from tests.jobs.helpers import write
 from tests.scenes import random_scene
 from warpsplat.errors import UsageError
-from warpsplat.fit.settings import make_settings
+from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.batch_file import MAX_FILE
-from warpsplat.jobs.plan import load_jobs
+from warpsplat.jobs.plan import KEYS, load_jobs
+from warpsplat.jobs.research import UNSET
 from warpsplat.jobs.vectorize import job_key
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import write_svg
 
 
@@ -47,6 +49,36 @@ jobs:
     assert [j.settings.curves for j in jobs] == [9, 9, 9, 5, 5]
     assert jobs[3].settings.iterations == make_settings("draft").iterations
     assert {j.device for j in jobs} == {"cpu"}
+
+
+def test_every_setting_is_a_key(folder: Path) -> None:
+    """Those of researchers as well, in the defaults and over them."""
+    named = {name.replace("-", "_") for name in KEYS} | {"kind", *UNSET}
+    assert {f.name for f in fields(Settings)} <= named
+    first, second = load_jobs(
+        write(
+            folder,
+            """
+defaults:
+  renderer: gaussian
+  xing: 0.01
+  order: age
+  through-scales: false
+  rates: {points: 0.5, colors: 0.01}
+  density: {interval: 400, opacity-start: 0.3}
+jobs:
+  - images: in/a.png
+  - images: in/b.jpg
+    renderer: exact
+    basis: spline
+    density: {interval: 100}
+""",
+        )
+    )
+    assert (first.settings.order, first.settings.xing, first.settings.through_scales) == ("age", 0.01, False)
+    assert (first.settings.rates["points"], first.settings.rates["colors"]) == (0.5, 0.01)
+    assert (second.settings.renderer, second.settings.basis) == ("exact", Basis.SPLINE)
+    assert (second.settings.density.interval, second.settings.density.opacity_start) == (100, 0.3)
 
 
 def test_without_output_beside_the_image(folder: Path) -> None:
@@ -97,6 +129,13 @@ BAD = [
     ("jobs:\n  - images: " + "x" * 5000 + ".png\n", 2, "characters"),
     ("jobs:\n  - images: in/a.png\n    curves: &a [1, *a]\n", 3, "plain value"),
     ("jobs:\n  - images: in/a.png\n    curves: [[1, 2]]\n", 3, "one value"),
+    ("jobs:\n  - images: in/a.png\n    order: size\n", 3, "order"),
+    ("jobs:\n  - images: in/a.png\n    coarse: many\n", 3, "coarse"),
+    ("jobs:\n  - images: in/a.png\n    rates: 3\n", 3, "rates"),
+    ("jobs:\n  - images: in/a.png\n    rates:\n      points: [1]\n", 4, "rates: points"),
+    ("jobs:\n  - images: in/a.png\n    density:\n      intervall: 3\n", 4, "intervall"),
+    ("jobs:\n  - images: in/a.png\n    density:\n      interval: 0.5\n", 4, "density: interval"),
+    ("jobs:\n  - images: in/a.png\n    renderer: splat\n    basis: spline\n", 2, "needs the basis cubic"),
     ("? &a [*a]\n: 1\n", 1, "unknown key"),
     ("jobs:\n  - \x01\n", 2, "not allowed"),
 ]
@@ -133,7 +172,7 @@ def test_examples_are_valid(tmp_path: Path) -> None:
     examples = sorted(Path(p) for p in warpsplat.configs.__path__)[0]
     files = sorted(examples.glob("*.yaml"))
     assert files
-    for name in ("photos/a.jpg", "photos/b.png", "more/x/c.png", "portrait.png"):
+    for name in ("photos/a.jpg", "photos/b.png", "more/x/c.png", "portrait.png", "kodak/a.png"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     for file in files:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from tests import ROOT
 from tests.fit.pictures import picture
+from warpsplat.cli.vectorize import summary
 from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
-from warpsplat.jobs.vectorize import has_time_for_eyes, vectorize
+from warpsplat.jobs.vectorize import has_time_for_eyes, render_figures, vectorize
 from warpsplat.render.backend import Backend
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
@@ -23,7 +26,7 @@ CAT = ROOT / "docs" / "images" / "cat.jpg"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("renderer", ["exact", "splat"])
+@pytest.mark.parametrize("renderer", get_args(Renderer))
 def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: Renderer) -> None:
     settings = make_settings(
         kind=kind, renderer=renderer, curves=16, iterations=40, seed=3, coarse_pixels=1000
@@ -195,6 +198,27 @@ def test_a_simple_image_gets_fewer_shapes_unless_told(device: str) -> None:
     assert len(vectorize(target, settings, Backend.on(device)).scene) == 32
     told = make_settings(iterations=5, curves=50)
     assert len(vectorize(target, told, Backend.on(device)).scene) == 50
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_soft_gaussians_have_two_figures(device: str, kind: Kind) -> None:
+    """That of their own render, which the scene gives again, and that of the file."""
+    settings = make_settings(curves=60, iterations=60, renderer="gaussian", kind=kind)
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert result.score.paths == 60
+    values = result.as_dict()
+    assert (values["renderer"], values["psnr"]) == ("gaussian", round(result.score.psnr, 3))
+    again = render_figures(result.scene, picture(), settings, Backend.on(device))
+    assert (result.render_psnr, result.render_ssim) == again
+    assert result.render_psnr > 24
+    assert result.render_psnr > result.score.psnr > 14
+    reduced = vectorize(picture(), replace(settings, fine_pixels=500, iterations=3), Backend.on(device))
+    assert reduced.render_ssim is None, "an image that is larger than what was trained on"
+    larger, _ = render_figures(result.scene, picture(), settings, Backend.on(device), scale=2)
+    assert larger == pytest.approx(result.render_psnr, abs=1)
+    said = summary(Path("a.svg"), values)
+    assert f"the soft render {result.render_psnr:.2f} dB, the file {result.score.psnr:.2f} dB" in said
 
 
 def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str) -> None:

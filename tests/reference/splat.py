@@ -37,7 +37,13 @@ def gaussians(
 
 
 def gaussian_values(
-    mean: torch.Tensor, scale: torch.Tensor, angle: torch.Tensor, cut: torch.Tensor, width: int, height: int
+    mean: torch.Tensor,
+    scale: torch.Tensor,
+    angle: torch.Tensor,
+    cut: torch.Tensor,
+    width: int,
+    height: int,
+    most: float = k.GAUSSIAN_MAX,
 ) -> torch.Tensor:
     """g of each Gaussian at each pixel, [n, height, width] (paper eq. 9 to 11), cut and clamped."""
     rotation = torch.stack(
@@ -47,7 +53,7 @@ def gaussian_values(
     inverse = torch.linalg.inv(rs @ rs.transpose(1, 2))
     d = pixel_centres(width, height)[None] - mean[:, None, None, :]
     q = torch.einsum("nhwi,nij,nhwj->nhw", d, inverse, d)
-    g = torch.exp(-0.5 * q).clamp(max=k.GAUSSIAN_MAX)
+    g = torch.exp(-0.5 * q).clamp(max=most)
     return torch.where(q <= cut[:, None, None], g, torch.zeros_like(g))
 
 

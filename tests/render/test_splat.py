@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from tests.helpers import (
 from tests.reference import splat as reference
 from tests.reference.curves import tensors
 from tests.reference.grid import grids, runs_of
-from tests.scenes import disc, random_scene
+from tests.scenes import canvas, disc, random_scene
 from warpsplat.errors import CapacityError
 from warpsplat.kernels.constants import TILE, TILE_PIXELS
 from warpsplat.kernels.coverage import splat
@@ -219,3 +220,33 @@ def test_translation_moves_the_image(device: str) -> None:
     moved = replace(inner, points=inner.points + np.float32(16))
     a, b = splatted(inner, device), splatted(moved, device)
     np.testing.assert_allclose(b[16:, 16:], a[:-16, :-16], atol=3e-3)
+
+
+@pytest.mark.parametrize("cuts", [(0.5,), (0.1, 0.15, 0.9), (0.01, 0.02, 0.03, 0.04), (0.2, 0.4, 0.6, 0.8)])
+def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tuple[float, ...]) -> None:
+    """One cubic cut into several, of equal and of unequal lengths."""
+    whole = np.array([[8, 50], [20, -10], [44, 80], [56, 10]], np.float64)
+
+    def piece(a: float, b: float) -> np.ndarray:
+        return np.array([blossom(*at) for at in ((a, a, a), (a, a, b), (a, b, b), (b, b, b))])
+
+    def blossom(*at: float) -> np.ndarray:
+        p = whole
+        for t in at:
+            p = (1 - t) * p[:-1] + t * p[1:]
+        return p[0]
+
+    pieces = [piece(a, b) for a, b in itertools.pairwise((0.0, *cuts, 1.0))]
+    chain = np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
+    pictures = []
+    for points in (whole, chain):
+        scene = Scene.uniform(
+            STROKE,
+            canvas(64, 64),
+            points[None].astype(np.float32),
+            colors=np.ones((1, 3), np.float32),
+            opacities=np.full(1, 0.9, np.float32),
+            widths=np.full(1, 6, np.float32),
+        )
+        pictures.append(splatted(scene, device))
+    assert np.abs(pictures[0] - pictures[1]).mean() < 3e-3

@@ -1,4 +1,7 @@
-"""What is empty in the picture is empty in the file: outlines that spill over draw back."""
+"""What is empty in the picture is empty in the file: outlines that spill over draw back.
+
+Spikes without area, which coarse fits of small pictures have, may leave a few pixels.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,9 @@ STEP = 0.2
 
 PATIENCE = 8
 """Rounds after which points move twice as far, then three times, and so on."""
+
+THIN = 0.02
+"""Opacity at which it is measured what spills over."""
 
 LEAST = 0.05
 """Weight of a pixel beside one that is not empty though it should."""
@@ -68,7 +74,9 @@ def _drawn_back(scene: Scene, spill: npt.NDArray[np.bool_], backend: Backend, st
     ``step`` [px] at the most.
     """
     height, width = spill.shape
-    renderer = Renderer(Parameters(scene, backend), Viewport(width, height, 1.0))
+    # So thin that none hides another: all of them have to go.
+    thin = replace(scene, opacities=np.full_like(scene.opacities, THIN))
+    renderer = Renderer(Parameters(thin, backend), Viewport(width, height, 1.0))
     renderer.forward_complete()
     gradient = np.zeros((height, width, 4), np.float32)
     # A viewer's rounding may show what has no coverage here: the pixels around count a little as well.

@@ -60,7 +60,7 @@ def _alike(
 
 def prune_mask(scene: Scene, density: Density, progress: float) -> BoolArray:
     """True for the shapes to remove: faint, tiny, broken or doubled."""
-    doomed = scene.opacities < opacity_threshold(density, progress)
+    doomed = scene.opacities + scene.fades.mean(axis=1) < opacity_threshold(density, progress)
     # A small canvas with many shapes has no room for shapes of the usual least area.
     share = scene.canvas.width * scene.canvas.height / max(len(scene), 1)
     doomed |= areas(scene) < min(density.area, 0.1 * share)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from warpsplat.fit.as_paths import as_paths
 from warpsplat.fit.settings import Settings
 from warpsplat.kernels import constants
 from warpsplat.scene import Scene
@@ -10,5 +11,7 @@ from warpsplat.svg.write import write_svg
 
 def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
     """The file that ``settings`` ask for, with ``per_pixel`` units of its view box a pixel."""
+    if settings.renderer == "gaussian":
+        scene = as_paths(scene, settings.softness)
     plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
     return write_svg(scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau)

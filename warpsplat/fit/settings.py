@@ -6,8 +6,9 @@ import hashlib
 import json
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -16,7 +17,47 @@ from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
-Renderer = Literal["exact", "splat"]
+Renderer = Literal["exact", "splat", "gaussian"]
+
+
+FRACTION = (0.0, 1.0)
+WEIGHT = (0.0, 1e6)
+RANGES: dict[str, tuple[float, float]] = {
+    **dict.fromkeys(("coarse", "final_rate", "texture"), FRACTION),
+    **dict.fromkeys(("ssim", "xing", "bending"), WEIGHT),
+    **dict.fromkeys(("fold_start", "fold_end"), (1e-6, 1e6)),
+    "softness": (0.0, 100.0),
+    "gaussian_density": (0.05, 20.0),
+}
+"""Least and largest values of the settings that are numbers."""
+DENSITY_RANGES: dict[str, tuple[float, float]] = {
+    **dict.fromkeys(("grown", "thin", "stop", "opacity_start", "opacity_end", "replace"), FRACTION),
+    **dict.fromkeys(("duplicate_color", "duplicate_overlap"), (0.0, 2.0)),
+    "start": (1e-3, 1.0),
+    "surplus": (1.0, 10.0),
+    "mean_points": (3.0, 100.0),
+    "area": (0.0, 1e9),
+}
+
+
+def check_whole(name: str, value: object, low: int, high: int) -> None:
+    """Whether a setting is a whole number in its range.
+
+    Raises:
+        UsageError: it is not.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+
+
+def check_number(name: str, value: object, low: float, high: float) -> None:
+    """Whether a setting is a number in its range.
+
+    Raises:
+        UsageError: it is not.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise UsageError(f"{name} must be a number from {low:g} to {high:g}, not {value!r}")
 
 
 def default_rates() -> dict[str, float]:
@@ -34,13 +75,13 @@ class Density:
     """Fraction of the run at which all curves are there; until then their number grows geometrically."""
     surplus: float = 1.5
     """Shapes at the most, over those that are left in the end."""
-    thin: float = 0.6
+    thin: float = 0.65
     """Fraction of the run from which on the surplus is removed, until ``stop``."""
     mean_points: float = 10.4
     """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
-    stop: float = 0.75
+    stop: float = 0.85
     """Fraction of the run after which the set of curves stays as it is."""
     opacity_start: float = 0.2
     """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""
@@ -53,6 +94,16 @@ class Density:
     """... and above this overlap (intersection over union) of their boxes."""
     replace: float = 0.1
     """Replace at least this fraction of the curves each turn: those without which the error grows least."""
+
+    def __post_init__(self) -> None:
+        """Check ranges.
+
+        Raises:
+            UsageError: a value is out of its range.
+        """
+        check_whole("density interval", self.interval, 0, 1_000_000)
+        for name, (low, high) in DENSITY_RANGES.items():
+            check_number(f"density {name.replace('_', '-')}", getattr(self, name), low, high)
 
 
 @dataclass(frozen=True)
@@ -79,7 +130,12 @@ class Settings:
     chain_cubics: int = 2
     """Cubics in each of the two chains of a closed curve."""
     renderer: Renderer = "exact"
-    """Model of coverage in training: that of the exported paths, or the paper's Gaussians."""
+    """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
+    look like the paths, or the paper's own soft ones."""
+    softness: float = 0.6
+    """Standard deviation that soft Gaussians have at least [px of the canvas]."""
+    gaussian_density: float = 0.5
+    """Soft Gaussians along and across a shape over their usual number."""
     order: Order = "age"
     """Newest in front, or smallest in front as in the paper."""
     ssim: float = 0.0
@@ -132,10 +188,16 @@ class Settings:
             ("precision", 0 if self.precision is None else self.precision, 0, 6),
             ("seed", self.seed, 0, 2**32 - 1),
             ("chain-cubics", self.chain_cubics, 1, 8),
+            ("spline-points", self.spline_points, 3, 64),
+            ("coarse-pixels", self.coarse_pixels, 1, 10**9),
+            ("fine-pixels", self.fine_pixels, 1, 10**9),
         )
         for name, value, low, high in checks:
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+            check_whole(name, value, low, high)
+        for name, (least, most) in RANGES.items():
+            check_number(name.replace("_", "-"), getattr(self, name), least, most)
+        for name, rate in self.rates.items():
+            check_number(f"rates {name}", rate, 0.0, 1e6)
         goals = (
             ("target-psnr", self.target_psnr),
             ("time-budget", self.time_budget),
@@ -146,16 +208,18 @@ class Settings:
                 isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < math.inf
             ):
                 raise UsageError(f"{name} must be a positive number, not {goal!r}")
-        if not isinstance(self.kind, Kind):
-            raise UsageError(f"kind must be a Kind, not {self.kind!r}")
+        for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
+            if not isinstance(value, kind):
+                raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
+        for name, given in (("through-scales", self.through_scales), ("viewer", self.viewer)):
+            if not isinstance(given, bool):
+                raise UsageError(f"{name} must be true or false, not {given!r}")
         choices = (
-            ("order", self.order, ("age", "area")),
-            ("renderer", self.renderer, ("exact", "splat")),
+            ("order", self.order, get_args(Order)),
+            ("renderer", self.renderer, get_args(Renderer)),
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
-        if self.background == "none" and self.renderer != "exact":
-            raise UsageError(f"the renderer {self.renderer} has no transparent background")
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
@@ -222,7 +286,14 @@ FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
 SPLAT_SHARE = 0.5
-"""Iterations of the splat renderer over those of the exact one: a step takes several times as long."""
+"""Iterations with Gaussians over those of the exact renderer: a step takes several times as long."""
+
+GAUSSIAN: dict[str, Any] = {
+    "order": "area",
+    "texture": 0.0,
+    "viewer": False,
+}
+"""What the soft renderer changes in every preset: its own render is what counts, by its squared error."""
 
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
@@ -249,8 +320,35 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     if "max_bytes" in given:
         given["max_bytes"] = parse_bytes(given["max_bytes"])
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
-    if given.get("renderer") == "splat":
+    if given.get("renderer") in ("splat", "gaussian"):
         preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
+        preset = replace(preset, **(GAUSSIAN if given["renderer"] == "gaussian" else {}))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
-    return replace(preset, **given)
+    if "rates" in given:
+        given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
+    if isinstance(given.get("density"), Mapping):
+        names = tuple(f.name for f in fields(Density))
+        given["density"] = replace(preset.density, **_known("density", given["density"], names))
+    if isinstance(given.get("basis"), str):
+        if given["basis"].upper() not in Basis.__members__:
+            choices = ", ".join(Basis.__members__).lower()
+            raise UsageError(f"basis must be one of {choices}, not {given['basis']!r}")
+        given["basis"] = Basis[given["basis"].upper()]
+    settings = replace(preset, **given)
+    if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
+        raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
+    return settings
+
+
+def _known(name: str, given: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Any]:
+    """``given`` with underscores in its keys.
+
+    Raises:
+        UsageError: one is not ``known``.
+    """
+    values = {key.replace("-", "_"): value for key, value in given.items()}
+    for key in values:
+        if key not in known:
+            raise UsageError(f"unknown setting {key!r} in {name}")
+    return values

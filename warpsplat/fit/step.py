@@ -18,7 +18,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
 from warpsplat.render.backend import Viewport
-from warpsplat.render.models import ExactModel, Model, SplatModel
+from warpsplat.render.models import ExactModel, GaussianModel, Model, SplatModel
 from warpsplat.render.program import Program, capture
 from warpsplat.render.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
@@ -50,6 +50,9 @@ def model_for(settings: Settings, step: int, slack: float = 1.0) -> Model:
     """The settings' model of coverage, as it is after ``step`` steps, with a phase's ``slack``."""
     if settings.renderer == "splat":
         return SplatModel(settings.through_scales, fold_weight(settings, step))
+    if settings.renderer == "gaussian":
+        fold = fold_weight(settings, step)
+        return GaussianModel(settings.softness, settings.gaussian_density, settings.through_scales, fold)
     return ExactModel(slack=slack)
 
 

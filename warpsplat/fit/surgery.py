@@ -7,6 +7,7 @@ import numpy as np
 from warpsplat.fit.density import densify, least_seen, prune_mask
 from warpsplat.fit.schedule import mean_points_at, shapes_at
 from warpsplat.fit.simplify import simplify
+from warpsplat.fit.split import faded, split
 from warpsplat.fit.step import Step
 from warpsplat.scene import Basis, FloatArray
 from warpsplat.scene.geometry import areas
@@ -27,10 +28,15 @@ def operate(step: Step, *, grows: bool) -> Step:
     gone = least_seen(doomed, max(replaced, len(scene) - wanted), seen)
     keep = np.setdiff1d(np.arange(len(scene)), gone)
     added = scene.take(np.arange(0))
-    if wanted > len(keep):
+    if settings.renderer == "gaussian" and wanted > len(keep):
+        broken = np.intersect1d(faded(scene), keep)[: wanted - len(keep)]
+        keep, added = np.setdiff1d(keep, broken), split(scene, broken)
+    missing = wanted - len(keep) - len(added)
+    if missing > 0:
         image = step.renderer.read_image()
         weights = step.target.weights
-        added = densify(settings, scene, step.target.image, image, wanted - len(keep), state.rng, weights)
+        new = densify(settings, scene, step.target.image, image, missing, state.rng, weights)
+        added = added.append(new)
     state.parameters.rearrange(keep, added)
     if grows:
         _thin_outlines(step, seen[keep])

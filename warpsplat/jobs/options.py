@@ -52,7 +52,7 @@ OPTIONS = (
     Option(
         "renderer",
         str,
-        "Model of coverage: the file's, or the paper's Gaussians.",
+        "Model of coverage: the file's, or Gaussians that look like it, or the paper's soft ones.",
         _defaults.renderer,
         choices=get_args(Renderer),
     ),

@@ -2,7 +2,7 @@
 
 ::
 
-    defaults:            # of every job; keys are the long flags of `warpsplat vectorize`
+    defaults:            # of every job; keys are the long flags of `warpsplat vectorize`, and jobs.research's
       curves: 512
       quality: draft
       output: svg        # folder for the results; default: beside each image
@@ -33,12 +33,13 @@ from warpsplat.files.inputs import read_input
 from warpsplat.files.output import HEAD, check_folder, check_target, may_replace
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.batch_file import BatchFile
-from warpsplat.jobs.options import BY_NAME, KINDS, Option, settings_from
+from warpsplat.jobs.options import BY_NAME, KINDS, settings_from
+from warpsplat.jobs.research import NESTED, RESEARCH_KEYS
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.svg.write import read_metadata
 
 TEXT_KEYS = ("output", "device", "importance")
-KEYS = (*BY_NAME, *TEXT_KEYS)
+KEYS = (*BY_NAME, *TEXT_KEYS, *RESEARCH_KEYS, *NESTED)
 
 
 @dataclass(frozen=True)
@@ -89,41 +90,59 @@ def _options(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict
     for key, (line, node) in entries.items():
         if key not in KEYS:
             continue
+        if key in NESTED:
+            options[key] = _Value(_nested(file, key, node), line)
+            continue
         value = file.value(node)
         if not isinstance(node, yaml.ScalarNode):
             raise file.error(line, f"{key}: must be one value, not a list or mapping")
-        if key in TEXT_KEYS or BY_NAME[key].choices:
+        if key in TEXT_KEYS or (key in BY_NAME and BY_NAME[key].choices):
             file.text(line, key, value)
-        if key in BY_NAME:
-            _check_setting(file, line, BY_NAME[key], value)
+        if key in KINDS:
+            if value is not True:
+                cause = f"must be true, not {value!r}; leave it out or give the other kind"
+                raise file.error(line, f"{key}: {cause}")
+        elif key not in TEXT_KEYS:
+            _check_setting(file, line, key, value, {key.replace("-", "_"): value})
         options[key] = _Value(value, line)
     if "closed" in options and "open" in options:
         raise file.error(options["open"].line, "open: closed is there as well; give one of them")
     return options
 
 
-def _check_setting(file: BatchFile, line: int, option: Option, value: Any) -> None:
-    """Whether a setting can have a value.
+def _nested(file: BatchFile, key: str, node: yaml.Node) -> dict[str, Any]:
+    """The mapping of a key of NESTED, each value checked by itself."""
+    values = {}
+    for name, (line, inner) in file.mapping(node, key, NESTED[key]).items():
+        value = file.value(inner)
+        _check_setting(file, line, f"{key}: {name}", value, {key: {name: value}})
+        values[name] = value
+    return values
+
+
+def _check_setting(file: BatchFile, line: int, key: str, value: Any, settings: dict[str, Any]) -> None:
+    """Whether a setting can have a value: whether there are such ``settings``.
 
     Raises:
         UsageError: it cannot; the message names line and key.
     """
-    key = option.name
-    if option.kind is not None:
-        if value is not True:
-            raise file.error(line, f"{key}: must be true, not {value!r}; leave it out or give the other kind")
-        return
     try:
         if value is None:
             raise UsageError(f"{key} has no value")
-        settings_from({option.setting: value})
+        settings_from(settings)
     except (UsageError, TypeError) as error:
         raise file.error(line, f"{key}: {error}") from error
 
 
 def _merge(defaults: dict[str, _Value], own: dict[str, _Value]) -> dict[str, Any]:
-    """A job's options over the defaults; a job's kind replaces the default kind."""
+    """A job's options over the defaults, within mappings as well; a job's kind replaces the default kind."""
     merged = dict(defaults)
+    own = {
+        key: _Value({**defaults[key].value, **item.value}, item.line)
+        if key in NESTED and key in defaults
+        else item
+        for key, item in own.items()
+    }
     if any(kind in own for kind in KINDS):
         for kind in KINDS:
             merged.pop(kind, None)
@@ -205,7 +224,10 @@ def load_jobs(path: Path) -> list[Job]:
         folder_given, mask = (
             _path(file, start, key, options.pop(key, None)) for key in ("output", "importance")
         )
-        settings = settings_from(options)
+        try:
+            settings = settings_from(options)
+        except UsageError as error:  # values that do not go together
+            raise file.error(start, str(error)) from error
         given = own.get("output") or defaults.get("output")
         at = given.line if given else entries["images"][0]
         for image in _images(file, *entries["images"]):

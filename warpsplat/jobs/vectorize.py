@@ -22,9 +22,11 @@ from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.settings import Settings, solid_color
-from warpsplat.metrics import Score, score_svg
+from warpsplat.fit.settings import Renderer, Settings, solid_color
+from warpsplat.fit.step import model_for
+from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
@@ -37,10 +39,13 @@ class Result:
 
     svg: str
     scene: Scene
+    """What the file shows; of soft Gaussians, the shapes as they were trained: a file holds less of them."""
     score: Score | None
     """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
     render_psnr: float
-    """Of the last training render against the image, at its size [dB]."""
+    """Of the last training render against the image, at its size [dB]. Of soft Gaussians, where the image is
+    no larger than that size: of the finished scene in 8 bits, as the file's is.
+    """
     estimated_psnr: float
     """Of the file at that size, as the training saw it: the last look at it may be 25 steps old [dB]."""
     iterations: int
@@ -48,6 +53,10 @@ class Result:
     seconds: float
     stopped: bool
     """Whether it was interrupted."""
+    renderer: Renderer = "exact"
+    """Of the training."""
+    render_ssim: float | None = None
+    """Of soft Gaussians' own render."""
     missed: tuple[str, ...] = ()
     """Goals that were not reached, each as a sentence."""
 
@@ -56,7 +65,9 @@ class Result:
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
             **(self.score.as_dict() if self.score else figures),
+            "renderer": self.renderer,
             "render_psnr": round(self.render_psnr, 3),
+            "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
             "curves": len(self.scene),
             "iterations": self.iterations,
@@ -120,7 +131,8 @@ def vectorize(
             report=report,
             stop=stop,
         )
-        made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
+        if settings.renderer != "gaussian":  # which reach beyond the outlines that this order goes by
+            made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     if target.shape[2] == 4 and not made.interrupted:
         held = rounded(made.scene, made.per_pixel)
         clear = clear_empty(held, target, settings, backend, made.per_pixel)
@@ -132,16 +144,21 @@ def vectorize(
     if write:
         write(svg)
     score = _score(svg, target, settings, stop, interrupted=made.interrupted)
+    render_psnr, render_ssim = made.render_psnr, None
+    if settings.renderer == "gaussian" and target.shape[0] * target.shape[1] <= settings.fine_pixels:
+        render_psnr, render_ssim = render_figures(made.scene, target, settings, backend)
     seconds = time.monotonic() - started
     return Result(
         svg=svg,
         scene=scene,
         score=score,
-        render_psnr=made.render_psnr,
+        render_psnr=render_psnr,
         estimated_psnr=made.estimated_psnr,
         iterations=made.iterations,
         seconds=seconds,
         stopped=made.interrupted,
+        renderer=settings.renderer,
+        render_ssim=render_ssim,
         missed=missed_goals(settings, score, seconds),
     )
 
@@ -164,6 +181,22 @@ def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: 
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
         svg = export(scene, settings, per_pixel, metadata)
     return svg, scene
+
+
+def render_figures(
+    scene: Scene, target: FloatArray, settings: Settings, backend: Backend, *, scale: int = 1
+) -> tuple[float, float | None]:
+    """PSNR [dB] and SSIM of the settings' own render of ``scene`` against ``target``, both in 8 bits.
+
+    ``scale``: of the render, which is reduced by area to the image's size before it is compared.
+    """
+    shown = render(scene, scale=scale, model=model_for(settings, 0), backend=backend)
+    levels = np.round(255 * np.clip(shown, 0, 1))
+    if scale > 1:
+        height, width = target.shape[:2]
+        levels = levels.reshape(height, scale, width, scale, 3).mean(axis=(1, 3), dtype=np.float32)
+    wanted = np.round(255 * target)
+    return psnr(levels, wanted), ssim(levels, wanted)
 
 
 QUICK_PIXELS = 1_000_000

@@ -48,6 +48,8 @@ class Bins:
     ) -> None:
         self._parameters, self._viewport = parameters, viewport
         self._capacity, self._needed = capacity, needed
+        self.paint: dict[str, wp.array] = {}
+        """Arrays that the lists read in place of the parameters' of these names."""
         sizes = {
             "shapes": parameters.shape_count,
             "slots": capacity,
@@ -83,4 +85,5 @@ class Bins:
             self.buffers,
             self._parameters.arrays,
             split=True,
+            **self.paint,
         )

@@ -156,5 +156,6 @@ ATTRIBUTES = (
     Attribute(
         "stop_opacities", "stop", 1, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS
     ),
+    Attribute("fades", "shape", 3, 0.04, Unit.ONE, (-1.0, Unit.ONE), (1.0, Unit.ONE), (Kind.STROKE,)),
     Attribute("widths", "shape", 1, 0.3, Unit.PIXEL, (1.0, Unit.PIXEL), (1.0, Unit.CANVAS), (Kind.STROKE,)),
 )

@@ -109,6 +109,9 @@ class Scene:
     """sRGB in [0, 1], shape (stop, 3)."""
     stop_opacities: FloatArray = None  # type: ignore[assignment]
     """In [0, 1], besides the shape's, shape (stop,)."""
+    fades: FloatArray = None  # type: ignore[assignment]
+    """What is added to a stroke's opacity in each of its thirds (of three cubics: in each), shape (shape, 3).
+    Soft Gaussians alone know of it: a path has one opacity."""
     dashes: tuple[tuple[float, ...], ...] = ()
     """Patterns of dashes [canvas units]: where in the pattern a stroke begins, then dashes and gaps in turn,
     as many of these as of those."""
