@@ -103,7 +103,7 @@ LINES = {
     '<path d="M22 8l3 16 3-16" stroke-linejoin="bevel"/><path d="M31 8l3 16 3-16z" '
     'stroke-miterlimit="9"/></g>',
     "dashes": '<path d="M4 6h30l-9 20z" fill="#ffc" stroke="red" stroke-width="3" '
-    'stroke-dasharray="5%, 2 1" stroke-dashoffset="-3"/>',
+    'stroke-dasharray="5%, 2 1" stroke-dashoffset="-2"/>',
     "no dashes": '<path d="M4 8h30" stroke="red" stroke-width="4" stroke-dasharray="3 -1"/>'
     '<path d="M4 18h30" stroke="red" stroke-width="4" stroke-dasharray="0 0"/>',
 }
