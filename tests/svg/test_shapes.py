@@ -23,7 +23,7 @@ LOST = {
     '<path filter="url(#a)"/>': "filter",
     '<pattern id="a"/><path d="M1 1h9v9z" fill="url(#a)"/>': "<pattern>",
     f'<path d="M1 1h9v9" {ROUND} marker-end="url(#a)"/>': "markers",
-    f'<path d="M1 1h9v9" {ROUND} style="marker:url(#a)"/>': "markers",
+    '<circle r="9" style="marker:url(#a)"/>': "markers",
     f'<path d="M1 1h9v9" {ROUND} vector-effect="non-scaling-stroke"/>': "vector-effect",
     f'<path d="M1 1h9v9" {ROUND} transform="scale(1,2)"/>': "stretches",
     '<path d="M1 1h9v9" stroke="red" stroke-linejoin="miter-clip"/>': "miter-clip",
