@@ -33,6 +33,9 @@ STRUCTURE = {
     '<rect x="1" y="10%" width="80%" height="8" fill="teal"/></svg>',
     "a viewport cut off": '<g transform="rotate(9)"><svg x="8" y="4" width="16" height="15">'
     '<circle cx="3" cy="9" r="12" fill="teal"/><path d="M6-5h9v40h-9zM9 2h3v9h-3z" fill="red"/></svg></g>',
+    "clipped by a rectangle": '<clipPath id="a" transform="rotate(5)"><rect x="5" y="4" width="20" '
+    'height="15"/></clipPath><g clip-path="url(#a)"><circle cx="9" cy="9" r="12" fill="red"/>'
+    '<path d="M20 9h9v20z"/><path d="M30 0h9v9z"/></g>',
     "overflow": '<svg x="9" y="4" width="9" height="9" overflow="visible"><circle r="8" fill="teal"/></svg>',
     "opacity of a group": '<g opacity=".5"><path d="M2 2h9v9z"/><path d="M20 2h9v9z" opacity=".5"/></g>',
     "origin": '<rect x="9" y="9" width="15" height="9" transform="rotate(30)" transform-origin="50% top"/>',

@@ -19,6 +19,9 @@ LOST = {
     '<image href="a.png"/>': "<image>",
     "<foreignObject/>": "<foreignObject>",
     '<g style="clip-path:url(#a)"/>': "clip-path",
+    '<clipPath id="a"><circle r="9"/></clipPath><g clip-path="url(#a)"/>': "clip-path",
+    '<clipPath id="a" clipPathUnits="objectBoundingBox"><rect width="1" height="1"/></clipPath>'
+    '<g clip-path="url(#a)"/>': "clip-path",
     '<g mask="url(#a)"/>': "mask",
     '<path filter="url(#a)"/>': "filter",
     '<pattern id="a"/><path d="M1 1h9v9z" fill="url(#a)"/>': "<pattern>",

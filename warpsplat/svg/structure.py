@@ -9,6 +9,7 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.scene import Rule
 from warpsplat.svg.clip import clipped, overlap, polygon
+from warpsplat.svg.clip_path import clip_rectangle
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import (
     Matrix,
@@ -152,14 +153,15 @@ class _Walk:
         if np.linalg.det(matrix[:2, :2]) == 0:
             return
         inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=context.depth + 1)
+        clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         if tag in DRAWN:
             first = len(self._shapes)
             self._shapes += element_shapes(
                 element, self._document, Place(style, matrix, viewport, context.paints)
             )
-            self._end(_End(first, fraction(style["opacity"])))
+            self._end(_End(first, fraction(style["opacity"]), clip))
             return
-        self._todo.append(_End(len(self._shapes), fraction(style["opacity"])))
+        self._todo.append(_End(len(self._shapes), fraction(style["opacity"]), clip))
         if tag == "use":
             self._link(element, inner)
         elif tag == "svg" and element is not self._document.root:
@@ -224,6 +226,8 @@ class _Walk:
         if not (width > 0 and height > 0):
             return
         style = context.style if is_svg else self._document.style_in(content, context.style)
+        if not is_svg and style["clip-path"] != "none":
+            raise ImageError("uses clip-path of a symbol, not supported")
         view = view_box_map(content.attrib, width, height)
         box = view_box(dict(content.attrib)) if view is not None else None
         size = box[2:] if box else (width, height)
