@@ -75,13 +75,13 @@ class Density:
     """Fraction of the run at which all curves are there; until then their number grows geometrically."""
     surplus: float = 1.5
     """Shapes at the most, over those that are left in the end."""
-    thin: float = 0.6
+    thin: float = 0.65
     """Fraction of the run from which on the surplus is removed, until ``stop``."""
     mean_points: float = 10.4
     """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
-    stop: float = 0.75
+    stop: float = 0.85
     """Fraction of the run after which the set of curves stays as it is."""
     opacity_start: float = 0.2
     """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""

@@ -41,7 +41,10 @@ def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
         ImageError: a stroke reaches beyond it.
     """
     following = np.roll(corners, -1, axis=0)
-    if np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]) < 0:
+    doubled = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
+    if not abs(doubled) > TOLERANCE:
+        return []
+    if doubled < 0:
         corners = corners[::-1]
     kept: list[Shape] = []
     for shape in shapes:
