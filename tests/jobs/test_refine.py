@@ -90,3 +90,24 @@ def test_an_own_file_of_both_bases_is_refined(device: str) -> None:
     assert result.score
     assert result.score.psnr > before
     assert result.scene.basis.tolist() == [basis for _, basis, _ in outlines]
+
+
+MIXED = (
+    '<linearGradient id="g"><stop stop-color="#fc0"/><stop offset="1" stop-color="#06c"/></linearGradient>'
+    '<path fill-rule="evenodd" d="M3 3h20v20h-20zM8 8h10v10h-10z" fill="url(#g)" stroke="#024" '
+    'stroke-width="2"/><path d="M28 5l9 18" stroke="green" stroke-width="3" stroke-dasharray="5 2"/>'
+    '<circle cx="30" cy="9" r="6" fill="#a33" fill-opacity=".5"/>'
+)
+
+
+def test_shapes_of_any_kind_are_refined_together(device: str) -> None:
+    """They stay what they are: holes, styles of strokes, gradients, fill and stroke of one path."""
+    text = f'{HEAD}width="40" height="30">{MIXED}</svg>'
+    wanted = text.replace("M3 3h20v20", "M4 4h19v22").replace("#a33", "#393").replace("l9 18", "l7 19")
+    target = (on_white(render_svg(wanted)) / 255).astype(np.float32)
+    result, before = refine(text, target, make_settings(iterations=80), Backend.on(device), name="a.svg")
+    assert result.score
+    assert result.score.psnr > before + 6
+    assert result.svg.count("<path") == 3
+    for word in ("evenodd", "stroke-dasharray", "linearGradient", "fill-opacity"):
+        assert word in result.svg

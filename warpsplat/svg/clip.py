@@ -1,13 +1,77 @@
-"""Fills cut by a convex polygon: what a nested viewport leaves of them."""
+"""What a nested viewport leaves of shapes, and whether shapes overlap."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 
+from warpsplat.errors import ImageError
 from warpsplat.svg.paths import Points, Subpath, line
+from warpsplat.svg.shapes import Shape
 
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""
+
+
+OVERLAP_SHAPES = 2000
+"""Most shapes of a group that are compared with each other."""
+
+
+def overlap(shapes: list[Shape]) -> bool:
+    """Whether shapes overlap, as far as boxes tell."""
+    if len(shapes) < 2:
+        return False
+    if len(shapes) > OVERLAP_SHAPES:
+        return True
+    boxes = np.stack([shape.box() for shape in shapes])
+    low, high = boxes[:, 0] + EDGE, boxes[:, 1] - EDGE
+    return bool(np.all((low[:, None] < high) & (low < high[:, None]), axis=2).sum() > len(shapes))
+
+
+EDGE = 1e-3
+"""By how much boxes that only touch may overlap [px]."""
+
+
+def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
+    """What is seen of shapes within a convex polygon.
+
+    Raises:
+        ImageError: a stroke reaches beyond it.
+    """
+    following = np.roll(corners, -1, axis=0)
+    doubled = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
+    if not abs(doubled) > TOLERANCE:
+        return []
+    if doubled < 0:
+        corners = corners[::-1]
+    kept: list[Shape] = []
+    for shape in shapes:
+        low, high = shape.box()
+        around = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+        inward = [_heights(around, a, b) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+        if all((height >= -EDGE).all() for height in inward):
+            kept.append(shape)
+        elif any((height <= EDGE).all() for height in inward):
+            continue
+        elif shape.line is None:
+            parts = [part for part in (cut_subpath(s, corners) for s in shape.subpaths) if part]
+            if parts:
+                kept.append(replace(shape, subpaths=parts, is_rect=False))
+        else:
+            raise ImageError("a stroke that a viewport cuts off is not supported")
+    # A shape that was cut shares its points with none.
+    return [
+        replace(shape, is_twin=shape.is_twin and i > 0 and kept[i - 1].subpaths is shape.subpaths)
+        for i, shape in enumerate(kept)
+    ]
+
+
+def _heights(points: Points, a: Points, b: Points) -> Points:
+    """Distances of points from a line, positive to its left."""
+    way = (b - a) / np.hypot(*(b - a))
+    return np.asarray((points - a) @ np.array([-way[1], way[0]]))
 
 
 def cut_subpath(subpath: Subpath, corners: Points) -> Subpath | None:
@@ -77,3 +141,10 @@ def _halves(cubic: Points, t: float) -> tuple[Points, Points]:
     while len(rows[-1]) > 1:
         rows.append(rows[-1][:-1] + t * (rows[-1][1:] - rows[-1][:-1]))
     return np.array([row[0] for row in rows]), np.array([row[-1] for row in reversed(rows)])
+
+
+def polygon(corners: Points) -> Subpath:
+    """A closed polygon with these corners."""
+    ring = [*map(complex, *corners.T), complex(*corners[0])]
+    points = [ring[0], *(z for a, b in pairwise(ring) for z in line(a, b))]
+    return Subpath(np.array([(z.real, z.imag) for z in points]), True, False)

@@ -100,7 +100,7 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
         for name, wanted in (("fill", tag != "line"), ("stroke", line is not None))
     )
     subpaths = [subpath.moved(place.matrix[:2, :2], place.matrix[:2, 2]) for subpath in own]
-    _check(style, tag, subpaths, line if stroke else None)
+    _check(style, subpaths, line if stroke else None)
     shapes = []
     if fill:
         rule = Rule.EVENODD if style["fill-rule"] == "evenodd" else Rule.NONZERO
@@ -179,16 +179,14 @@ def _strokes_first(order: str) -> bool:
     return "stroke" in words and "fill" not in words[: words.index("stroke")]
 
 
-def _check(style: Style, tag: str, subpaths: list[Subpath], line: Line | None) -> None:
+def _check(style: Style, subpaths: list[Subpath], line: Line | None) -> None:
     """Whether a scene can hold an element.
 
     Raises:
         ImageError: it cannot.
     """
-    if tag in {"path", "line", "polyline", "polygon"}:
-        for name in ("marker-start", "marker-mid", "marker-end"):
-            if style[name] != "none":
-                raise ImageError("uses markers, not supported")
+    if any(style[name] != "none" for name in ("marker-start", "marker-mid", "marker-end")):
+        raise ImageError("uses markers, not supported")
     if style["shape-rendering"] not in {"auto", "geometricPrecision"}:
         raise ImageError(f"uses shape-rendering {style['shape-rendering'][:40]!r}, not supported")
     if line and style["vector-effect"] != "none":

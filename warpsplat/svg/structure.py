@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.scene import Rule
-from warpsplat.svg.clip import cut_subpath
+from warpsplat.svg.clip import clipped, overlap, polygon
+from warpsplat.svg.clip_path import clip_rectangle
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import (
     Matrix,
@@ -22,7 +22,7 @@ from warpsplat.svg.geometry import (
 )
 from warpsplat.svg.gradients import Flat
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
-from warpsplat.svg.paths import Points, Subpath, line
+from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
 from warpsplat.svg.style import DRAWN, ROOT, Style
 from warpsplat.svg.values import Viewport, fraction, parse_color
@@ -153,14 +153,15 @@ class _Walk:
         if np.linalg.det(matrix[:2, :2]) == 0:
             return
         inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=context.depth + 1)
+        clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         if tag in DRAWN:
             first = len(self._shapes)
             self._shapes += element_shapes(
                 element, self._document, Place(style, matrix, viewport, context.paints)
             )
-            self._end(_End(first, fraction(style["opacity"])))
+            self._end(_End(first, fraction(style["opacity"]), clip))
             return
-        self._todo.append(_End(len(self._shapes), fraction(style["opacity"])))
+        self._todo.append(_End(len(self._shapes), fraction(style["opacity"]), clip))
         if tag == "use":
             self._link(element, inner)
         elif tag == "svg" and element is not self._document.root:
@@ -225,6 +226,8 @@ class _Walk:
         if not (width > 0 and height > 0):
             return
         style = context.style if is_svg else self._document.style_in(content, context.style)
+        if not is_svg and style["clip-path"] != "none":
+            raise ImageError("uses clip-path of a symbol, not supported")
         view = view_box_map(content.attrib, width, height)
         box = view_box(dict(content.attrib)) if view is not None else None
         size = box[2:] if box else (width, height)
@@ -254,11 +257,11 @@ class _Walk:
             return
         shapes = self._shapes[end.first :]
         if end.clip is not None:
-            shapes = _clipped(shapes, end.clip)
+            shapes = clipped(shapes, end.clip)
         if end.opacity == 0:
             shapes = []
         elif end.opacity < 1:
-            if _overlap(shapes):
+            if overlap(shapes):
                 raise ImageError("uses opacity of a group of shapes that overlap, not supported")
             shapes = [replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes]
         self._shapes[end.first :] = shapes
@@ -277,7 +280,7 @@ class _Walk:
         x, y = box[:2] if box else (0.0, 0.0)
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [viewport.width, viewport.height] + [x, y]
         self._shapes.append(
-            Shape([_polygon(moved(matrix, corners))], Flat(*color), 1.0, None, Rule.NONZERO, is_rect=True)
+            Shape([polygon(moved(matrix, corners))], Flat(*color), 1.0, None, Rule.NONZERO, is_rect=True)
         )
 
 
@@ -287,65 +290,3 @@ VISITED = {*DRAWN, "svg", "g", "a", "use"}
 
 def _in_context(paint: str, context: tuple[str, str]) -> str:
     return context[CONTEXTS.index(paint)] if paint in CONTEXTS else paint
-
-
-def _polygon(corners: Points) -> Subpath:
-    ring = [*map(complex, *corners.T), complex(*corners[0])]
-    points = [ring[0], *(z for a, b in pairwise(ring) for z in line(a, b))]
-    return Subpath(np.array([(z.real, z.imag) for z in points]), True, False)
-
-
-OVERLAP_SHAPES = 2000
-"""Most shapes of a group that are compared with each other."""
-
-
-def _overlap(shapes: list[Shape]) -> bool:
-    """Whether shapes overlap, as far as boxes tell."""
-    if len(shapes) < 2:
-        return False
-    if len(shapes) > OVERLAP_SHAPES:
-        return True
-    boxes = np.stack([shape.box() for shape in shapes])
-    low, high = boxes[:, 0] + EDGE, boxes[:, 1] - EDGE
-    return bool(np.all((low[:, None] < high) & (low < high[:, None]), axis=2).sum() > len(shapes))
-
-
-EDGE = 1e-3
-"""By how much boxes that only touch may overlap [px]."""
-
-
-def _clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
-    """What is seen of shapes within a convex polygon.
-
-    Raises:
-        ImageError: a stroke reaches beyond it.
-    """
-    following = np.roll(corners, -1, axis=0)
-    if np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]) < 0:
-        corners = corners[::-1]
-    kept: list[Shape] = []
-    for shape in shapes:
-        low, high = shape.box()
-        around = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
-        inward = [_heights(around, a, b) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-        if all((height >= -EDGE).all() for height in inward):
-            kept.append(shape)
-        elif any((height <= EDGE).all() for height in inward):
-            continue
-        elif shape.line is None:
-            parts = [part for part in (cut_subpath(s, corners) for s in shape.subpaths) if part]
-            if parts:
-                kept.append(replace(shape, subpaths=parts, is_rect=False))
-        else:
-            raise ImageError("a stroke that a viewport cuts off is not supported")
-    # A shape that was cut shares its points with none.
-    return [
-        replace(shape, is_twin=shape.is_twin and i > 0 and kept[i - 1].subpaths is shape.subpaths)
-        for i, shape in enumerate(kept)
-    ]
-
-
-def _heights(points: Points, a: Points, b: Points) -> Points:
-    """Distances of points from a line, positive to its left."""
-    way = (b - a) / np.hypot(*(b - a))
-    return np.asarray((points - a) @ np.array([-way[1], way[0]]))

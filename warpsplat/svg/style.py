@@ -97,7 +97,7 @@ def element_style(element: ElementTree.Element, rules: Sequence[Declaration], pa
             style[name] = repr(_font_size(value, float(parent[name])))
         else:
             style[name] = value
-    for name in ("clip-path", "mask", "filter", "mix-blend-mode"):
+    for name in ("mask", "filter", "mix-blend-mode"):
         if style[name] != OWN[name]:
             raise ImageError(f"uses {name}, not supported")
     return style
