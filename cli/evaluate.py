@@ -19,7 +19,8 @@ from warpsplat.errors import ImageError, UsageError
 def command(image: Path, svg: Path, as_json: bool) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
 
-    The SVG is rendered at the image's size; transparency is on white.
+    The SVG is rendered at the image's size, on white; where the image has
+    opacity, on black and on white, and the lower figures are given.
     SSIMULACRA2 is given where its package is installed (the extra "eyes"),
     for images of up to 4 million pixels. One of the two may be - for the
     standard input.
@@ -31,7 +32,7 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")
-    target = load_image(image)
+    target = load_image(image, paper=None)
     text = read_svg_text(svg)
     try:
         values = score_svg(text, target).as_dict()

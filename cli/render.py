@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from warpsplat.cli.options import FILE, overwrite_option
+from warpsplat.cli.options import FILE, overwrite_option, threads_option
 from warpsplat.errors import ImageError, UsageError
 
 
@@ -15,8 +15,19 @@ from warpsplat.errors import ImageError, UsageError
 @click.option("-o", "--output", type=FILE, required=True, help="PNG to write; - is the standard output.")
 @overwrite_option
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
-def command(svg: Path, output: Path, overwrite: bool, scale: float) -> None:
-    """Render SVG (any, not only ours; - for the standard input) to a PNG, as a viewer shows it."""
+@click.option(
+    "--renderer",
+    type=click.Choice(["viewer", "exact", "splat"]),
+    default="viewer",
+    show_default=True,
+    help="viewer: resvg. exact, splat: those that curves are fitted with, for SVGs of paths.",
+)
+@click.option("--device", default="auto", show_default=True, help="Of exact and splat.")
+@threads_option
+def command(
+    svg: Path, output: Path, overwrite: bool, scale: float, renderer: str, device: str, threads: int | None
+) -> None:
+    """Render SVG (any, not only ours; - for the standard input) to a PNG."""
     import math
 
     from warpsplat.files.inputs import input_name
@@ -34,7 +45,15 @@ def command(svg: Path, output: Path, overwrite: bool, scale: float) -> None:
             raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
         if size and min(max(1.0, side) for side in size) * scale < 0.5:
             raise UsageError(f"scale {scale} leaves no pixel of {size[0]:g}x{size[1]:g}")
-        png = draw_png(text, zoom=scale)
+        if renderer == "viewer":
+            png = draw_png(text, zoom=scale)
+        else:
+            from warpsplat.jobs.render import draw_own
+            from warpsplat.render.backend import Backend
+            from warpsplat.render.device import choose_device, start_warp
+
+            start_warp()
+            png = draw_own(text, renderer, scale, Backend.on(choose_device(device), threads))
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
     write_result(output, mark_png(png))

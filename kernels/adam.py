@@ -6,6 +6,7 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+NONE = wp.constant(constants.NONE)
 BETA1 = wp.constant(0.9)
 BETA2 = wp.constant(0.99)
 EPSILON = wp.constant(1.0e-12)  # the gradients of a mean over 10^6 pixels are about 1e-7
@@ -41,6 +42,23 @@ def advance(
 
 
 @wp.kernel
+def tie_twins(
+    # In:
+    offset: wp.int32,
+    point_twin: wp.array[wp.int32],  # [point_count] the same point of the shape behind, or NONE
+    # Out:
+    points_grad: wp.array[wp.vec2],  # [point_count] updated
+):
+    """Two rows that are one point get the gradient of both, and move as one."""
+    i = offset + wp.tid()
+    j = point_twin[i]
+    if j != NONE:
+        both = points_grad[i] + points_grad[j]
+        points_grad[i] = both
+        points_grad[j] = both
+
+
+@wp.kernel
 def adam_update(
     # In:
     offset: wp.int32,
@@ -49,6 +67,8 @@ def adam_update(
     held: wp.array[wp.int32],  # [row_count] 1: stays as it is
     kind: wp.array[wp.int32],  # [shape_count]
     kinds: wp.int32,  # the kinds that have the attribute, a bit each
+    paint: wp.array[wp.int32],  # [shape_count]
+    paints: wp.int32,  # the paints that have it, a bit each
     bias1: wp.array[wp.float32],  # [shape_count]
     bias2: wp.array[wp.float32],  # [shape_count]
     decay: wp.array[wp.float32],  # [1]
@@ -64,7 +84,7 @@ def adam_update(
     i, j = wp.tid()
     row = offset + i
     shape = owner[row]
-    if (kinds >> kind[shape]) & 1 == 0 or held[row] != 0:
+    if (kinds >> kind[shape]) & (paints >> paint[shape]) & 1 == 0 or held[row] != 0:
         return
     current = rate * decay[0]
     g = grad[row, j]

@@ -8,7 +8,6 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FILL = wp.constant(constants.FILL)
 CUBIC = wp.constant(constants.CUBIC)
 
 control_points: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float32)
@@ -64,13 +63,13 @@ def chain_end(at_end: wp.bool) -> wp.float32:
 @wp.func
 def bezier_points(
     points: wp.array[wp.vec2],
-    kind: wp.int32,
+    closed: wp.int32,
     basis: wp.int32,
     first: wp.int32,
     count: wp.int32,
     local: wp.int32,
 ) -> control_points:
-    """Bézier ``local`` of a shape with ``count`` points from ``first`` on, as a cubic: of a spline, its
+    """Bézier ``local`` of a contour with ``count`` points from ``first`` on, as a cubic: of a spline, its
     quadratic with the degree elevated.
     """
     if basis == CUBIC:
@@ -84,12 +83,12 @@ def bezier_points(
         d = points[last]
         return control_points(a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1])
     before = local - 1
-    if kind != FILL:
+    if closed == 0:
         before = local
     middle = points[first + (before + 1) % count]
-    share = chain_end(kind != FILL and local == 0)
+    share = chain_end(closed == 0 and local == 0)
     start = share * points[first + (before + count) % count] + (1.0 - share) * middle
-    share = chain_end(kind != FILL and local == count - 3)
+    share = chain_end(closed == 0 and local == count - 3)
     end = share * points[first + (before + 2) % count] + (1.0 - share) * middle
     b = (start + 2.0 * middle) / 3.0
     c = (end + 2.0 * middle) / 3.0
@@ -99,24 +98,24 @@ def bezier_points(
 @wp.func
 def add_bezier_grad(
     grad: control_points,
-    kind: wp.int32,
+    closed: wp.int32,
     basis: wp.int32,
     first: wp.int32,
     count: wp.int32,
     local: wp.int32,
     points_grad: wp.array[wp.vec2],
 ):
-    """Adjoint of ``bezier_points``: add ``grad`` to the shape's control points."""
+    """Adjoint of ``bezier_points``: add ``grad`` to the contour's control points."""
     if basis == CUBIC:
         for j in range(4):
             i = first + (3 * local + j) % count
             points_grad[i] = points_grad[i] + grad[j]
         return
     before = local - 1
-    if kind != FILL:
+    if closed == 0:
         before = local
-    start = chain_end(kind != FILL and local == 0) * (grad[0] + grad[1] / 3.0)
-    end = chain_end(kind != FILL and local == count - 3) * (grad[3] + grad[2] / 3.0)
+    start = chain_end(closed == 0 and local == 0) * (grad[0] + grad[1] / 3.0)
+    end = chain_end(closed == 0 and local == count - 3) * (grad[3] + grad[2] / 3.0)
     i = first + (before + count) % count
     points_grad[i] = points_grad[i] + start
     i = first + (before + 1) % count
@@ -127,15 +126,15 @@ def add_bezier_grad(
 
 @wp.func
 def point_weight(
-    kind: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, w: wp.vec4
+    closed: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, w: wp.vec4
 ) -> wp.float32:
     """Weight of control point ``j`` of Bézier ``local`` where its cubic's have the weights ``w``, which sum
     to 1: the adjoint of ``bezier_points``.
     """
     if basis == CUBIC:
         return w[j]
-    before = chain_end(kind != FILL and local == 0) * (w[0] + w[1] / 3.0)
-    after = chain_end(kind != FILL and local == count - 3) * (w[3] + w[2] / 3.0)
+    before = chain_end(closed == 0 and local == 0) * (w[0] + w[1] / 3.0)
+    after = chain_end(closed == 0 and local == count - 3) * (w[3] + w[2] / 3.0)
     if j == 0:
         return before
     if j == 2:

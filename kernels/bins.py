@@ -12,6 +12,7 @@ from warpsplat.kernels.ranges import find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+FLAT = wp.constant(constants.FLAT)
 TILE = wp.constant(constants.TILE)
 INT_MAX = wp.constant(constants.INT_MAX)
 TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
@@ -141,6 +142,7 @@ def list_visible(
     offset: wp.int32,
     sort_slots: wp.array[wp.int32],  # [2 x slot_capacity] slots by tile, front to back
     slot_shape: wp.array[wp.int32],  # [slot_capacity]
+    paint: wp.array[wp.int32],  # [shape_count]
     colors: wp.array[wp.vec3],  # [shape_count]
     opacities: wp.array[wp.float32],  # [shape_count]
     tile_first: wp.array[wp.int32],  # [tile_count]
@@ -162,10 +164,11 @@ def list_visible(
             slot_state[slot] = state | HIDDEN
         elif state & COVERED != 0:
             shape = slot_shape[slot]
-            list_paint[n] = shape_paint(colors, opacities, shape)
+            list_paint[n] = shape_paint(paint, colors, opacities, shape)
             list_slot[n] = slot
             if state == FULL:
                 list_slot[n] = -1 - slot
-                light *= 1.0 - opacities[shape]
+                if paint[shape] == FLAT:
+                    light *= 1.0 - opacities[shape]
             n += 1
     tile_stop[tile] = n

@@ -6,7 +6,9 @@ share and so knows the share of all that lies behind, without stored lists:
 dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
 A coverage may come from splats or from any other model: this stage knows only the tiles' lists of visible
 slots. It takes the magnitude (an exact fill stores which way round it is as a sign), and 1 throughout a FULL
-slot. Images are arrays of tiles, planes and columns (see ``warpsplat.tiles``).
+slot. A flat paint comes with the lists; of a gradient the colours of a slot's pixels lie in memory as its
+coverage does. A transparent canvas has a fourth plane: how opaque a pixel is, as a colour that all shapes
+have and the background has not. Images are arrays of tiles, planes and columns (see ``warpsplat.tiles``).
 """
 
 import warp as wp
@@ -33,9 +35,10 @@ def composite_forward(
     list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
+    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] of gradients: colour and opacity
     background: wp.vec3,
     # Out:
-    image: wp.array3d[column],  # [tile_count, 3, TILE]
+    image: wp.array3d[column],  # [tile_count, planes, TILE]
 ):
     """One thread a tile and lane."""
     i, lane = wp.tid()
@@ -50,16 +53,25 @@ def composite_forward(
         for k in range(start, stop):
             paint = list_paint[k]
             slot = list_slot[k]
-            share = paint[3] * t
+            share = wp.abs(paint[3]) * t
             if slot >= 0:
                 share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
-            red = red + paint_times(paint, 0, share)
-            green = green + paint_times(paint, 1, share)
-            blue = blue + paint_times(paint, 2, share)
+            if paint[3] >= 0.0:
+                red = red + paint_times(paint, 0, share)
+                green = green + paint_times(paint, 1, share)
+                blue = blue + paint_times(paint, 2, share)
+            else:
+                s = wp.max(slot, -1 - slot)
+                share = wp.cw_mul(share, paint_columns[s, 3, x])
+                red = red + wp.cw_mul(share, paint_columns[s, 0, x])
+                green = green + wp.cw_mul(share, paint_columns[s, 1, x])
+                blue = blue + wp.cw_mul(share, paint_columns[s, 2, x])
             t = t - share
         image[tile, 0, x] = red + background[0] * t
         image[tile, 1, x] = green + background[1] * t
         image[tile, 2, x] = blue + background[2] * t
+        if image.shape[1] == 4:
+            image[tile, 3, x] = column(1.0) - t
 
 
 @wp.kernel
@@ -73,9 +85,10 @@ def composite_backward(
     list_paint: wp.array[wp.vec4],  # [slot_capacity]
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
     law: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-    image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
-    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
+    image: wp.array3d[column],  # [tile_count, planes, TILE] of the forward pass
+    image_grad: wp.array3d[column],  # [tile_count, planes, TILE]
     # Out:
+    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] replaced by their gradients
     sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
     slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3) and opacity by pixel row: one lane
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
@@ -97,6 +110,10 @@ def composite_backward(
         behind = wp.cw_mul(image[tile, 0, x], red)
         behind = behind + wp.cw_mul(image[tile, 1, x], green)
         behind = behind + wp.cw_mul(image[tile, 2, x], blue)
+        opaque = zero
+        if image.shape[1] == 4:
+            opaque = image_grad[tile, 3, x]
+            behind = behind + wp.cw_mul(image[tile, 3, x], opaque)
         t = one
         for k in range(start, stop):
             paint = list_paint[k]
@@ -109,8 +126,20 @@ def composite_backward(
             else:
                 signed = coverage[slot, x]
                 covered = wp.abs(signed)
-            alpha = paint[3] * covered
-            share = wp.cw_mul(t, paint_against(paint, red, green, blue))
+            gradient = paint[3] < 0.0
+            opacity = wp.abs(paint[3])
+            alpha = opacity * covered
+            own = covered
+            share = opaque
+            if gradient:
+                own = wp.cw_mul(own, paint_columns[slot, 3, x])
+                alpha = opacity * own
+                share = share + wp.cw_mul(paint_columns[slot, 0, x], red)
+                share = share + wp.cw_mul(paint_columns[slot, 1, x], green)
+                share = share + wp.cw_mul(paint_columns[slot, 2, x], blue)
+            else:
+                share = share + paint_against(paint, red, green, blue)
+            share = wp.cw_mul(t, share)
             seen = wp.cw_mul(t, alpha)
             behind = behind - wp.cw_mul(alpha, share)
             # Where no light is left, only rounding is; Adam would make steps of it.
@@ -123,11 +152,19 @@ def composite_backward(
                 if law == AREA:
                     slope = wp.min(STEEP * slope, one)
                     slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
-                sum_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
+                slope = opacity * wp.cw_mul(slope, alpha_grad)
+                if gradient:
+                    slope = wp.cw_mul(slope, paint_columns[slot, 3, x])
+                sum_grad[slot, x] = slope
             red_grad = wp.cw_mul(seen, red)
             green_grad = wp.cw_mul(seen, green)
             blue_grad = wp.cw_mul(seen, blue)
-            opacity_grad = wp.cw_mul(covered, alpha_grad)
+            opacity_grad = wp.cw_mul(own, alpha_grad)
+            if gradient:
+                paint_columns[slot, 0, x] = red_grad
+                paint_columns[slot, 1, x] = green_grad
+                paint_columns[slot, 2, x] = blue_grad
+                paint_columns[slot, 3, x] = opacity * wp.cw_mul(covered, alpha_grad)
             if lane_columns == 1:
                 slot_grad[slot, lane] = wp.vec4(
                     total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
@@ -154,8 +191,9 @@ def removal_cost(
     list_slot: wp.array[wp.int32],  # [slot_capacity]
     list_paint: wp.array[wp.vec4],  # [slot_capacity]
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
-    target: wp.array3d[column],  # [tile_count, 3, TILE]
+    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE]
+    image: wp.array3d[column],  # [tile_count, planes, TILE] of the forward pass
+    target: wp.array3d[column],  # [tile_count, planes, TILE]
     importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
     # Out:
     slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
@@ -163,39 +201,62 @@ def removal_cost(
     """What the weighted squared error would grow by if a shape alone were taken away.
 
     Behind a shape lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
-    squared error by 2 d . (image - target) + d . d.
+    squared error by 2 d . (image - target) + d . d. On a transparent canvas the error is the mean of those on
+    black and on white, where what is not covered is white.
     """
     i, lane = wp.tid()
     tile = offset + i
     one = column(1.0)
     zero = column(0.0)
+    planes = image.shape[1]
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
         t = one
         red = image[tile, 0, x]
         green = image[tile, 1, x]
         blue = image[tile, 2, x]
+        opaque = one
         red_error = 2.0 * (red - target[tile, 0, x])
         green_error = 2.0 * (green - target[tile, 1, x])
         blue_error = 2.0 * (blue - target[tile, 2, x])
+        opaque_error = zero
+        if planes == 4:
+            opaque = image[tile, 3, x]
+            opaque_error = 2.0 * (opaque - target[tile, 3, x])
         for k in range(tile_first[tile], tile_stop[tile]):
             paint = list_paint[k]
             slot = list_slot[k]
-            seen = paint[3] * t
+            seen = wp.abs(paint[3]) * t
             if slot >= 0:
                 seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
             else:
                 slot = -1 - slot
+            if paint[3] < 0.0:
+                seen = wp.cw_mul(seen, paint_columns[slot, 3, x])
             lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
             t = t - seen
-            red = red - paint_times(paint, 0, seen)
-            green = green - paint_times(paint, 1, seen)
-            blue = blue - paint_times(paint, 2, seen)
+            red_seen = paint_times(paint, 0, seen)
+            green_seen = paint_times(paint, 1, seen)
+            blue_seen = paint_times(paint, 2, seen)
+            if paint[3] < 0.0:
+                red_seen = wp.cw_mul(seen, paint_columns[slot, 0, x])
+                green_seen = wp.cw_mul(seen, paint_columns[slot, 1, x])
+                blue_seen = wp.cw_mul(seen, paint_columns[slot, 2, x])
+            red = red - red_seen
+            green = green - green_seen
+            blue = blue - blue_seen
             share = wp.cw_div(seen, wp.max(t, TINY * one))
-            d = wp.cw_mul(share, red) - paint_times(paint, 0, seen)
-            cost = wp.cw_mul(d, d + red_error)
-            d = wp.cw_mul(share, green) - paint_times(paint, 1, seen)
-            cost = cost + wp.cw_mul(d, d + green_error)
-            d = wp.cw_mul(share, blue) - paint_times(paint, 2, seen)
-            cost = cost + wp.cw_mul(d, d + blue_error)
+            red_seen = wp.cw_mul(share, red) - red_seen
+            green_seen = wp.cw_mul(share, green) - green_seen
+            blue_seen = wp.cw_mul(share, blue) - blue_seen
+            cost = wp.cw_mul(red_seen, red_seen + red_error)
+            cost = cost + wp.cw_mul(green_seen, green_seen + green_error)
+            cost = cost + wp.cw_mul(blue_seen, blue_seen + blue_error)
+            if planes == 4:
+                opaque = opaque - seen
+                d = wp.cw_mul(share, opaque) - seen
+                cost = 0.5 * cost
+                cost = cost + 0.5 * wp.cw_mul(red_seen - d, red_seen - d + red_error - opaque_error)
+                cost = cost + 0.5 * wp.cw_mul(green_seen - d, green_seen - d + green_error - opaque_error)
+                cost = cost + 0.5 * wp.cw_mul(blue_seen - d, blue_seen - d + blue_error - opaque_error)
             cost = wp.cw_mul(cost, wp.cw_mul(lit, importance[tile, x]))
             slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)

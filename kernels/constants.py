@@ -6,11 +6,53 @@ FILL = 0
 STROKE = 1
 """Kinds of shapes: a closed ring of cubics that is painted inside, a chain of cubics painted along."""
 
+STYLED = 2
+"""Of exact coverage, the part of those strokes that are drawn as polygons, as they have dashes, or caps or
+joins that are not round; the others' parts are their kinds."""
+
 CUBIC = 0
 SPLINE = 1
 """Bases of a shape's control points: a chain of cubic Béziers (points 0, 3, 6 ... lie on the outline), or a
 uniform quadratic B-spline (each point is the control point of one quadratic Bézier, whose ends lie midway to
 the neighbouring points)."""
+
+NONZERO = 0
+EVENODD = 1
+"""Rules of what is inside of a fill."""
+
+ROUND = 0
+BUTT = 1
+SQUARE = 2
+"""Caps of strokes."""
+
+MITER = 1
+BEVEL = 2
+"""Joins of strokes, besides ROUND."""
+
+FLAT = 0
+LINEAR = 1
+RADIAL = 2
+"""Paints of shapes."""
+
+PAD = 0
+REFLECT = 1
+REPEAT = 2
+"""How gradients go on beyond their ends."""
+
+NONE = -1
+"""No such row."""
+
+SEGMENT_MIN = 1.0e-3
+"""Length [px] below which a piece of a stroke's centre line has no direction, and no part in its length."""
+
+DASH_PERIOD_MIN = 0.5
+"""Shortest pattern of dashes that is drawn [px]; shorter ones are drawn a whole number of times larger."""
+
+CORNERS_MAX = 2**25
+"""Corners of a stroke's polygons beyond which they are not counted further: more than any capacity."""
+
+MITERED = -1.0
+"""Radius of a corner of a stroke that is the tip of a mitre."""
 
 TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""

@@ -15,6 +15,7 @@ from warpsplat.kernels.bezier import bezier_points, control_points, cubic_weight
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 FILL = wp.constant(constants.FILL)
+NONE = wp.constant(constants.NONE)
 REACH_MAX = wp.constant(constants.REACH_MAX)
 FLATNESS = wp.constant(constants.FLATNESS)
 FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
@@ -24,6 +25,21 @@ PIECES_MIN = wp.constant(constants.PIECES_MIN)
 PIECES_MAX = wp.constant(constants.PIECES_MAX)
 
 
+@wp.func
+def bezier_of(
+    points: wp.array[wp.vec2],
+    basis: wp.int32,
+    contour: wp.int32,
+    contour_first: wp.array[wp.int32],
+    contour_closed: wp.array[wp.int32],
+    local: wp.int32,
+) -> control_points:
+    """Bézier ``local`` of a contour, as a cubic."""
+    first = contour_first[contour]
+    count = contour_first[contour + 1] - first
+    return bezier_points(points, contour_closed[contour], basis, first, count, local)
+
+
 @wp.kernel
 def plan_outline(
     # In:
@@ -31,14 +47,17 @@ def plan_outline(
     points: wp.array[wp.vec2],  # [point_count] canvas units
     kind: wp.array[wp.int32],  # [shape_count] FILL or STROKE
     basis: wp.array[wp.int32],  # [shape_count] CUBIC or SPLINE
-    point_first: wp.array[wp.int32],  # [shape_count + 1] first control point
-    bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier
+    bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier of each shape
+    bezier_contour: wp.array[wp.int32],  # [bezier_count]
+    contour_first: wp.array[wp.int32],  # [contour_count + 1] first control point
+    contour_bezier: wp.array[wp.int32],  # [contour_count + 1] first Bézier of each contour
+    contour_closed: wp.array[wp.int32],  # [contour_count]
     scale: wp.float32,  # render pixels per canvas unit
     slack: wp.float32,  # over FLATNESS
     # Out:
     bezier_vertex: wp.array[wp.int32],  # [bezier_count] first vertex of each Bézier, counted in its shape
     bezier_pieces: wp.array[wp.int32],  # [bezier_count] straight pieces
-    vertex_count: wp.array[wp.int32],  # [shape_count] a stroke has one more than pieces
+    vertex_count: wp.array[wp.int32],  # [shape_count] an open contour has one more than pieces
 ):
     """Pieces of each Bézier, one thread a shape: the polyline is slack x FLATNESS px off it at most."""
     shape = offset + wp.tid()
@@ -49,19 +68,19 @@ def plan_outline(
     least = PIECES_MIN
     if basis[shape] != CUBIC:
         least = PIECES_MIN_SPLINE
-    first = point_first[shape]
-    count = point_first[shape + 1] - first
     vertices = int(0)
     for bezier in range(bezier_first[shape], bezier_first[shape + 1]):
-        p = bezier_points(points, kind[shape], basis[shape], first, count, bezier - bezier_first[shape])
+        contour = bezier_contour[bezier]
+        local = bezier - contour_bezier[contour]
+        p = bezier_of(points, basis[shape], contour, contour_first, contour_closed, local)
         worst = wp.max(wp.length(p[0] - 2.0 * p[1] + p[2]), wp.length(p[1] - 2.0 * p[2] + p[3]))
         wanted = wp.ceil(wp.sqrt(0.5 * scale * worst / flatness))
         pieces = wp.clamp(int(wp.min(wanted, 1.0e6)), least, PIECES_MAX)
         bezier_vertex[bezier] = vertices
         bezier_pieces[bezier] = pieces
         vertices += pieces
-    if kind[shape] != FILL:
-        vertices += 1
+        if contour_closed[contour] == 0 and bezier + 1 == contour_bezier[contour + 1]:
+            vertices += 1
     vertex_count[shape] = vertices
 
 
@@ -87,9 +106,11 @@ def outline_forward(
     widths: wp.array[wp.float32],  # [shape_count] canvas units; of fills not read
     kind: wp.array[wp.int32],  # [shape_count]
     basis: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
-    bezier_shape: wp.array[wp.int32],  # [bezier_count]
+    bezier_contour: wp.array[wp.int32],  # [bezier_count]
+    contour_shape: wp.array[wp.int32],  # [contour_count]
+    contour_first: wp.array[wp.int32],  # [contour_count + 1]
+    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
+    contour_closed: wp.array[wp.int32],  # [contour_count]
     scale: wp.float32,
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
@@ -97,122 +118,120 @@ def outline_forward(
     bezier_pieces: wp.array[wp.int32],  # [bezier_count]
     # Out:
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity] those beyond the last shape's are left as they are
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends; NONE: no edge
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     extent: wp.array[wp.vec2],  # [vertex_capacity] px; how far the shape may reach beyond the vertex
 ):
     """One thread a Bézier: the vertices at k / n of it, its end being the next one's, but for the last's."""
     bezier = offset + wp.tid()
-    shape = bezier_shape[bezier]
+    contour = bezier_contour[bezier]
+    shape = contour_shape[contour]
     if vertex_last[shape] == vertex_first[shape]:
         return
-    first = point_first[shape]
-    point_count = point_first[shape + 1] - first
-    local = bezier - bezier_first[shape]
-    p = scale * bezier_points(points, kind[shape], basis[shape], first, point_count, local)
+    closed = contour_closed[contour] != 0
+    local = bezier - contour_bezier[contour]
+    is_last = bezier + 1 == contour_bezier[contour + 1]
+    p = scale * bezier_of(points, basis[shape], contour, contour_first, contour_closed, local)
     base = vertex_first[shape] + bezier_vertex[bezier]
     pieces = bezier_pieces[bezier]
     count = pieces
+    if is_last and not closed:
+        count += 1
     reach = float(0.0)
     if kind[shape] != FILL:
         reach = wp.min(0.5 * scale * widths[shape], REACH_MAX) + 1.0
-        if bezier + 1 == bezier_first[shape + 1]:
-            count += 1
     for k in range(count):
         t = float(k) / float(pieces)
         position = weighted(p, fair_weights(t, pieces))
-        if kind[shape] != FILL and (k == pieces or (k == 0 and local == 0)):
+        if not closed and (k == pieces or (k == 0 and local == 0)):
             position = weighted(p, cubic_weights(t))
         elif k == 0:
-            before = bezier - 1
+            before = local - 1
             if local == 0:
-                before = bezier_first[shape + 1] - 1
-            q = scale * bezier_points(
-                points, kind[shape], basis[shape], first, point_count, before - bezier_first[shape]
-            )
-            position = 0.5 * (position + weighted(q, fair_weights(1.0, bezier_pieces[before])))
+                before = contour_bezier[contour + 1] - contour_bezier[contour] - 1
+            q = scale * bezier_of(points, basis[shape], contour, contour_first, contour_closed, before)
+            before_pieces = bezier_pieces[contour_bezier[contour] + before]
+            position = 0.5 * (position + weighted(q, fair_weights(1.0, before_pieces)))
         vertex_shape[base + k] = shape
+        vertex_next[base + k] = base + k + 1
         vertex[base + k] = wp.vec2(within_reach(position[0]), within_reach(position[1]))
         extent[base + k] = wp.vec2(reach, reach)
+    if is_last:
+        start = vertex_first[shape] + bezier_vertex[contour_bezier[contour]]
+        if not closed and kind[shape] != FILL:
+            start = NONE
+        vertex_next[base + count - 1] = start
 
 
 @wp.kernel
 def outline_backward(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
     basis: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    point_shape: wp.array[wp.int32],  # [point_count]
-    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
+    point_contour: wp.array[wp.int32],  # [point_count]
+    contour_shape: wp.array[wp.int32],  # [contour_count]
+    contour_first: wp.array[wp.int32],  # [contour_count + 1]
+    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
+    contour_closed: wp.array[wp.int32],  # [contour_count]
     scale: wp.float32,
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
     bezier_vertex: wp.array[wp.int32],  # [bezier_count]
     bezier_pieces: wp.array[wp.int32],  # [bezier_count]
-    start_grad: wp.array[
-        wp.vec2
-    ],  # [vertex_capacity] of the first vertex of the edge that starts at a vertex
-    end_grad: wp.array[wp.vec2],  # [vertex_capacity] of the second vertex of that edge
+    start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts at a vertex
+    end_grad: wp.array[wp.vec2],  # [vertex_capacity] of the second end of that edge; 0 where there is none
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] written
 ):
     """A gather, one thread a control point: its weights in its Béziers x the gradients of their vertices."""
     point = offset + wp.tid()
-    shape = point_shape[point]
+    contour = point_contour[point]
+    shape = contour_shape[contour]
     total = wp.vec2(0.0, 0.0)
     if vertex_last[shape] > vertex_first[shape]:
-        ring = kind[shape] == FILL
-        first = point_first[shape]
-        index = point - first
-        count = point_first[shape + 1] - first
-        beziers = bezier_first[shape + 1] - bezier_first[shape]
+        closed = contour_closed[contour]
+        index = point - contour_first[contour]
+        count = contour_first[contour + 1] - contour_first[contour]
+        bezier_base = contour_bezier[contour]
+        beziers = contour_bezier[contour + 1] - bezier_base
+        first = vertex_first[shape] + bezier_vertex[bezier_base]
+        # The vertex before the first, by way of the edge that closes the contour.
+        last = vertex_first[shape] + bezier_vertex[bezier_base + beziers - 1]
+        last += bezier_pieces[bezier_base + beziers - 1] - closed
         # The last Bézier that the point belongs to, which number it has there, and how those change for the
         # Béziers before: the point may end a cubic, and belongs to three quadratics.
         latest = index / 3
         j = index % 3
         step = int(3)
         if basis[shape] != CUBIC:
-            latest = index
+            latest = index + closed
             j = int(0)
             step = 1
-            if ring:
-                latest = index + 1
         while j <= 3 and (step == 3 or j <= 2):
             local = latest
-            if ring:
+            if closed != 0:
                 local = (latest + beziers) % beziers
             if local >= 0 and local < beziers:
-                bezier = bezier_first[shape] + local
-                base = vertex_first[shape] + bezier_vertex[bezier]
-                pieces = bezier_pieces[bezier]
-                last = base + pieces
-                if ring and last == vertex_last[shape]:
-                    last = vertex_first[shape]
-                if ring or local > 0:
-                    previous = base - 1
-                    if local == 0:
-                        previous = vertex_last[shape] - 1
-                    w = fair_weights(0.0, pieces)
-                    total += (0.5 * point_weight(kind[shape], basis[shape], count, local, j, w)) * (
-                        start_grad[base] + end_grad[previous]
+                base = vertex_first[shape] + bezier_vertex[bezier_base + local]
+                pieces = bezier_pieces[bezier_base + local]
+                for k in range(pieces + 1):
+                    v = base + k
+                    if v > last:
+                        v = first
+                    before = v - 1
+                    if v == first:
+                        before = last
+                    t = float(k) / float(pieces)
+                    w = fair_weights(t, pieces)
+                    share = float(1.0)
+                    if k == 0 or k == pieces:  # noqa: PLR1714  # a kernel knows no sets
+                        share = 0.5
+                        if closed == 0 and (v == first or v == last):  # noqa: PLR1714, SIM109
+                            w = cubic_weights(t)
+                            share = 1.0
+                    total += (share * point_weight(closed, basis[shape], count, local, j, w)) * (
+                        start_grad[v] + end_grad[before]
                     )
-                else:
-                    w = cubic_weights(0.0)
-                    total += point_weight(kind[shape], basis[shape], count, local, j, w) * start_grad[base]
-                for k in range(1, pieces):
-                    w = fair_weights(float(k) / float(pieces), pieces)
-                    total += point_weight(kind[shape], basis[shape], count, local, j, w) * (
-                        start_grad[base + k] + end_grad[base + k - 1]
-                    )
-                end = end_grad[base + pieces - 1]
-                if ring or local + 1 < beziers:
-                    w = fair_weights(1.0, pieces)
-                    total += (0.5 * point_weight(kind[shape], basis[shape], count, local, j, w)) * (
-                        start_grad[last] + end
-                    )
-                else:
-                    w = cubic_weights(1.0)
-                    total += point_weight(kind[shape], basis[shape], count, local, j, w) * end
             latest -= 1
             j += step
     points_grad[point] = scale * total

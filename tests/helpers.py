@@ -75,7 +75,7 @@ def reference_image(scene: Scene, renderer: Renderer, detach: bool = False) -> t
         covers = splat.coverages(scene, p, plans_of(renderer), v.width, v.height, v.scale, detach)
     else:
         covers = exact.coverages(scene, p, pieces_of(renderer), v.width, v.height, v.scale)
-    return p, composite(covers, p, scene)
+    return p, composite(covers, p, scene, v.scale)
 
 
 def compare(
@@ -127,4 +127,4 @@ def run(kernel: wp.Kernel, dim: int | tuple[int, ...], device: str, *sources: ob
 
 def relative_error(got: np.ndarray, want: np.ndarray) -> float:
     """Largest difference over the largest magnitude."""
-    return float(np.abs(got - want).max() / max(np.abs(want).max(), 1e-30))
+    return float(np.abs(got - want).max(initial=0) / max(np.abs(want).max(initial=0), 1e-30))

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Rule, Scene
+from warpsplat.scene.attributes import NO_DASHES
+from warpsplat.scene.geometry import bounds
+from warpsplat.scene.scene import starts_of
 
 CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
 FILL_CUBICS, STROKE_CUBICS = 4, 3
@@ -118,6 +123,59 @@ def mixed_scene(width: int = 40, height: int = 36, *, seed: int = 0, splines: bo
     return ragged_scene(MIXED if splines else MIXED_CUBICS, width, height, seed=seed)
 
 
+def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> Scene:
+    """Shapes of several contours each, of both bases, closed and open, that overlap their own."""
+    shapes = []
+    for i, basis in enumerate((CUBIC, SPLINE, CUBIC)):
+        parts = [
+            random_scene(like, 1, seed=seed + 10 * i + k, basis=basis, beziers=5 + k)
+            for k, like in enumerate((Kind.FILL, Kind.STROKE, Kind.FILL))
+        ]
+        points = [part.points - part.points.mean(axis=0) + [12 + 8 * i, 18] for part in parts]
+        counts = [len(own) for own in points]
+        shapes.append(
+            Scene.of(
+                canvas(40, 36),
+                np.array([kind], np.int32),
+                np.array([0, sum(counts)], np.int32),
+                np.array([basis], np.int32),
+                starts=starts_of(np.array(counts)),
+                closed=np.array([part.kind[0] == Kind.FILL for part in parts], np.int32),
+                rule=np.array([rule], np.int32),
+                points=np.concatenate(points).astype(np.float32),
+                colors=parts[0].colors,
+                opacities=parts[0].opacities,
+                widths=np.full(1, 2.5 if kind == Kind.STROKE else 0, np.float32),
+            )
+        )
+    return functools.reduce(Scene.append, shapes)
+
+
+def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:
+    """Every shape but the last has a gradient: linear and radial by turns, of one to three stops."""
+    rng = np.random.default_rng(seed)
+    count = len(scene)
+    stops = np.arange(count) % 3 + 1
+    stops[-1] = 0
+    total = int(stops.sum())
+    low, high = bounds(scene)[:, :2], bounds(scene)[:, 2:]
+    axes = rng.uniform(0.3, 0.5, (count, 2)) * (high - low)
+    turned = np.stack([-axes[:, 1], axes[:, 0]], axis=1) * rng.uniform(0.6, 1.4, (count, 1)) + 0.1 * axes
+    offsets = [np.sort(rng.uniform(0.1, 0.9, n)) for n in stops]
+    paint = np.where(stops == 0, Paint.FLAT, 1 + np.arange(count) % 2)
+    return replace(
+        scene,
+        paint=paint.astype(np.int32),
+        spread=(np.arange(count) % 3).astype(np.int32),
+        frames=np.concatenate([(low + high) / 2, axes, turned], axis=1).astype(np.float32),
+        focus=(rng.uniform(0, 0.3, (count, 3)) * (paint == Paint.RADIAL)[:, None]).astype(np.float32),
+        stop_first=starts_of(stops),
+        stop_offsets=np.concatenate(offsets).astype(np.float32),
+        stop_colors=rng.uniform(0.05, 0.95, (total, 3)).astype(np.float32),
+        stop_opacities=rng.uniform(0.3, 1.0, total).astype(np.float32),
+    )
+
+
 def with_points(scene: Scene, points: FloatArray) -> FloatArray:
     """Points of alike shapes (shape, point, 2), as the scene has them."""
     return np.ascontiguousarray(points, np.float32).reshape(scene.points.shape)
@@ -155,4 +213,63 @@ def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> 
         (np.array(points)[None] * radius + centre).astype(np.float32),
         colors=np.ones((1, 3), np.float32),
         opacities=np.ones(1, np.float32),
+    )
+
+
+DASHES = (
+    (0.0, 7.0, 5.0),
+    (-3.0, 9.0, 6.5, 2.0, 7.0),
+    (2.5, 0.0, 6.0),
+    (1.0, 300.0, 5.0),
+)
+"""Patterns that begin anywhere, of several dashes, of dots, and longer than what they are on."""
+
+
+def styled_scene(cap: Cap, join: Join, dash: int = NO_DASHES, *, seed: int = 0, limit: float = 4.0) -> Scene:
+    """Shapes of several contours, closed and open, smooth and with corners, drawn in a style."""
+    scene = contours_scene(Kind.STROKE, seed=seed)
+    count = len(scene)
+    return replace(
+        scene,
+        cap=np.full(count, cap, np.int32),
+        join=np.full(count, join, np.int32),
+        miter_limits=np.full(count, limit, np.float32),
+        dash=np.full(count, dash, np.int32),
+        dashes=DASHES,
+    )
+
+
+def polyline_scene(
+    contours: Sequence[tuple[Sequence[tuple[float, float]], bool]],
+    width: float,
+    size: tuple[int, int] = (64, 64),
+    *,
+    cap: Cap,
+    join: Join,
+    miter_limits: float = 4.0,
+    dash: int = NO_DASHES,
+    dashes: tuple[tuple[float, ...], ...] = (),
+) -> Scene:
+    """A white stroke on black along straight lines, closed or not."""
+    points = []
+    for corners, closed in contours:
+        ring = np.array([*corners, corners[0]] if closed else corners, np.float64)
+        sides = [a + (b - a) * t for a, b in itertools.pairwise(ring) for t in (0, 1 / 3, 2 / 3)]
+        points.append(np.array(sides if closed else [*sides, ring[-1]]))
+    counts = np.array([len(own) for own in points])
+    return Scene.of(
+        Canvas(*size, np.zeros(3, np.float32)),
+        np.array([Kind.STROKE], np.int32),
+        np.array([0, counts.sum()], np.int32),
+        starts=starts_of(counts),
+        closed=np.array([closed for _, closed in contours], np.int32),
+        points=np.concatenate(points).astype(np.float32),
+        colors=np.ones((1, 3), np.float32),
+        opacities=np.ones(1, np.float32),
+        widths=np.array([width], np.float32),
+        cap=np.array([cap], np.int32),
+        join=np.array([join], np.int32),
+        miter_limits=np.array([miter_limits], np.float32),
+        dash=np.array([dash], np.int32),
+        dashes=dashes,
     )

@@ -19,19 +19,31 @@ from tests import ROOT
 ALLOWED: dict[str, tuple[str, ...]] = {
     "errors": (),
     "native": (),
+    "alpha": (),
     "kernels": (),
     "scene": ("kernels.constants", "errors"),
     "files": ("errors", "native", "scene", "_version"),
     "svg": ("errors", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
     "render": ("errors", "native", "scene", "kernels"),
-    "fit": ("errors", "scene", "kernels", "render", "svg", "metrics"),
-    "jobs": ("errors", "scene", "kernels.constants", "render", "fit", "files", "svg", "metrics"),
+    "fit": ("alpha", "errors", "scene", "kernels", "render", "svg", "metrics"),
+    "jobs": (
+        "alpha",
+        "errors",
+        "native",
+        "scene",
+        "kernels.constants",
+        "render",
+        "fit",
+        "files",
+        "svg",
+        "metrics",
+    ),
 }
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.
 Those that are not named may import all but ``cli``."""
 
-HEAVY = {"numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "svgelements", "scipy"}
+HEAVY = {"numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "svgelements", "scipy", "matplotlib"}
 """What the command line imports only when a command runs: ``--help`` answers at once."""
 
 

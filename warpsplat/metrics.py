@@ -195,13 +195,15 @@ def score_svg(
     eyes: bool = True,
     stop: Callable[[], bool] | None = None,
 ) -> Score:
-    """Render ``text`` at the size of ``target`` (sRGB in [0, 1], (height, width, 3)) and compare.
+    """Render ``text`` at the size of ``target`` and compare.
 
-    Besides ``target`` this takes about 15 bytes a pixel, with SSIMULACRA2 500.
+    With opacity both lie on black and on white; the figures are those of where they are less alike. Besides
+    ``target`` this takes about 15 bytes a pixel, with SSIMULACRA2 500.
 
     Args:
         text: the SVG.
-        target: the image.
+        target: the image, sRGB in [0, 1], shape (height, width, 3), which a file with opacity lies on white
+            for; or premultiplied with opacity, shape (height, width, 4).
         own: this program wrote the text just now: it is drawn without precautions.
         eyes: measure SSIMULACRA2 where that can be done.
         stop: asked every few tenths of a second; once true, the work is given up.
@@ -212,9 +214,11 @@ def score_svg(
     """
     height, width = target.shape[:2]
     shown = draw(text, width, height, stop, own=own)
-    fidelity, single, multiple = _figures(_shown_and_wanted(shown, target), stop)
+    papers = (255,) if target.shape[2] == 3 else (0, 255)
+    paper = min(papers, key=lambda level: _decibels(_error(shown, target, level)))
+    fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check(stop)
-    seen = ssimulacra2(*_in_8_bits(shown, target)) if eyes else None
+    seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None
     data = text.encode()
     facts = inspect_svg(text)
     return Score(
@@ -229,21 +233,30 @@ def score_svg(
     )
 
 
-def _shown_and_wanted(shown: Bytes, target: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """Channels of ``shown`` on white, and of ``target`` in the levels of 8 bits."""
+def _error(shown: Bytes, target: Floats, paper: int) -> float:
+    """Mean squared error on grey of level ``paper``."""
+    return float(np.mean([_squared_error(a, b) for a, b in _shown_and_wanted(shown, target, paper)]))
+
+
+def _shown_and_wanted(shown: Bytes, target: Floats, paper: int) -> Iterator[tuple[Floats, Floats]]:
+    """Channels of ``shown``, and of ``target`` in the levels of 8 bits, on grey of level ``paper``."""
     height, width = target.shape[:2]
     a, b = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
     for channel in range(3):
         for rows in rows_of(width, height):
             alpha = shown[rows, :, 3] / np.float32(255)
-            a[rows] = shown[rows, :, channel] * alpha + np.float32(255) * (1 - alpha)
-            b[rows] = np.round(target[rows, :, channel] * np.float32(255))
+            a[rows] = shown[rows, :, channel] * alpha + np.float32(paper) * (1 - alpha)
+            wanted = target[rows, :, channel] * np.float32(255)
+            if target.shape[2] == 4:
+                wanted = wanted + np.float32(paper) * (1 - target[rows, :, 3])
+            b[rows] = np.round(wanted)
         yield a, b
 
 
-def _in_8_bits(shown: Bytes, target: Floats) -> tuple[Bytes, Bytes]:
-    """``target`` and ``shown`` on white, of shape (height, width, 3)."""
-    a, b = np.empty(target.shape, np.uint8), np.empty(target.shape, np.uint8)
-    for channel, (flat, wanted) in enumerate(_shown_and_wanted(shown, target)):
+def _in_8_bits(shown: Bytes, target: Floats, paper: int) -> tuple[Bytes, Bytes]:
+    """``target`` and ``shown`` on grey of level ``paper``, of shape (height, width, 3)."""
+    shape = (*target.shape[:2], 3)
+    a, b = np.empty(shape, np.uint8), np.empty(shape, np.uint8)
+    for channel, (flat, wanted) in enumerate(_shown_and_wanted(shown, target, paper)):
         a[..., channel], b[..., channel] = wanted, np.round(flat)
     return a, b

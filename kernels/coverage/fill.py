@@ -3,7 +3,8 @@
 The winding-weighted area of a polygon in each pixel is summed up edge by edge as font rasterisers do: a piece
 of an edge inside one pixel adds its height to all pixels on its right, and to its own pixel the share of it
 right of the piece. What is stored is that sum, clamped to [-1, 1]; its magnitude is the coverage of a
-non-zero fill. No samples: a straight edge's coverage is the exact area.
+non-zero fill. By the even-odd rule it is folded instead. No samples: a straight edge's coverage is the exact
+area.
 
 Adjoint: a piece with extent (dx, dy), moved by v, changes its pixel's area by dx v_y - dy v_x and no other
 pixel's. An edge's ends take (1 - s) and s of it, s the edge's parameter at the middle of the piece.
@@ -17,7 +18,8 @@ from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FILL = wp.constant(constants.FILL)
+NONZERO = wp.constant(constants.NONZERO)
+EVENODD = wp.constant(constants.EVENODD)
 TILE = wp.constant(constants.TILE)
 TILE_LAST = wp.constant(constants.TILE - 1)
 TILE_BITS = wp.constant(constants.TILE.bit_length() - 1)  # of a pixel within its tile
@@ -28,14 +30,6 @@ FLAT = wp.constant(1.0e-30)  # [px] an edge that rises less is horizontal: its s
 MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
 NEVER = wp.constant(4.0)  # beyond the parameters of an edge, which are 0 to 1
 MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as touching it
-
-
-@wp.func
-def next_vertex(i: wp.int32, vertex_first: wp.int32, vertex_last: wp.int32) -> wp.int32:
-    """The vertex after ``i`` in its ring."""
-    if i + 1 == vertex_last:
-        return vertex_first
-    return i + 1
 
 
 @wp.func
@@ -71,12 +65,15 @@ def crossing(a: wp.vec2, b: wp.vec2, y: wp.float32) -> wp.int32:
 def fill_states(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
+    own_part: wp.int32,  # of the shapes to cover
+    part: wp.array[wp.int32],  # [shape_count]
+    rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [shape_count]
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
@@ -92,7 +89,7 @@ def fill_states(
     shape = row[0]
     if shape < 0:
         return
-    if kind[shape] != FILL:
+    if part[shape] != own_part:
         return
     wide = row[2]
     low = float(TILE * row[3])
@@ -103,10 +100,9 @@ def fill_states(
         slot_state[s] = 0
         slot_winding[s] = 0
     winding = int(0)
-    b = vertex[vertex_last[shape] - 1]
     for j in range(vertex_first[shape], vertex_last[shape]):
-        a = b
-        b = vertex[j]
+        a = vertex[j]
+        b = vertex[vertex_next[j]]
         if wp.min(a[1], b[1]) <= high and wp.max(a[1], b[1]) >= low:
             turn = crossing(a, b, low + MIDDLE)
             if turn != 0:
@@ -126,7 +122,7 @@ def fill_states(
         slot_winding[s] = winding
         if slot_state[s] != PARTIAL:
             slot_state[s] = UNCOVERED
-            if winding != 0:
+            if winding % 2 != 0 or (winding != 0 and rule[shape] == NONZERO):
                 slot_state[s] = FULL
 
 
@@ -250,6 +246,14 @@ def sum_columns(
 
 
 @wp.func
+def fold(s: wp.float32) -> wp.float32:
+    """What is left of a winding-weighted area by the even-odd rule: as far as it is from the nearest even
+    number, with the sign of the side on which it lies, which is that of the coverage's derivative.
+    """
+    return s - 2.0 * wp.floor(0.5 * s + 0.5)
+
+
+@wp.func
 def sum_row(
     pixels: wp.array2d[wp.float32],
     slot_state: wp.array[wp.int32],
@@ -257,14 +261,18 @@ def sum_row(
     first: wp.int32,
     last: wp.int32,
     row: wp.int32,
+    rule: wp.int32,
 ):
-    """Prefix sums along one row of the slots [first, last), clamped."""
+    """Prefix sums along one row of the slots [first, last), clamped or folded."""
     total = float(0.0)
     for s in range(first, last):
         if slot_state[s] & PARTIAL == PARTIAL:
             for x in range(TILE):
                 total += pixels[s, TILE * x + row]
-                pixels[s, TILE * x + row] = wp.clamp(total, -1.0, 1.0)
+                value = wp.clamp(total, -1.0, 1.0)
+                if rule == EVENODD:
+                    value = fold(total)
+                pixels[s, TILE * x + row] = value
         else:
             total = float(slot_winding[s])
 
@@ -274,7 +282,9 @@ def fill_forward(
     # In:
     offset: wp.int32,
     lane_rows: wp.int32,  # pixel rows of a tile that a thread handles: one, or all
-    kind: wp.array[wp.int32],  # [shape_count]
+    own_part: wp.int32,  # of the shapes to cover
+    part: wp.array[wp.int32],  # [shape_count]
+    rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
@@ -282,6 +292,7 @@ def fill_forward(
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
     coverage: wp.array2d[column],  # [slot_capacity, TILE] signed, in [-1, 1]
@@ -296,7 +307,7 @@ def fill_forward(
     shape = row[0]
     if shape < 0:
         return
-    if kind[shape] != FILL:
+    if part[shape] != own_part:
         return
     end = slot + row[2]
     if not any_visible(slot_state, slot, end):
@@ -311,15 +322,15 @@ def fill_forward(
     top = TILE * row[3]
     row_first = top + lane * lane_rows
     left = float(TILE * row[1])
-    b = vertex[vertex_last[shape] - 1]
     for j in range(vertex_first[shape], vertex_last[shape]):
-        a = b
-        b = vertex[j]
+        a = vertex[j]
+        b = vertex[vertex_next[j]]
         add_edge(coverage_pixels, slot, a, b, left, TILE * row[2], top, row_first, row_first + lane_rows)
-    if lane_rows == TILE:
+    if lane_rows == TILE and rule[shape] == NONZERO:
         sum_columns(coverage, slot_state, slot_winding, slot, end)
     else:
-        sum_row(coverage_pixels, slot_state, slot_winding, slot, end, lane)
+        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
+            sum_row(coverage_pixels, slot_state, slot_winding, slot, end, y, rule[shape])
 
 
 @wp.func
@@ -352,7 +363,8 @@ def leaves_at(border: wp.int32, a: wp.float32, d: wp.float32, inverse: wp.float3
 def fill_backward(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
+    own_part: wp.int32,  # of the shapes to cover
+    part: wp.array[wp.int32],  # [shape_count]
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
     vertex_first: wp.array[wp.int32],  # [shape_count]
@@ -361,6 +373,7 @@ def fill_backward(
     slot_last: wp.array[wp.int32],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] of the area, not clamped; by column
     # Out:
@@ -372,11 +385,11 @@ def fill_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if kind[shape] != FILL or i < vertex_first[shape] or i >= vertex_last[shape]:
+    if part[shape] != own_part or i < vertex_first[shape] or i >= vertex_last[shape]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
-    d = vertex[next_vertex(i, vertex_first[shape], vertex_last[shape])] - vertex[i]
+    d = vertex[vertex_next[i]] - vertex[i]
     if slot_last[shape] > slot_first[shape] and wp.abs(d[0]) + wp.abs(d[1]) > 0.0:
         # From here on, pixels are counted from the corner of the shape's tiles. Those of them that lie
         # outside the canvas have no gradient.

@@ -19,6 +19,7 @@ from warpsplat.kernels.tile import column
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 STROKE = wp.constant(constants.STROKE)
+NONE = wp.constant(constants.NONE)
 TILE = wp.constant(constants.TILE)
 COVERED = wp.constant(constants.COVERED)
 UNCOVERED = wp.constant(constants.UNCOVERED)
@@ -89,20 +90,27 @@ def turn(before: wp.vec2, after: wp.vec2) -> wp.float32:
 
 @wp.func
 def overhang(
-    vertex: wp.array[wp.vec2], i: wp.int32, first: wp.int32, last: wp.int32, reach: wp.float32
+    vertex: wp.array[wp.vec2],
+    vertex_next: wp.array[wp.int32],
+    i: wp.int32,
+    first: wp.int32,
+    reach: wp.float32,
 ) -> wp.vec2:
-    """How far beyond its ends segment ``i`` of the vertices [first, last) is looked at [px].
+    """How far beyond its ends the segment that starts at vertex ``i`` is looked at [px].
 
     A pixel whose nearest point is the joint of two segments lies in the wedge between their normals, hence at
     most the sine of their angle times its distance beyond each of them; at the ends of the stroke are caps.
+    ``first``: the shape's first vertex. Where a closed contour begins, the angle is not looked at.
     """
-    e = vertex[i + 1] - vertex[i]
+    e = vertex[vertex_next[i]] - vertex[i]
     start = float(1.0)
     end = float(1.0)
     if i > first:
-        start = turn(vertex[i] - vertex[i - 1], e)
-    if i + 2 < last:
-        end = turn(e, vertex[i + 2] - vertex[i + 1])
+        if vertex_next[i - 1] == i:
+            start = turn(vertex[i] - vertex[i - 1], e)
+    following = vertex_next[vertex_next[i]]
+    if following != NONE:
+        end = turn(e, vertex[following] - vertex[vertex_next[i]])
     return wp.vec2(start * reach + MARGIN, end * reach + MARGIN)
 
 
@@ -163,6 +171,7 @@ def keep_nearest(
     slot_near: wp.array2d[wp.int32],
     vertex: wp.array[wp.vec2],
     j: wp.int32,
+    b: wp.vec2,
     over: wp.vec2,
     reach: wp.float32,
     inside: wp.float32,
@@ -172,13 +181,14 @@ def keep_nearest(
     rows: wp.vec2i,
     top: wp.int32,
 ):
-    """Where segment ``j`` is nearer than all before it, store it and reach^2 - distance^2.
+    """Where segment ``j``, which ends at ``b``, is nearer than all before it, store it and
+    reach^2 - distance^2.
 
     ``columns``, ``rows``: a lane's pixels [first, last) of the row of tiles at ``top`` that starts with
     ``slot``; those that have ``inside`` are done with.
     """
     a = vertex[j]
-    d = vertex[j + 1] - a
+    d = b - a
     length = wp.length(d)
     e = direction(d, length)
     inverse = 1.0 / wp.max(length * length, TINY)
@@ -227,6 +237,7 @@ def cover_slot(
     pixels: wp.array2d[wp.float32],
     segment: wp.array2d[wp.int32],
     vertex: wp.array[wp.vec2],
+    vertex_next: wp.array[wp.int32],
     s: wp.int32,
     left: wp.int32,
     top: wp.int32,
@@ -247,7 +258,7 @@ def cover_slot(
             elif value > 0.0:
                 j = segment[s, p]
                 centre = wp.vec2(float(left + x) + 0.5, float(y) + 0.5)
-                value = strip_coverage(centre, vertex[j], vertex[j + 1], half)
+                value = strip_coverage(centre, vertex[j], vertex[vertex_next[j]], half)
                 pixels[s, p] = value
             most = wp.max(most, value)
             least = wp.min(least, value)
@@ -265,12 +276,13 @@ def stroke_forward(
     lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
     slot_first: wp.array[wp.int32],  # [shape_count]
-    kind: wp.array[wp.int32],  # [shape_count]
+    part: wp.array[wp.int32],  # [shape_count]
     widths: wp.array[wp.float32],  # [shape_count] canvas units
     scale: wp.float32,
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
     coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
@@ -288,7 +300,7 @@ def stroke_forward(
     shape = row[0]
     if shape < 0:
         return
-    if kind[shape] != STROKE:
+    if part[shape] != STROKE:
         return
     half = half_width(widths[shape], scale)
     reach = half + HALF_DIAGONAL
@@ -307,20 +319,20 @@ def stroke_forward(
                 coverage[s, x] = column(0.0)
             else:
                 coverage_pixels[s, TILE * x + lane] = 0.0
-    start = vertex_first[shape]
-    stop = vertex_last[shape]
-    b = vertex[start]
-    for j in range(start, stop - 1):
-        a = b
-        b = vertex[j + 1]
+    for j in range(vertex_first[shape], vertex_last[shape]):
+        if vertex_next[j] == NONE:
+            continue
+        a = vertex[j]
+        b = vertex[vertex_next[j]]
         if wp.min(a[1], b[1]) - reach < float(rows[1]) and wp.max(a[1], b[1]) + reach > float(rows[0]):
-            over = overhang(vertex, j, start, stop, reach)
+            over = overhang(vertex, vertex_next, j, vertex_first[shape], reach)
             keep_nearest(
                 coverage_pixels,
                 segment,
                 slot_near,
                 vertex,
                 j,
+                b,
                 over,
                 reach,
                 inside,
@@ -334,7 +346,7 @@ def stroke_forward(
         state = int(UNCOVERED)
         if slot_near[s, lane] == 1:
             at = left + TILE * (s - slot)
-            state = cover_slot(coverage_pixels, segment, vertex, s, at, top, rows, half, inside)
+            state = cover_slot(coverage_pixels, segment, vertex, vertex_next, s, at, top, rows, half, inside)
         wp.atomic_or(slot_state, s, state)
 
 
@@ -344,7 +356,7 @@ def stroke_backward(
     offset: wp.int32,
     width: wp.int32,  # px
     height: wp.int32,  # px
-    kind: wp.array[wp.int32],  # [shape_count]
+    part: wp.array[wp.int32],  # [shape_count]
     widths: wp.array[wp.float32],  # [shape_count] canvas units
     scale: wp.float32,
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
@@ -355,6 +367,7 @@ def stroke_backward(
     slot_last: wp.array[wp.int32],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS]
     sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] 0 where the coverage is 0 or 1
@@ -368,22 +381,22 @@ def stroke_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if kind[shape] != STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
+    if part[shape] != STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     of_half = float(0.0)
-    if slot_last[shape] > slot_first[shape] and i + 1 < vertex_last[shape]:
+    if slot_last[shape] > slot_first[shape] and vertex_next[i] != NONE:
         half = half_width(widths[shape], scale)
         reach = half + HALF_DIAGONAL
         x0 = shape_tiles[shape, 0]
         y0 = shape_tiles[shape, 1]
         wide = shape_tiles[shape, 2] - x0
         a = vertex[i]
-        b = vertex[i + 1]
+        b = vertex[vertex_next[i]]
         length = wp.length(b - a)
         e = direction(b - a, length)
-        over = overhang(vertex, i, vertex_first[shape], vertex_last[shape], reach)
+        over = overhang(vertex, vertex_next, i, vertex_first[shape], reach)
         ends = segment_ends(e, length, over)
         sides = segment_sides(e, reach)
         heights = segment_rows(a, e, length, reach, over)
@@ -424,7 +437,7 @@ def stroke_backward(
 def widths_backward(
     # In:
     offset: wp.int32,
-    kind: wp.array[wp.int32],  # [shape_count]
+    part: wp.array[wp.int32],  # [shape_count]
     scale: wp.float32,
     vertex_first: wp.array[wp.int32],  # [shape_count]
     vertex_last: wp.array[wp.int32],  # [shape_count]
@@ -434,7 +447,7 @@ def widths_backward(
 ):
     """One thread a shape sums its segments in order."""
     shape = offset + wp.tid()
-    if kind[shape] != STROKE:
+    if part[shape] != STROKE:
         return
     total = float(0.0)
     for i in range(vertex_first[shape], vertex_last[shape]):

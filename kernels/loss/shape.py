@@ -21,27 +21,32 @@ def xing_backward(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
     basis: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
+    contour_shape: wp.array[wp.int32],  # [contour_count]
+    contour_first: wp.array[wp.int32],  # [contour_count + 1]
+    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
+    contour_closed: wp.array[wp.int32],  # [contour_count]
     weight: wp.float32,
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] added to
-    shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's Béziers, before weight and mean
+    contour_loss: wp.array[
+        wp.float32
+    ],  # [contour_count] sum over the contour's Béziers, before weight and mean
 ):
     """Xing loss of LIVE (Ma et al. 2022, eq. 5) of each Bézier's edges v1, v2, v3 (as a cubic):
     relu(-sin(v1, v3)) where sin(v1, v2) >= 0, else relu(sin(v1, v3)); the mean over all Béziers.
 
-    One thread a shape. d sin(a, b) / da = (perp(b) - sin a |b| / |a|) / (|a| |b|), perp(b) = (b_y, -b_x).
+    One thread a contour. d sin(a, b) / da = (perp(b) - sin a |b| / |a|) / (|a| |b|), perp(b) = (b_y, -b_x).
     """
-    shape = offset + wp.tid()
-    first = point_first[shape]
-    count = point_first[shape + 1] - first
-    factor = weight / float(bezier_first[bezier_first.shape[0] - 1])
+    contour = offset + wp.tid()
+    shape = contour_shape[contour]
+    closed = contour_closed[contour]
+    first = contour_first[contour]
+    count = contour_first[contour + 1] - first
+    factor = weight / float(contour_bezier[contour_bezier.shape[0] - 1])
     total = float(0.0)
-    for local in range(bezier_first[shape + 1] - bezier_first[shape]):
-        p = bezier_points(points, kind[shape], basis[shape], first, count, local)
+    for local in range(contour_bezier[contour + 1] - contour_bezier[contour]):
+        p = bezier_points(points, closed, basis[shape], first, count, local)
         a = p[1] - p[0]
         middle = p[2] - p[1]
         b = p[3] - p[2]
@@ -63,8 +68,8 @@ def xing_backward(
             grad = control_points(
                 -a_grad[0], -a_grad[1], a_grad[0], a_grad[1], -b_grad[0], -b_grad[1], b_grad[0], b_grad[1]
             )
-            add_bezier_grad(grad, kind[shape], basis[shape], first, count, local, points_grad)
-    shape_loss[shape] = total
+            add_bezier_grad(grad, closed, basis[shape], first, count, local, points_grad)
+    contour_loss[contour] = total
 
 
 @wp.kernel
@@ -72,25 +77,29 @@ def bending_backward(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
     basis: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    bezier_first: wp.array[wp.int32],  # [shape_count + 1]
+    contour_shape: wp.array[wp.int32],  # [contour_count]
+    contour_first: wp.array[wp.int32],  # [contour_count + 1]
+    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
+    contour_closed: wp.array[wp.int32],  # [contour_count]
     weight: wp.float32,
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] added to
-    shape_loss: wp.array[wp.float32],  # [shape_count] sum over the shape's Béziers, before weight
+    contour_loss: wp.array[wp.float32],  # [contour_count] sum over the contour's Béziers, before weight
 ):
     """Bending of each Bézier, as a cubic: (|a|^2 + |b|^2) / (1 + c), a and b the second differences of its
     control points and c the distance of its ends. A unit of length, as a hundredth of the outline of a circle
-    is; but large where handles are long for the way that they go, as in burrs and loops. One thread a shape.
+    is; but large where handles are long for the way that they go, as in burrs and loops. One thread a
+    contour.
     """
-    shape = offset + wp.tid()
-    first = point_first[shape]
-    count = point_first[shape + 1] - first
+    contour = offset + wp.tid()
+    shape = contour_shape[contour]
+    closed = contour_closed[contour]
+    first = contour_first[contour]
+    count = contour_first[contour + 1] - first
     total = float(0.0)
-    for local in range(bezier_first[shape + 1] - bezier_first[shape]):
-        p = bezier_points(points, kind[shape], basis[shape], first, count, local)
+    for local in range(contour_bezier[contour + 1] - contour_bezier[contour]):
+        p = bezier_points(points, closed, basis[shape], first, count, local)
         a = p[0] - 2.0 * p[1] + p[2]
         b = p[1] - 2.0 * p[2] + p[3]
         chord = p[3] - p[0]
@@ -107,5 +116,5 @@ def bending_backward(
         g2 = k * (a - 2.0 * b)
         g3 = k * b - stretch
         grad = control_points(g0[0], g0[1], g1[0], g1[1], g2[0], g2[1], g3[0], g3[1])
-        add_bezier_grad(grad, kind[shape], basis[shape], first, count, local, points_grad)
-    shape_loss[shape] = total
+        add_bezier_grad(grad, closed, basis[shape], first, count, local, points_grad)
+    contour_loss[contour] = total

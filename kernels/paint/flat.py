@@ -1,7 +1,7 @@
 """Flat paint: one colour and one opacity a shape, and the adjoint.
 
 Compositing asks a paint for two things of a column of pixels: a light times the paint's colour, and the
-colour times the image's gradient. A paint that changes from pixel to pixel would answer the same questions.
+colour times the image's gradient. Gradients (``gradient``) lie in memory instead, pixel by pixel.
 """
 
 import warp as wp
@@ -11,13 +11,21 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+FLAT = wp.constant(constants.FLAT)
+SOME = wp.constant(1.0e-20)  # as good as nothing, but with a sign
 COVERED = wp.constant(constants.COVERED)
 HIDDEN = wp.constant(constants.HIDDEN)
 
 
 @wp.func
-def shape_paint(colors: wp.array[wp.vec3], opacities: wp.array[wp.float32], shape: wp.int32) -> wp.vec4:
-    """Colour and opacity of a shape, as the tiles' lists have them."""
+def shape_paint(
+    paint: wp.array[wp.int32], colors: wp.array[wp.vec3], opacities: wp.array[wp.float32], shape: wp.int32
+) -> wp.vec4:
+    """Colour and opacity of a shape, as the tiles' lists have them; a negative opacity says that the colour
+    is a gradient's.
+    """
+    if paint[shape] != FLAT:
+        return wp.vec4(0.0, 0.0, 0.0, -wp.max(opacities[shape], SOME))
     color = colors[shape]
     return wp.vec4(color[0], color[1], color[2], opacities[shape])
 
@@ -39,6 +47,7 @@ def flat_backward(
     # In:
     offset: wp.int32,
     lanes: wp.int32,
+    paint: wp.array[wp.int32],  # [shape_count]
     slot_first: wp.array[wp.int32],  # [shape_count]
     slot_last: wp.array[wp.int32],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
@@ -66,5 +75,10 @@ def flat_backward(
             else:
                 for lane in range(lanes):
                     sums = sums + slot_grad[slot, lane]
+    if paint[shape] != FLAT:
+        red = column(0.0)
+        green = column(0.0)
+        blue = column(0.0)
+        sums = wp.vec4(0.0, 0.0, 0.0, sums[3])
     colors_grad[shape] = wp.vec3(sums[0] + total(red), sums[1] + total(green), sums[2] + total(blue))
     opacities_grad[shape] = sums[3] + total(opacity)

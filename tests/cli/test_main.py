@@ -88,7 +88,7 @@ ODD = [
     (["render", "good.svg", "-o", "a.png", "--scale", "1e-9"], 2),
     (["eval", "photo.png", "square.svg"], 3),
     (["refine", "square.svg", "photo.png", "-o", "b.svg"], 3),
-    (["refine", "gradient.svg", "photo.png", "-o", "b.svg"], 3),
+    (["refine", "pattern.svg", "photo.png", "-o", "b.svg"], 3),
     (["refine", "clip.svg", "photo.png", "-o", "b.svg"], 3),
     (["refine", "opacity.svg", "photo.png", "-o", "b.svg"], 3),
     (["nonsense"], 2),
@@ -107,9 +107,9 @@ def test_odd_requests_are_one_line(
     files = {
         "good.svg": 'width="5in" height="4in" viewBox="0 0 50 40"/>',
         "square.svg": f'width="40" height="40">{path}/></svg>',
-        "gradient.svg": f'width="60" height="40">{path}fill="url(#g)"/></svg>',
+        "pattern.svg": f'width="60" height="40"><pattern id="g"/>{path}fill="url(#g)"/></svg>',
         "clip.svg": f'width="60" height="40"><g clip-path="url(#c)">{path}/></g></svg>',
-        "opacity.svg": f'width="60" height="40">{path}opacity=".5em"/></svg>',
+        "opacity.svg": f'width="60" height="40">{path}stroke="red" opacity=".5"/></svg>',
     }
     for name, text in files.items():
         (image.parent / name).write_text(head + text)

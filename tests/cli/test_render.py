@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run
+from warpsplat.metrics import psnr
 
 
 def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,3 +54,62 @@ def test_physical_units(tmp_path: Path) -> None:
     assert run("render", svg, "-o", tmp_path / "a.png") == 0
     with Image.open(tmp_path / "a.png") as picture:
         assert picture.size == (96, 48)
+
+
+SHAPES = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20.4">'
+    '<circle cx="10" cy="10" r="8" fill="red" fill-opacity=".5"/>'
+    '<path d="M18 4q9 0 6 12" fill="none" stroke="blue" stroke-width="3" stroke-linecap="round" '
+    'stroke-linejoin="round"/></svg>'
+)
+
+
+@pytest.mark.parametrize(("renderer", "least"), [("exact", 34), ("splat", 24)])
+def test_our_own_renderers(renderer: str, least: float, tmp_path: Path) -> None:
+    (tmp_path / "a.svg").write_text(SHAPES)
+    pictures = []
+    for name in (renderer, "viewer"):
+        png = tmp_path / f"{name}.png"
+        arguments = ["--device", "cpu"] if name == renderer else []
+        assert (
+            run("render", tmp_path / "a.svg", "-o", png, "--scale", "2.5", "--renderer", name, *arguments)
+            == 0
+        )
+        with Image.open(png) as picture:
+            assert picture.mode == "RGBA"
+            pictures.append(picture.copy())
+    assert pictures[0].size == pictures[1].size == (75, 50)
+    for paper in ("white", "black"):
+        shown = [Image.new("RGBA", p.size, paper) for p in pictures]
+        for below, above in zip(shown, pictures, strict=True):
+            below.alpha_composite(above)
+        assert psnr(*(np.asarray(p.convert("RGB")).astype(np.float64) for p in shown)) > least
+
+
+@pytest.mark.parametrize(
+    ("renderer", "body", "words"),
+    [
+        ("exact", "<text>a</text>", "<text>"),
+        ("splat", '<path d="M1 1h9v9zM3 3v4h4z"/>', "several contours"),
+        ("splat", '<path d="M1 1h9v9" fill="none" stroke="red"/>', "caps"),
+    ],
+)
+def test_what_they_cannot_show_is_named(
+    renderer: str, body: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    svg = tmp_path / "a.svg"
+    svg.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20">{body}</svg>')
+    assert run("render", svg, "-o", tmp_path / "a.png", "--renderer", renderer, "--device", "cpu") == 3
+    message = one_line(capsys.readouterr().err)
+    assert words in message
+    assert "a.svg" in message
+
+
+@pytest.mark.parametrize("body", ["", '<rect width="30" height="20" fill="red"/>'])
+def test_nothing_but_paper(body: str, tmp_path: Path) -> None:
+    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
+    svg.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20">{body}</svg>')
+    assert run("render", svg, "-o", png, "--renderer", "exact", "--device", "cpu") == 0
+    with Image.open(png) as picture:
+        expected = (255, 0, 0, 255) if body else (0, 0, 0, 0)
+        assert picture.convert("RGBA").getpixel((15, 10)) == expected

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.fit.place import canvas_for
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.scene import FloatArray, Kind, Scene
 
 
@@ -20,4 +20,4 @@ def picture(width: int = 64, height: int = 48) -> FloatArray:
 def empty_scene(settings: Settings, target: FloatArray) -> Scene:
     """No shapes yet."""
     points = np.zeros((0, 6 * settings.chain_cubics, 2), np.float32)
-    return Scene.uniform(Kind.FILL, canvas_for(target), points)
+    return Scene.uniform(Kind.FILL, canvas_for(make_settings(), target), points)

@@ -20,6 +20,7 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.render.backend import Backend
+from warpsplat.render.models import ExactModel
 from warpsplat.render.renderer import render
 from warpsplat.scene import OPACITY_RANGE, Basis, FloatArray, Kind, Scene
 from warpsplat.svg.read import load_scene
@@ -171,7 +172,8 @@ def test_the_coarsest_grid_within_the_loss(
     grid = choose_grid(step, staged=staged)
 
     def error(points: np.ndarray) -> float:
-        shown = render(replace(scene, points=points), backend=step.renderer.backend)
+        model = ExactModel(slack=step.target.slack)
+        shown = render(replace(scene, points=points), model=model, backend=step.renderer.backend)
         return float(((shown - image) ** 2).mean(dtype=np.float64))
 
     before = error(scene.points)

@@ -37,7 +37,7 @@ def between(a: FloatArray, b: FloatArray, kind: Kind = Kind.FILL) -> float:
     masks = []
     for points in (a, b):
         mask = np.zeros((64 * FINE, 64 * FINE), np.uint8)
-        outline = flatten(points[None], kind, Basis.SPLINE, pieces=64)[0]
+        outline = flatten(points[None], kind == Kind.FILL, Basis.SPLINE, pieces=64)[0]
         if kind == Kind.STROKE:  # closed below the canvas
             outline = np.concatenate([outline, [[outline[-1, 0], 80], [outline[0, 0], 80]]])
         cv2.fillPoly(mask, [np.round(outline * FINE).astype(np.int32)], 1)
@@ -59,7 +59,7 @@ def ring_of(kind: str) -> FloatArray:
 @pytest.mark.parametrize("kind", ["circle", "bean", "wobble"])
 def test_area_between_the_outlines(kind: str) -> None:
     ring = ring_of(kind)
-    moved, area = without(ring[None], Kind.FILL)
+    moved, area = without(ring[None], closed=True)
     counted = [between(ring, removed(ring, k, moved[0, k])) for k in range(len(ring))]
     np.testing.assert_allclose(area[0], counted, rtol=0.12)
 
@@ -68,7 +68,7 @@ def test_area_between_the_outlines(kind: str) -> None:
 def test_neighbours_go_where_little_changes(kind: str) -> None:
     """Along the bulge that the point made, no distance leaves much less area between the outlines."""
     ring = ring_of(kind)
-    moved, _ = without(ring[None], Kind.FILL)
+    moved, _ = without(ring[None], closed=True)
     found, best = 0.0, 0.0
     for k in range(len(ring)):
         stay = ring[[k - 1, (k + 1) % len(ring)]]
@@ -83,7 +83,7 @@ def test_neighbours_go_where_little_changes(kind: str) -> None:
 
 def test_a_point_of_a_circle_costs_little() -> None:
     ring = ring_of("circle")
-    moved, area = without(ring[None], Kind.FILL)
+    moved, area = without(ring[None], closed=True)
     np.testing.assert_allclose(area[0], area[0, 0], rtol=1e-3)
     assert between(ring, removed(ring, 0, moved[0, 0])) < 0.01 * areas(one(ring))[0]
 
@@ -92,7 +92,7 @@ def test_a_point_of_a_straight_side_costs_nothing() -> None:
     side = np.stack([np.arange(8) * 6.0 + 8, np.full(8, 10.0)], axis=1)
     corner = np.array([[54, 30], [50, 50], [32, 56], [12, 50], [8, 30]], float)
     ring = np.concatenate([side, corner]).astype(np.float32)
-    moved, area = without(ring[None], Kind.FILL)
+    moved, area = without(ring[None], closed=True)
     assert (area[0, 3:5] < 1e-3).all(), "three others on the side before and behind"
     np.testing.assert_allclose(moved[0, 3:5, :, 1], 10, atol=1e-4)
     assert area[0, 8:].min() > 1
@@ -108,7 +108,7 @@ def chain_of(count: int) -> FloatArray:
 def test_ends_of_a_stroke_stay(count: int) -> None:
     """Neither removed nor moved, whichever point goes."""
     chain = chain_of(count)
-    moved, area = without(chain[None], Kind.STROKE)
+    moved, area = without(chain[None], closed=False)
     assert np.isinf(area[0, [0, -1]]).all()
     assert np.isfinite(area[0, 1:-1]).all()
     for k in range(1, count - 1):
@@ -119,7 +119,7 @@ def test_ends_of_a_stroke_stay(count: int) -> None:
 def test_area_that_a_stroke_sweeps() -> None:
     """Of the points whose neighbours are free to move."""
     chain = chain_of(14)
-    moved, area = without(chain[None], Kind.STROKE)
+    moved, area = without(chain[None], closed=False)
     for k in range(3, 11):
         counted = between(chain, removed(chain, k, moved[0, k]), Kind.STROKE)
         assert area[0, k] == pytest.approx(counted, rel=0.12, abs=0.2), k
@@ -128,11 +128,11 @@ def test_area_that_a_stroke_sweeps() -> None:
 def test_a_point_of_a_straight_stroke_costs_nothing() -> None:
     x = np.arange(9, dtype=np.float32) * 6 + 8
     chain = np.stack([x, 0.5 * x + 10], axis=1)
-    _, area = without(chain[None], Kind.STROKE)
+    _, area = without(chain[None], closed=False)
     assert area[0, 1:-1].max() < 1e-3
     bent = chain.copy()
     bent[4, 1] += 5
-    assert without(bent[None], Kind.STROKE)[1][0, 4] > 1
+    assert without(bent[None], closed=False)[1][0, 4] > 1
 
 
 def one(ring: FloatArray) -> Scene:
@@ -162,7 +162,7 @@ def test_the_cheapest_points_go_and_all_else_stays() -> None:
     for i in range(len(scene)):
         kind = Kind(int(scene.kind[i]))
         if scene.basis[i] == Basis.SPLINE and scene.point_counts()[i] > LEAST_POINTS:
-            moved, area = without(scene.points_of(i)[None], kind)
+            moved, area = without(scene.points_of(i)[None], closed=kind == Kind.FILL)
             k = int(area[0].argmin())
             costs.append((area[0, k], scene.first[i] + k, removed(scene.points_of(i), k, moved[0, k]), i))
     _, cheapest, points, owner_of_it = min(costs, key=lambda c: c[0])

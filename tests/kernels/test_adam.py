@@ -21,6 +21,7 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
         "owner": wp.array(owner, dtype=int, device=device),
         "held": wp.zeros(len(owner), dtype=int, device=device),
         "kind": wp.array(kind, dtype=int, device=device),
+        "paint": wp.zeros(len(kind), dtype=int, device=device),
         "ages": wp.zeros(len(kind), dtype=int, device=device),
         "clock": wp.zeros(1, dtype=int, device=device),
         "bias1": wp.zeros(len(kind), dtype=float, device=device),
@@ -33,7 +34,7 @@ def step(s: dict[str, Any], gradient: np.ndarray, device: str, **values: float) 
     s["grad"].assign(gradient)
     decay = {"step_count": 20, "final": values.pop("final", 0.1)}
     run(adam.advance, s["ages"].shape[0], device, s, **decay)
-    settings = {"kinds": BOTH, "rate": 0.1, "low": -100.0, "high": 100.0}
+    settings = {"kinds": BOTH, "paints": 1, "rate": 0.1, "low": -100.0, "high": 100.0}
     run(adam.adam_update, s["value"].shape, device, s, **{**settings, **values})
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 
 from tests.reference.curves import Tensors
+from tests.reference.paint import pixel_paint
 from warpsplat.scene import Scene
 
 
@@ -14,11 +15,15 @@ def pixel_centres(width: int, height: int) -> torch.Tensor:
     return torch.stack([x, y], dim=2)
 
 
-def composite(coverages: list[torch.Tensor], p: Tensors, scene: Scene) -> torch.Tensor:
+def composite(coverages: list[torch.Tensor], p: Tensors, scene: Scene, scale: float = 1.0) -> torch.Tensor:
     """Back to front, the other way round than the kernels: C <- alpha c + (1 - alpha) C."""
-    background = torch.tensor(scene.canvas.background.astype("float64"))
-    image = background.expand(*coverages[0].shape, 3)
+    height, width = coverages[0].shape
+    solid = scene.canvas.background
+    background = torch.zeros(4) if solid is None else torch.tensor([*solid.astype("float64"), 1.0])
+    image = background.expand(height, width, 4)
     for shape, cover in enumerate(coverages):
-        alpha = (p["opacities"][shape] * cover)[..., None]
-        image = alpha * p["colors"][shape] + (1 - alpha) * image
-    return image
+        color, opacity = pixel_paint(scene, p, shape, pixel_centres(width, height) / scale)
+        alpha = (p["opacities"][shape] * cover * opacity)[..., None]
+        opaque = torch.cat([color, torch.ones_like(color[..., :1])], dim=-1)
+        image = alpha * opaque + (1 - alpha) * image
+    return image if solid is None else image[..., :3]

@@ -6,7 +6,7 @@ import itertools
 
 import torch
 
-from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Basis, Scene
 
 Tensors = dict[str, torch.Tensor]
 
@@ -44,9 +44,8 @@ def tangent(p: torch.Tensor, t: torch.Tensor) -> torch.Tensor:
     return (1 - s) ** 2 * d[0] + 2 * s * (1 - s) * d[1] + s**2 * d[2]
 
 
-def chain(points: torch.Tensor, kind: Kind, basis: Basis) -> torch.Tensor:
-    """A shape's outline as a chain of cubics [3 n + 1, 2]; a fill's ends where it begins."""
-    ring = kind == Kind.FILL
+def chain(points: torch.Tensor, ring: bool, basis: Basis) -> torch.Tensor:
+    """A contour as a chain of cubics [3 n + 1, 2]; a ring's ends where it begins."""
     if basis == Basis.CUBIC:
         return torch.cat([points, points[:1]]) if ring else points
     knots, poles = spline(points, ring)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import torch
 
+from tests.reference import stroker
 from tests.reference.composite import pixel_centres
 from tests.reference.curves import Tensors, points_of
 from tests.reference.outline import polyline
-from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.scene import Basis, Cap, Join, Kind, Rule, Scene
+from warpsplat.scene.attributes import NO_DASHES
 
 
 def ramp_integral(u: torch.Tensor) -> torch.Tensor:
@@ -15,11 +17,30 @@ def ramp_integral(u: torch.Tensor) -> torch.Tensor:
     return torch.where(u < 0, torch.zeros_like(u), torch.where(u < 1, u * u / 2, u - 0.5))
 
 
-def fill_coverage(vertices: torch.Tensor, width: int, height: int) -> torch.Tensor:
-    """|winding-weighted area| of each pixel, at most 1, [height, width]: over each edge, the integral by y
-    of the part of the pixel's row that lies right of the edge.
+Lines = list[torch.Tensor]
+"""Vertices of each contour, [vertex, 2]; those of a closed one end where they begin."""
+
+
+def ends(contours: Lines) -> tuple[torch.Tensor, torch.Tensor]:
+    """Both ends of all edges, [edge, 1, 1, 2]."""
+    starts, stops = (
+        torch.cat(v)[:, None, None] for v in ([c[:-1] for c in contours], [c[1:] for c in contours])
+    )
+    return starts, stops
+
+
+def inside(area: torch.Tensor, rule: Rule) -> torch.Tensor:
+    """Winding-weighted areas -> coverages: at most 1, or how far from the nearest even number."""
+    if rule == Rule.NONZERO:
+        return area.abs().clamp(max=1)
+    return 1 - (area.abs() % 2 - 1).abs()
+
+
+def fill_area(contours: Lines, width: int, height: int) -> torch.Tensor:
+    """Winding-weighted area of each pixel, [height, width]: over each edge, the integral by y of the part of
+    the pixel's row that lies right of the edge.
     """
-    a, b = vertices[:-1, None, None], vertices[1:, None, None]
+    a, b = ends([torch.cat([c, c[:1]]) for c in contours])
     x0, y0 = torch.arange(width)[None, None, :], torch.arange(height)[None, :, None]
     slope = (b[..., 0] - a[..., 0]) / torch.where(
         b[..., 1] == a[..., 1], torch.ones(()), b[..., 1] - a[..., 1]
@@ -32,7 +53,7 @@ def fill_coverage(vertices: torch.Tensor, width: int, height: int) -> torch.Tens
     rise = torch.where(steep, torch.ones(()), ub - ua)
     sloped = (ramp_integral(ub) - ramp_integral(ua)) / rise
     share = torch.where(steep, ((ua + ub) / 2).clamp(0, 1), sloped)
-    return (share * (yb - ya)).sum(0).abs().clamp(max=1)
+    return (share * (yb - ya)).sum(0)
 
 
 def half_plane(x: torch.Tensor, n: torch.Tensor) -> torch.Tensor:
@@ -47,10 +68,10 @@ def half_plane(x: torch.Tensor, n: torch.Tensor) -> torch.Tensor:
     return total / (wide * narrow)
 
 
-def stroke_coverage(vertices: torch.Tensor, half: torch.Tensor, width: int, height: int) -> torch.Tensor:
+def stroke_coverage(contours: Lines, half: torch.Tensor, width: int, height: int) -> torch.Tensor:
     """Box-filtered band of half-width ``half`` around the nearest segment, [height, width]."""
     centres = pixel_centres(width, height)[None]
-    a, b = vertices[:-1, None, None], vertices[1:, None, None]
+    a, b = ends(contours)
     e = b - a
     t = (((centres - a) * e).sum(-1) / (e * e).sum(-1).clamp(min=1e-12)).clamp(0, 1)[..., None]
     r = centres - a - t * e
@@ -68,11 +89,35 @@ def coverages(
     """Of each shape, [height, width]; ``pieces`` of each shape's Béziers."""
     covers = []
     for shape, count in enumerate(pieces):
-        kind = Kind(int(scene.kind[shape]))
         basis = Basis(int(scene.basis[shape]))
-        vertices = polyline(scale * points_of(scene, p, shape), count, kind, basis)
-        if kind == Kind.FILL:
-            covers.append(fill_coverage(vertices, width, height))
+        points, rest, lines = scale * points_of(scene, p, shape), count, []
+        corners = []
+        for own, closed in scene.contours_of(shape):
+            beziers = len(own) // 3 if basis == Basis.CUBIC else len(own) - 2 * (not closed)
+            lines.append(polyline(points[: len(own)], rest[:beziers], closed, basis))
+            corners.append([k == 0 for n in rest[:beziers] for k in range(n)])
+            points, rest = points[len(own) :], rest[beziers:]
+        half = scale * p["widths"][shape] / 2
+        if scene.kind[shape] == Kind.FILL:
+            covers.append(inside(fill_area(lines, width, height), Rule(int(scene.rule[shape]))))
+        elif style := style_of(scene, shape, half, scale):
+            closed_ones = [closed for _, closed in scene.contours_of(shape)]
+            drawn = [
+                torch.stack(polygon)
+                for each in zip(lines, corners, closed_ones, strict=True)
+                for polygon in stroker.polygons(*each, style)
+            ]
+            area = fill_area(drawn, width, height) if drawn else torch.zeros((height, width))
+            covers.append(inside(area, Rule.NONZERO))
         else:
-            covers.append(stroke_coverage(vertices, scale * p["widths"][shape] / 2, width, height))
+            covers.append(stroke_coverage(lines, half, width, height))
     return covers
+
+
+def style_of(scene: Scene, shape: int, half: torch.Tensor, scale: float) -> stroker.Style | None:
+    """Of a stroke that is not round throughout."""
+    cap, join, row = Cap(int(scene.cap[shape])), Join(int(scene.join[shape])), int(scene.dash[shape])
+    if cap == Cap.ROUND and join == Join.ROUND and row == NO_DASHES:
+        return None
+    dashes = () if row == NO_DASHES else tuple(scale * x for x in scene.dashes[row])
+    return stroker.Style(half, cap, join, float(scene.miter_limits[shape]), dashes)

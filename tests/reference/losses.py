@@ -13,7 +13,7 @@ def cubics(scene: Scene, points: torch.Tensor) -> torch.Tensor:
     found = []
     for shape in range(len(scene)):
         own = points_of(scene, {"points": points}, shape)
-        outline = chain(own, Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape])))
+        outline = chain(own, scene.kind[shape] == Kind.FILL, Basis(int(scene.basis[shape])))
         found += [outline[i : i + 4] for i in range(0, len(outline) - 1, 3)]
     return torch.stack(found)
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import torch
 
 from tests.reference.curves import chain
-from warpsplat.scene import Basis, Kind
+from warpsplat.scene import Basis
 
 
-def polyline(points: torch.Tensor, pieces: list[int], kind: Kind, basis: Basis) -> torch.Tensor:
-    """Vertices of a flattened shape, ``pieces`` of each Bézier; a fill ends where it begins."""
-    path = chain(points, kind, basis)
+def polyline(points: torch.Tensor, pieces: list[int], ring: bool, basis: Basis) -> torch.Tensor:
+    """Vertices of a flattened contour, ``pieces`` of each Bézier; a ring ends where it begins."""
+    path = chain(points, ring, basis)
     sides = [shifted(path[3 * i : 3 * i + 4], n) for i, n in enumerate(pieces)]
-    ring = kind == Kind.FILL
     joints = [(a[-1:] + b[:1]) / 2 for a, b in zip([sides[-1], *sides], sides, strict=False)]
     if not ring:
         joints[0] = path[:1]

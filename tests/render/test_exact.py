@@ -106,6 +106,7 @@ def test_against_a_supersampled_truth(device: str, kind: Kind, basis: Basis, siz
     scene = replace(scene, widths=scene.widths * np.float32(size))
     big = on_white(render_svg(write_svg(scene), zoom=16))
     truth = cv2.resize(big, (96, 80), interpolation=cv2.INTER_AREA)
+    assert scene.canvas.background is not None
     background = (np.round(scene.canvas.background * 255) / 255).astype(np.float32)
     held = rounded(replace(scene, canvas=replace(scene.canvas, background=background)), GRIDS[-1])
     mine = render(held, backend=Backend.on(device)).astype(np.float64) * 255
@@ -213,7 +214,7 @@ def test_polylines_are_as_near_to_the_curves_as_they_should(device: str, slack: 
     for shape in range(len(scene)):
         ring = b.vertex.numpy()[b.vertex_first.numpy()[shape] : b.vertex_last.numpy()[shape]]
         start, way = ring, np.roll(ring, -1, axis=0) - ring
-        curve = flatten(scene.points_of(shape)[None], Kind.FILL, 200)[0]
+        curve = flatten(scene.points_of(shape)[None], True, Basis.CUBIC, 200)[0]
         along = ((curve[:, None] - start) * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-12)
         foot = start + np.clip(along, 0, 1)[..., None] * way
         worst = max(worst, np.linalg.norm(curve[:, None] - foot, axis=2).min(axis=1).max())

@@ -103,6 +103,7 @@ class BoxModel:
 def expected(scene: Scene, scale: float) -> np.ndarray:
     """The image by the formula, in float64."""
     width, height = round(scene.canvas.width * scale), round(scene.canvas.height * scale)
+    assert scene.canvas.background is not None
     image = np.tile(scene.canvas.background.astype(np.float64), (height, width, 1))
     for i in range(len(scene)):
         low, high = (scale * f(scene.points_of(i).astype(np.float64), axis=0) for f in (np.min, np.max))

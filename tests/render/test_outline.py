@@ -26,7 +26,7 @@ def curve(scene: Scene, shape: int, t: torch.Tensor) -> torch.Tensor:
     kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
     if basis == Basis.SPLINE:
         return spline_at(points, kind == Kind.FILL, t)
-    return bezier(chain(points, kind, basis), t)
+    return bezier(chain(points, kind == Kind.FILL, basis), t)
 
 
 @pytest.mark.parametrize(("kind", "beziers"), SPLINES)
@@ -35,7 +35,7 @@ def test_the_reference_agrees_with_the_recursion(kind: Kind, beziers: int) -> No
     t = torch.linspace(0, beziers, 101, dtype=torch.float64)
     points = torch.tensor(scene.points, dtype=torch.float64)
     np.testing.assert_allclose(
-        bezier(chain(points, kind, Basis.SPLINE), t), curve(scene, 0, t), rtol=0, atol=1e-12
+        bezier(chain(points, kind == Kind.FILL, Basis.SPLINE), t), curve(scene, 0, t), rtol=0, atol=1e-12
     )
 
 
@@ -50,7 +50,7 @@ def test_vertices(device: str, scale: float) -> None:
         kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
         assert min(pieces) >= (3 if basis == Basis.CUBIC else 2)
         points = torch.tensor(scale * scene.points_of(shape), dtype=torch.float64)
-        want = polyline(points, pieces, kind, basis).numpy()
+        want = polyline(points, pieces, kind == Kind.FILL, basis).numpy()
         got = vertex[firsts[shape] : lasts[shape]]
         np.testing.assert_allclose(got, want[: len(got)], atol=2e-4 * scale)
         steps = np.concatenate([number + np.arange(n) / n for number, n in enumerate(pieces)])
@@ -73,7 +73,7 @@ def test_a_polyline_encloses_what_its_curve_does(basis: Basis) -> None:
         scene = Scene.uniform(Kind.FILL, scene.canvas, ring, basis)
     points = torch.tensor(scene.points, dtype=torch.float64)
     count = int(scene.bezier_counts()[0])
-    coarse, fine = (polyline(points, [n] * count, Kind.FILL, basis) for n in (3, 300))
+    coarse, fine = (polyline(points, [n] * count, True, basis) for n in (3, 300))
     steps = torch.linspace(0, count, 3 * count + 1, dtype=torch.float64)
     chords = curve(scene, 0, steps)
     assert abs(area(coarse) - area(fine)) < 0.02 * abs(area(chords) - area(fine))
@@ -90,12 +90,16 @@ def test_weights_of_points(kind: Kind, basis: Basis, beziers: int) -> None:
     of_point = range(4 if basis == Basis.CUBIC else 3)
     for local in range(beziers):
         for t in (0.0, 0.25, 1.0):
-            at = bezier(chain(points, kind, basis), torch.tensor([local + t], dtype=torch.float64))
+            at = bezier(
+                chain(points, kind == Kind.FILL, basis), torch.tensor([local + t], dtype=torch.float64)
+            )
             (want,) = torch.autograd.grad(at[0, 0], points)
             weights = kernels.cubic_weights(t)
             got = np.zeros(count)
             for j in of_point:
                 before = local - 1 if kind == Kind.FILL else local
                 index = 3 * local + j if basis == Basis.CUBIC else before + j
-                got[index % count] += kernels.point_weight(int(kind), int(basis), count, local, j, weights)
+                got[index % count] += kernels.point_weight(
+                    int(kind == Kind.FILL), int(basis), count, local, j, weights
+                )
             np.testing.assert_allclose(got, want[:, 0], atol=1e-6)

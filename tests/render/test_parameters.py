@@ -50,12 +50,12 @@ def test_layout(device: str) -> None:
     for shape in range(len(scene)):
         own = np.flatnonzero(arrays["point_shape"] == shape)
         np.testing.assert_array_equal(own, np.arange(*arrays["point_first"][shape : shape + 2]))
-        beziers = np.flatnonzero(arrays["bezier_shape"] == shape)
+        beziers = np.flatnonzero(arrays["bezier_contour"] == shape)
         np.testing.assert_array_equal(beziers, np.arange(*arrays["bezier_first"][shape : shape + 2]))
         kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
         assert (arrays["kind"][shape], arrays["basis"][shape]) == (kind, basis)
         assert len(own) == point_count(kind, basis, len(beziers))
-    assert parameters.bezier_count == len(arrays["bezier_shape"])
+    assert parameters.bezier_count == len(arrays["bezier_contour"])
     assert parameters.kinds == {Kind.FILL, Kind.STROKE}
 
 
@@ -72,16 +72,16 @@ def test_fewer_points_keep_their_moments(device: str) -> None:
     ages = np.arange(10, 10 + len(scene), dtype=np.int32)
     parameters.arrays["ages"].assign(ages)
     keep = np.delete(np.arange(len(scene.points)), [1, 4, 13])
-    first = scene.first - np.searchsorted([1, 4, 13], scene.first)
-    points = (scene.points[keep] + 1).astype(np.float32)
-    parameters.reshape(replace(scene, first=first.astype(np.int32), points=points), keep)
+    mask = np.isin(np.arange(len(scene.points)), keep)
+    parameters.reshape(replace(scene, points=scene.points + 1).without_points(mask), keep)
+    points = scene.points[keep] + 1
     after = parameters.scene()
     assert after.point_counts()[:4].tolist() == [4, 6, 5, 12]
     np.testing.assert_array_equal(after.points, points)
     np.testing.assert_array_equal(parameters.arrays["ages"].numpy(), ages)
     for attribute in ATTRIBUTES:
         group = parameters.groups[attribute.name]
-        rows = keep if attribute.per == "point" else np.arange(len(scene))
+        rows = keep if attribute.per == "point" else np.arange(len(moments[attribute.name][0]))
         for moment, old in zip((group.moment1, group.moment2), moments[attribute.name], strict=True):
             np.testing.assert_array_equal(moment.numpy(), old[rows])
     assert parameters.revision == 1

@@ -88,10 +88,12 @@ def test_an_opacity_beyond_its_bounds_is_only_led_back(device: str) -> None:
     scene = random_scene(STROKE, 1, seed=2)
     over = replace(scene, fades=np.array([[1.5, 0, 0]], np.float32))
     renderer = renderer_for(over, device, model=SOFT)
+    background = scene.canvas.background
+    assert background is not None
     gradients = []
     for sign in (1, -1):
         renderer.forward()
-        renderer.write_image_grad(sign * (renderer.read_image() - scene.canvas.background))
+        renderer.write_image_grad(sign * (renderer.read_image() - background))
         renderer.backward()
         gradients.append(renderer.parameters.gradients()["fades"][0])
     shrinks = gradients[0]

@@ -36,8 +36,8 @@ def test_splines_are_flattened_where_they_are(kind: Kind, beziers: int) -> None:
     """Against de Boor's recursion, whose points the outline as cubics passes at the same parameters."""
     scene = random_scene(kind, 3, basis=Basis.SPLINE, beziers=beziers)
     (group,) = scene.alike()
-    assert beziers_of(group.points, kind, Basis.SPLINE).shape == (3, beziers, 4, 2)
-    lines = flatten(group.points, kind, Basis.SPLINE, pieces=5)
+    assert beziers_of(group.points, group.closed, Basis.SPLINE).shape == (3, beziers, 4, 2)
+    lines = flatten(group.points, group.closed, Basis.SPLINE, pieces=5)
     t = torch.arange(5 * beziers + (kind == Kind.STROKE), dtype=torch.float64) / 5
     for line, points in zip(lines, group.points, strict=True):
         want = spline_at(torch.tensor(points, dtype=torch.float64), kind == Kind.FILL, t)

@@ -34,7 +34,7 @@ def test_a_row_and_a_field_are_enough(tmp_path: Path) -> None:
     assert text.endswith("\n)\n"), "the table is the last of the file"
     table.write_text(text.removesuffix("\n)\n") + ROW, "utf-8")
     before, last, after = scene.read_text("utf-8").partition('0 for fills."""\n')
-    assert last and after.lstrip().startswith("def __post_init__"), "widths are the last field"
+    assert last and after.lstrip().startswith("starts:"), "widths are the last attribute"
     scene.write_text(before + last + FIELD.removeprefix("\n") + after, "utf-8")
     done = subprocess.run(
         [sys.executable, "-W", "error", "-m", "tests.scene.new_attribute"],

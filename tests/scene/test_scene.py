@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import MIXED, canvas, mixed_scene, random_scene
-from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
+from tests.scenes import MIXED, canvas, contours_scene, mixed_scene, random_scene, with_gradients
+from warpsplat.scene import ATTRIBUTES, NO_DASHES, TRAITS, Basis, Cap, Kind, Rule, Scene
 
 POINTS, COLORS = (next(a for a in ATTRIBUTES if a.name == name) for name in ("points", "colors"))
 
 
 def test_arrays_must_fit() -> None:
-    scene = random_scene(Kind.FILL)
+    scene = with_gradients(random_scene(Kind.FILL))
     for attribute in ATTRIBUTES:
         value = getattr(scene, attribute.name)
         with pytest.raises(ValueError, match=f"{attribute.name} "):
@@ -87,9 +87,10 @@ def test_alike_groups_every_shape_once() -> None:
     scene = mixed_scene().append(mixed_scene(seed=1))
     seen: list[int] = []
     groups = list(scene.alike())
-    for kind, basis, index, points in groups:
+    for kind, basis, closed, index, _, points in groups:
         for i, own in zip(index, points, strict=True):
             assert (scene.kind[i], scene.basis[i]) == (kind, basis)
+            assert closed == (kind == Kind.FILL)
             np.testing.assert_array_equal(own, scene.points_of(i))
         seen += index.tolist()
     assert sorted(seen) == list(range(len(scene)))
@@ -102,3 +103,45 @@ def test_rows_of_shapes() -> None:
     np.testing.assert_array_equal(scene.rows(COLORS, index), index)
     wanted = np.concatenate([np.arange(scene.first[i], scene.first[i + 1]) for i in index])
     np.testing.assert_array_equal(scene.rows(POINTS, index), wanted)
+
+
+def test_contours_and_traits_go_with_their_shapes() -> None:
+    scene = contours_scene(Kind.FILL, Rule.EVENODD).append(mixed_scene())
+    scene = replace(scene, cap=np.arange(len(scene), dtype=np.int32) % len(Cap))
+    index = np.array([7, 1, 0, 7])
+    for taken, wanted in (
+        (scene.take(index), index),
+        (scene.take(index[:2]).append(scene.take(index[2:])), index),
+    ):
+        for i, j in enumerate(wanted):
+            for (a, closed), (b, as_before) in zip(taken.contours_of(i), scene.contours_of(j), strict=True):
+                np.testing.assert_array_equal(a, b)
+                assert closed == as_before
+            for trait in TRAITS:
+                assert getattr(taken, trait.name)[i] == getattr(scene, trait.name)[j]
+    assert scene.contour_beziers().tolist()[:3] == [5, 6, 7]
+    assert scene.bezier_counts()[0] == 18
+
+
+def test_dashes_of_two_scenes() -> None:
+    """Each shape keeps its own pattern."""
+    one = replace(
+        random_scene(Kind.STROKE, 2), dash=np.array([0, NO_DASHES], np.int32), dashes=((0.0, 3.0, 2.0),)
+    )
+    two = replace(one, dashes=((1.0, 5.0, 5.0),))
+    both = one.append(two)
+    patterns = [both.dashes[d] if d >= 0 else None for d in both.dash]
+    assert patterns == [(0.0, 3.0, 2.0), None, (1.0, 5.0, 5.0), None]
+    assert one.append(one).dashes == one.dashes
+
+
+def test_a_shape_without_its_twin_is_alone() -> None:
+    pair = random_scene(Kind.FILL, 2)
+    pair = replace(pair, points=np.tile(pair.points_of(0), (2, 1)), twin=np.array([0, 1], np.int32))
+    assert pair.take(np.array([0, 1])).twin.tolist() == [0, 1]
+    assert pair.take(np.array([1])).twin.tolist() == [0]
+    assert pair.take(np.array([1, 0])).twin.tolist() == [0, 0]
+    with pytest.raises(ValueError, match="shape 0 has not the points of the one before it"):
+        replace(pair, twin=np.array([1, 0], np.int32))
+    with pytest.raises(ValueError, match="not those of the shapes' contours"):
+        replace(pair, starts=pair.starts[:-1])

@@ -116,7 +116,7 @@ CUBIC_PATHS = {
     "a line between": "M10 5q5 0 5 5t-5 5l0 0t-5-5 5-5",
     "smooth from the start": "M10 5t5 5t-5 5-5-5 5-5z",
     "cubics": "M10 5c5 0 5 5 5 5s-5 5-5 5z",
-    "a hole": RING + "M10 8q2 0 2 2t-2 2-2-2 2-2",
+    "a hole with a corner": RING + "M10 8q2 0 2 2t-2 2-2-2z",
     "two quadratics": "M10 5q5 0 5 5t-5-5",
 }
 
@@ -131,13 +131,17 @@ def test_other_rings_are_cubics(data: str) -> None:
 
 
 def test_strokes_of_smooth_quadratics_are_splines_clamped_at_both_ends() -> None:
-    scene = scene_of("M4 6Q10 2 14 8t6 2 6-3M3 20q5-5 9 0M5 9h20M30 5t4 4", ROUND)
-    assert scene.basis.tolist() == [SPLINE, SPLINE, CUBIC, CUBIC]
-    np.testing.assert_allclose(scene.points_of(0), [[4, 6], [10, 2], [18, 14], [22, 6], [26, 7]], atol=1e-5)
-    np.testing.assert_allclose(scene.points_of(1), [[3, 20], [8, 15], [12, 20]], atol=1e-5)
+    scene = scene_of("M4 6Q10 2 14 8t6 2 6-3M3 20q5-5 9 0", ROUND)
+    assert scene.basis.tolist() == [SPLINE]
+    (first, _), (second, is_closed) = scene.contours_of(0)
+    np.testing.assert_allclose(first, [[4, 6], [10, 2], [18, 14], [22, 6], [26, 7]], atol=1e-5)
+    np.testing.assert_allclose(second, [[3, 20], [8, 15], [12, 20]], atol=1e-5)
+    assert not is_closed
+    assert scene_of("M3 20q5-5 9 0M5 9h20M30 5t4 4", ROUND).basis.tolist() == [CUBIC]
     assert scene_of("M4 6Q10 2 14 8t6 2z", ROUND).basis.tolist() == [CUBIC], "closed by a line"
     closed = scene_of(RING + "z", ROUND)
-    np.testing.assert_allclose(closed.points, [[10, 5], *CORNERS, [10, 5]], atol=1e-5)
+    np.testing.assert_allclose(closed.points, CORNERS, atol=1e-5)
+    assert closed.closed.tolist() == [1]
 
 
 def test_files_of_an_older_format() -> None:

@@ -32,9 +32,6 @@ REFUSED = {
     "hello": "cannot be rendered",
     HEAD + 'width="40" height="30"/>': "draws no",
     HEAD + 'width="40" height="40"><path d="M0 0H9V9Z"/></svg>': "proportions",
-    HEAD + 'width="40" height="30"><path d="M0 0H9V9Z"/><path d="M0 0H9" fill="none" stroke="red" '
-    'stroke-linecap="round"/></svg>': "both",
-    HEAD + 'width="40" height="30"><path d="M0 0H9V9Z" stroke="red"/></svg>': "both",
 }
 
 

@@ -20,19 +20,16 @@ from warpsplat.render.backend import Backend
 from warpsplat.render.models import SplatModel
 from warpsplat.render.renderer import render
 from warpsplat.scene import Basis, Kind
+from warpsplat.svg.data import integers, path_data, spline_data
+from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
     NAMESPACE,
-    hex_colors,
-    integers,
-    number,
-    path_data,
     read_metadata,
     resized,
     rounded,
-    spline_data,
     width_decimals,
     write_svg,
 )
@@ -74,7 +71,7 @@ def steps_of(data: str, command: str) -> np.ndarray:
 def test_rounding_does_not_add_up(basis: Basis) -> None:
     """A thousand steps of 0.4 units: the end is at 400, not at 0."""
     points = np.stack([0.4 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
-    data = path_data(points, Kind.STROKE, basis, 1)
+    data = path_data(points, Kind.STROKE, basis, 1, closed=False)
     if basis == Basis.CUBIC:
         # Each cubic is relative to the end of the one before.
         ends = steps_of(data, "c")[2::3]
@@ -86,7 +83,7 @@ def test_rounding_does_not_add_up(basis: Basis) -> None:
 @pytest.mark.parametrize("kind", list(Kind))
 def test_a_spline_is_one_quadratic_and_smooth_ones(kind: Kind) -> None:
     scene = random_scene(kind, count=1, basis=Basis.SPLINE, beziers=7)
-    data = path_data(scene.points, kind, Basis.SPLINE, 10)
+    data = path_data(scene.points, kind, Basis.SPLINE, 10, closed=kind == Kind.FILL)
     assert re.fullmatch(r"M-?\d+[ -]\d+q[-\d ]+t[-\d ]+", data)
     assert len(steps_of(data.split("t")[0], "q")) == 2
     assert len(steps_of(data, "t")) == 6
@@ -181,9 +178,7 @@ def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
     for start in range(len(half)):
         turned = half[start:] + half[:start]
         assert len(spline_data(turned, closed=True)) == len(data)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("warpsplat.svg.write._cheapest_start", lambda half: 0)
-            lengths.append(len(spline_data(turned, closed=True)))
+        lengths.append(len(spline_data(turned, closed=True, turns=False)))
     assert len(data) == min(lengths)
     assert len(set(lengths)) > 1, "it matters"
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +39,19 @@ LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 """What Pillow makes of a sample 1 in PNGs of fewer than 8 bits; their transparent grey it leaves as it is."""
 
 
-def load_image(source: Path | bytes, name: str | None = None, *, paper: float = 1.0) -> FloatArray:
-    """Read an image: first frame, EXIF rotation applied, transparency composited on white.
+def load_image(
+    source: Path | bytes, name: str | None = None, *, paper: float | FloatArray | None = 1.0
+) -> FloatArray:
+    """Read an image: first frame, EXIF rotation applied, transparency composited on ``paper``.
 
     Args:
         source: a file, ``-`` for the standard input, or the bytes of an image.
         name: what messages call it; without, the path.
-        paper: grey level that transparency is composited on.
+        paper: grey level or colour that transparency is composited on; None: it is kept.
 
     Returns:
-        sRGB in [0, 1], shape (height, width, 3), float32. Grey images of 16 bits keep their precision.
+        sRGB in [0, 1], shape (height, width, 3), float32; where transparency is kept and there is some,
+        premultiplied with opacity, shape (height, width, 4). Grey images of 16 bits keep their precision.
 
     Raises:
         ImageError: missing, unreadable, truncated, not an image, too large, too small, or with pixels that
@@ -146,38 +149,65 @@ def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
         yield slice(top, bottom), image.crop((0, top, width, bottom))
 
 
-def to_srgb(image: Image.Image, paper: float = 1.0) -> FloatArray:
-    """A loaded Pillow image of any mode as sRGB in [0, 1] on ``paper``, shape (height, width, 3).
+def to_srgb(image: Image.Image, paper: float | FloatArray | None = 1.0) -> FloatArray:
+    """A loaded Pillow image of any mode as sRGB in [0, 1], see ``load_image``.
 
     Raises:
         ImageError: pixels that are no numbers.
     """
     if image.mode == "F" or image.mode.startswith("I"):
-        return _grey_to_srgb(image, paper)
+        grey, opacity = _grey(image)
+        return _composited([(slice(None), np.repeat(grey, 3, axis=2), opacity)], image.size, paper)
     transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
+    if transparent:
+        return _composited(_straight_strips(image), image.size, paper)
     out = np.empty((image.height, image.width, 3), np.float32)
     for rows, part in _strips(image):
-        if not transparent:
-            np.divide(np.asarray(part.convert("RGB")), np.float32(255), out=out[rows])
-            continue
-        rgba = np.asarray(part.convert("RGBA"), np.float32) / np.float32(255)
-        alpha = rgba[..., 3:]
-        out[rows] = rgba[..., :3] * alpha + np.float32(paper) * (1 - alpha)
+        np.divide(np.asarray(part.convert("RGB")), np.float32(255), out=out[rows])
     return out
 
 
-def _grey_to_srgb(image: Image.Image, paper: float) -> FloatArray:
-    """One channel of 16 or 32 bits, integers or floats."""
+Strip = tuple[slice, FloatArray, FloatArray | None]
+"""Rows, their colours (height, width, 3), and their opacity (height, width, 1) where there is any."""
+
+
+def _straight_strips(image: Image.Image) -> Iterator[Strip]:
+    for rows, part in _strips(image):
+        rgba = np.asarray(part.convert("RGBA"), np.float32) / np.float32(255)
+        yield rows, rgba[..., :3], rgba[..., 3:]
+
+
+def _composited(
+    strips: Iterable[Strip], size: tuple[int, int], paper: float | FloatArray | None
+) -> FloatArray:
+    """On ``paper``; without, premultiplied and with opacity, if not all is opaque."""
+    width, height = size
+    out = np.empty((height, width, 4 if paper is None else 3), np.float32)
+    for rows, color, opacity in strips:
+        if opacity is None:
+            out[rows, :, :3] = color
+            out[rows, :, 3:] = 1
+            continue
+        out[rows, :, :3] = color * opacity
+        if paper is None:
+            out[rows, :, 3:] = opacity
+        else:
+            out[rows] += np.float32(paper) * (1 - opacity)
+    return out[..., :3] if paper is None and (out[..., 3] == 1).all() else out
+
+
+def _grey(image: Image.Image) -> tuple[FloatArray, FloatArray | None]:
+    """One channel of 16 or 32 bits, integers or floats, and its opacity, each (height, width, 1)."""
     top = _white(image)
     transparent = image.info.get("transparency")
-    out = np.empty((image.height, image.width, 3), np.float32)
+    out = np.empty((image.height, image.width, 1), np.float32)
+    opacity = np.ones_like(out) if isinstance(transparent, int) else None
     for rows, part in _strips(image):
         samples = np.asarray(part)
-        grey = np.clip(samples.astype(np.float32) / np.float32(top), 0, 1)
-        if isinstance(transparent, int):
-            grey[samples == transparent] = paper
-        out[rows] = grey[..., None]
-    return out
+        out[rows, :, 0] = np.clip(samples.astype(np.float32) / np.float32(top), 0, 1)
+        if opacity is not None:
+            opacity[rows, :, 0] = samples != transparent
+    return out, opacity
 
 
 def _white(image: Image.Image) -> float:

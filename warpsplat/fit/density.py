@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.alpha import squares, straight
 from warpsplat.fit.place import pixel_of, place, shape_angles
 from warpsplat.fit.schedule import opacity_threshold
 from warpsplat.fit.settings import Density, Settings
@@ -117,14 +118,13 @@ def densify(
 ) -> Scene:
     """``count`` new shapes on the components of the quantised error map, the largest error first.
 
-    ``target`` and ``image`` are (height, width, 3) at any one size, ``weights`` of their pixels (height,
+    ``target`` and ``image`` are (height, width, 3 or 4) at any one size, ``weights`` of their pixels (height,
     width), without all 1; the result is in canvas units.
     """
     unit = scene.canvas.width / target.shape[1]
-    squares = (image - target) ** 2
-    # The same bits as a sum along the last axis, which takes many times as long.
-    total = squares[..., 0] + squares[..., 1] + squares[..., 2]
-    error = cv2.GaussianBlur(total if weights is None else weights * total, (0, 0), 1.0)
+    total = squares(image - target)
+    weighted = total if weights is None else weights * total
+    error = np.asarray(cv2.GaussianBlur(weighted, (0, 0), 1.0), np.float32)
     centres, radii, masses = _candidates(error)
     chosen: list[int] = []
     taken = np.zeros(error.shape, np.uint8)
@@ -144,6 +144,6 @@ def densify(
         places = np.concatenate([places, np.stack([column + 0.5, row + 0.5], axis=1)]).astype(np.float32)
         sizes = np.concatenate([sizes, np.full(missing, 2.0, np.float32)])
     column, row = pixel_of(places, target)
-    tones = cv2.GaussianBlur(target, (0, 0), 1.0)[row, column]
+    tones = straight(np.asarray(cv2.GaussianBlur(target, (0, 0), 1.0)[row, column], np.float32))
     angles = shape_angles(settings, target, places, 2.0)
     return place(settings, scene.canvas, places * unit, np.pi * (sizes * unit) ** 2, angles, tones)

@@ -5,11 +5,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from warpsplat.alpha import on
 from warpsplat.scene import FloatArray
 
 LEAST = 0.05
 """Weight of a black pixel of a mask over that of a white one. Not 0: shapes that nothing holds would grow
 over what is black, and the picture around a face is still to be a picture."""
+
+EMPTY = 8.0
+"""Weight of a pixel where nothing is, over others: what spills over an edge is seen on other backgrounds."""
 
 TEXTURE_SIGMA = 8.0
 """Standard deviation of the window in which texture is measured [px]."""
@@ -22,7 +26,7 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
     """Weights of the pixels of ``image``, shape (height, width); None where all are alike.
 
     Args:
-        image: sRGB in [0, 1], shape (height, width, 3).
+        image: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, (height, width, 4).
         mask: grey in [0, 1], of any size: a weight grows linearly with it from ``LEAST`` of white's.
         texture: power of the local variance by which a weight falls. An eye sees an error in what is plain
             sooner than in foliage (masking), and the shapes that foliage takes are worth more elsewhere.
@@ -30,7 +34,8 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
     height, width = image.shape[:2]
     weights: FloatArray | None = None
     if texture > 0:
-        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) - np.float32(0.5)  # about which 32 bits are enough
+        grey = cv2.cvtColor(np.asarray(on(image, 1.0), np.float32), cv2.COLOR_RGB2GRAY)
+        grey = grey - np.float32(0.5)  # about which 32 bits are enough
         mean, squares = (cv2.GaussianBlur(x, (0, 0), TEXTURE_SIGMA) for x in (grey, grey * grey))
         variance = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE**2)
         weights = np.asarray(variance**-texture, np.float32)
@@ -40,6 +45,9 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
         counts = LEAST + (1 - LEAST) * np.clip(cv2.resize(mask, (width, height), interpolation=how), 0, 1)
         # So that a mask of one grey is exactly none.
         counts = np.asarray(counts / counts.mean(dtype=np.float64), np.float32)
+        weights = counts if weights is None else weights * counts
+    if image.shape[2] == 4:
+        counts = np.where(image[..., 3] == 0, np.float32(EMPTY), np.float32(1))
         weights = counts if weights is None else weights * counts
     return weights
 

@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 
 from warpsplat.fit.settings import Settings
-from warpsplat.kernels.loss import image, shape
+from warpsplat.kernels.loss import alpha, image, shape
 from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.parameters import Parameters
@@ -41,7 +41,8 @@ class Aim:
         """What a step is to come near to.
 
         Args:
-            target: sRGB in [0, 1], shape (height, width, 3), of the viewport's size.
+            target: sRGB in [0, 1], shape (height, width, 3), of the viewport's size; or premultiplied with
+                opacity, shape (height, width, 4).
             backend: where to compute.
             viewport: of the render.
             importance: how much the error of a pixel counts, shape (height, width), mean 1; without, all do
@@ -82,6 +83,9 @@ def record_error(program: Program, inputs: LossInputs) -> None:
     The first loss, which writes the gradient; both in one, since what they wait for is memory.
     """
     viewport = inputs.renderer.viewport
+    if inputs.renderer.film.planes == 4:
+        record_alpha(program, inputs)
+        return
     program.launch(
         image.image_loss,
         (viewport.tile_count, 3),
@@ -95,15 +99,29 @@ def record_error(program: Program, inputs: LossInputs) -> None:
     )
 
 
+def record_alpha(program: Program, inputs: LossInputs) -> None:
+    """Mean squared error of a transparent picture, on black and on white: what is right on both is right on
+    anything. Writes the gradient.
+    """
+    program.launch(
+        alpha.alpha_loss,
+        inputs.renderer.viewport.tile_count,
+        inputs.renderer.film.buffers,
+        inputs.aim,
+        inputs.aim.buffers,
+        split=True,
+    )
+
+
 def record_xing(program: Program, parameters: Parameters, settings: Settings) -> None:
     """Shapes that do not cross themselves (LIVE), where the settings weigh it."""
     if settings.xing > 0:
         program.launch(
             shape.xing_backward,
-            parameters.shape_count,
+            parameters.contour_count,
             parameters.arrays,
             weight=settings.xing,
-            shape_loss=parameters.backend.array(wp.float32, parameters.shape_count),
+            contour_loss=parameters.backend.array(wp.float32, parameters.contour_count),
         )
 
 
@@ -113,10 +131,10 @@ def record_bending(program: Program, parameters: Parameters, settings: Settings)
         canvas = parameters.canvas
         program.launch(
             shape.bending_backward,
-            parameters.shape_count,
+            parameters.contour_count,
             parameters.arrays,
             weight=settings.bending / (3 * canvas.width * canvas.height),
-            shape_loss=parameters.backend.array(wp.float32, parameters.shape_count),
+            contour_loss=parameters.backend.array(wp.float32, parameters.contour_count),
         )
 
 

@@ -32,6 +32,8 @@ def record_adam(
 
     ``clock``: steps so far, on the device, shape (1,).
     """
+    if parameters.has_twins:
+        program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,
@@ -44,7 +46,7 @@ def record_adam(
     )
     for name, group in parameters.groups.items():
         attribute = group.attribute
-        if not parameters.kinds & set(attribute.kinds):
+        if not (parameters.kinds & set(attribute.kinds) and parameters.paints & set(attribute.paints)):
             continue
         program.launch(
             adam.adam_update,
@@ -53,6 +55,7 @@ def record_adam(
             buffers,
             parameters.arrays,
             kinds=sum(1 << kind for kind in attribute.kinds),
+            paints=sum(1 << paint for paint in attribute.paints),
             rate=units.resolve(settings.rates[name], attribute.rate_unit),
             low=units.resolve(*attribute.low),
             high=units.resolve(*attribute.high),

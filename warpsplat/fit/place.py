@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.fit.settings import Settings
+from warpsplat.alpha import CLEAR, on, straight
+from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 
 OPACITY = 0.98
@@ -50,6 +51,12 @@ LEAST_CURVES = 32
 PIXELS_A_CURVE = 8
 """Least pixels of an image for each curve: a curve has about as many numbers as these have."""
 
+LEAST_SHARE = 0.02
+"""Of a picture that is not empty, as far as the places of first shapes are made denser for it."""
+
+SOME = 0.05
+"""Least opacity of a picture around the place of a first shape."""
+
 Floats = npt.NDArray[np.floating]
 
 
@@ -75,7 +82,7 @@ def simple_curves(target: FloatArray) -> int:
     """
     height, width = target.shape[:2]
     room = max(1, width * height // PIXELS_A_CURVE)
-    steps = np.round(survey(target)[0] * (LEVELS - 1)).astype(np.int32)
+    steps = np.round(on(survey(target)[0], 0.5) * (LEVELS - 1)).astype(np.int32)
     codes = (steps * [LEVELS * LEVELS, LEVELS, 1]).sum(axis=2)
     counts = np.bincount(codes.ravel())
     colors = np.argsort(-counts, kind="stable")[:FLAT_COLORS]
@@ -163,9 +170,15 @@ def place(
     )
 
 
-def canvas_for(target: FloatArray) -> Canvas:
-    """A canvas of ``target``'s size with a background of its colour."""
-    return Canvas(target.shape[1], target.shape[0], background_color(target))
+def canvas_for(settings: Settings, target: FloatArray) -> Canvas:
+    """A canvas of ``target``'s size: transparent if it has opacity, else with the settings' background or a
+    colour of its own.
+    """
+    background = None
+    if target.shape[2] == 3:
+        color = solid_color(settings.background)
+        background = background_color(target) if color is None else color
+    return Canvas(target.shape[1], target.shape[0], background)
 
 
 def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
@@ -194,8 +207,11 @@ def pixel_of(centres: Floats, target: FloatArray) -> tuple[npt.NDArray[np.intp],
 
 def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.random.Generator) -> Scene:
     """``count`` shapes that cover the canvas."""
-    canvas = canvas_for(target)
+    canvas = canvas_for(settings, target)
     height, width = target.shape[:2]
+    wanted = count
+    if target.shape[2] == 4:  # where nothing is, nothing is placed: more places then, so that enough are left
+        count = round(count / max(float((target[..., 3] > CLEAR).mean()), LEAST_SHARE))
     rows = max(1, min(count, round(np.sqrt(count * height / width))))
     per_row = np.full(rows, count // rows)
     per_row[: count % rows] += 1
@@ -209,5 +225,12 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     column, row = pixel_of(centres / span, small)
     areas = np.full(count, COVER * cell * cell)
     angles = shape_angles(settings, small, centres / span, cell / span / 2)
-    scene = place(settings, canvas, centres, areas, angles, blurred[row, column])
-    return scene.take(rng.permutation(count))
+    tones = blurred[row, column]
+    scene = place(
+        settings, canvas, centres, areas, angles, np.asarray(straight(np.asarray(tones, np.float32)))
+    )
+    order = rng.permutation(count)
+    if target.shape[2] == 4:
+        order = order[np.argsort(tones[order, 3] <= SOME, kind="stable")][:wanted]
+        rng.shuffle(order)
+    return scene.take(order)

@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 from warpsplat.errors import UsageError
-from warpsplat.scene import ATTRIBUTES, Basis, Kind
+from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
@@ -73,13 +75,13 @@ class Density:
     """Fraction of the run at which all curves are there; until then their number grows geometrically."""
     surplus: float = 1.5
     """Shapes at the most, over those that are left in the end."""
-    thin: float = 0.6
+    thin: float = 0.65
     """Fraction of the run from which on the surplus is removed, until ``stop``."""
     mean_points: float = 10.4
     """Points that splines have in the mean in the end: those that their outlines need least are removed."""
     interval: int = 25
     """Steps between two turns."""
-    stop: float = 0.75
+    stop: float = 0.85
     """Fraction of the run after which the set of curves stays as it is."""
     opacity_start: float = 0.2
     """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""
@@ -155,6 +157,9 @@ class Settings:
     """Whether gradients flow through the Gaussians' scales and angles."""
     viewer: bool = True
     """Whether the last steps take what a viewer shows, its rounding included, for the render."""
+    background: str = "auto"
+    """``auto``: that of the image, transparent where it has opacity; ``none``: transparent in any case; or a
+    colour, ``#rrggbb``, that shows through as well."""
     precision: int | None = None
     """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
     (``fit.rounding``)."""
@@ -213,6 +218,8 @@ class Settings:
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
         )
+        if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
+            raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
@@ -221,6 +228,16 @@ class Settings:
         """A short hash of all that decides the result."""
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+def solid_color(background: str) -> FloatArray | None:
+    """The colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if it names none."""
+    if not COLOR.fullmatch(background):
+        return None
+    return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
 
 
 DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)

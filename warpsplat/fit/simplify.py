@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Scene
-from warpsplat.scene.scene import starts_of
+from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 
 SAMPLES = 4
 """Of each quadratic, for the area between two outlines."""
@@ -29,12 +28,12 @@ def _quadratics(points: npt.NDArray[Any], t: npt.NDArray[np.float64]) -> npt.NDA
     return 0.5 * (1 - s) ** 2 * a + (0.5 + s * (1 - s)) * b + 0.5 * s * s * c
 
 
-def without(points: FloatArray, kind: Kind) -> tuple[FloatArray, FloatArray]:
+def without(points: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
     """Splines without one of their points each.
 
     Args:
         points: shape (shape, point, 2).
-        kind: FILL: rings; STROKE: chains, whose ends stay where they are.
+        closed: whether they are rings; of chains the ends stay where they are.
 
     Returns:
         for every point of every spline, where its two neighbours go if it is removed, shape
@@ -42,7 +41,7 @@ def without(points: FloatArray, kind: Kind) -> tuple[FloatArray, FloatArray]:
     """
     count = points.shape[1]
     near = np.arange(count)[:, None] + np.arange(-3, 4)
-    near = near % count if kind == Kind.FILL else np.clip(near, 0, count - 1)
+    near = near % count if closed else np.clip(near, 0, count - 1)
     window = points[:, near]  # [shape, point, 7, 2]
     t = (np.arange(5 * SAMPLES) + 0.5) / SAMPLES
     old = _quadratics(window, t)
@@ -64,7 +63,7 @@ def without(points: FloatArray, kind: Kind) -> tuple[FloatArray, FloatArray]:
     middle = 0.5 * (apart[..., 1:, :] + apart[..., :-1, :])
     area = np.abs(direction[..., 0] * middle[..., 1] - direction[..., 1] * middle[..., 0]).sum(axis=-1)
     moved = window[..., [2, 4], :] + shift[..., None, :]
-    if kind == Kind.STROKE:
+    if not closed:
         moved[:, 1, 0], moved[:, -2, 1] = points[:, 0], points[:, -1]
         area[:, [0, -1]] = np.inf
     return moved, area
@@ -86,10 +85,10 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
         number = group.points.shape[1]
         if group.basis != Basis.SPLINE or number <= LEAST_POINTS:
             continue
-        moved, area = without(group.points, group.kind)
+        moved, area = without(group.points, group.closed)
         cost = area * worth[group.shapes][:, None]
         for i in np.flatnonzero(np.isfinite(worth[group.shapes])).tolist():
-            first = int(scene.first[group.shapes[i]])
+            first = int(scene.starts[group.contours[i]])
             chosen = _apart(cost[i], (number - LEAST_POINTS + 1) // 2)
             found += [(float(cost[i, k]), first, k, number, moved[i, k]) for k in chosen]
     found.sort(key=lambda entry: entry[:3])
@@ -98,8 +97,7 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
     for _, first, k, number, neighbours in found[:count]:
         points[[first + (k - 1) % number, first + (k + 1) % number]] = neighbours
         keep[first + k] = False
-    counts = np.add.reduceat(keep, scene.first[:-1]) if len(scene) else np.zeros(0, np.intp)
-    return replace(scene, first=starts_of(counts), points=points[keep]), np.flatnonzero(keep)
+    return replace(scene, points=points).without_points(keep), np.flatnonzero(keep)
 
 
 def _apart(cost: FloatArray, most: int) -> list[int]:

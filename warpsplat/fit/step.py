@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import warp as wp
 
+from warpsplat.alpha import squares
 from warpsplat.fit import losses
 from warpsplat.fit.importance import weights_at
 from warpsplat.fit.losses import Aim, LossInputs
@@ -16,7 +17,6 @@ from warpsplat.fit.schedule import Phase, fold_weight
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
-from warpsplat.metrics import psnr
 from warpsplat.render.backend import Viewport
 from warpsplat.render.models import ExactModel, GaussianModel, Model, SplatModel
 from warpsplat.render.program import Program, capture
@@ -31,7 +31,8 @@ class Target:
         """Both are reduced by area to the phase's size.
 
         Args:
-            image: sRGB in [0, 1], shape (height, width, 3).
+            image: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
+                width, 4).
             phase: the size.
             weights: of the pixels, shape (height, width) of any size and scale; without, all count alike.
         """
@@ -144,8 +145,8 @@ class Step:
     def square_error(self) -> float:
         """Mean squared error of the last render against what it is compared with. Reads the render back."""
         difference = self.renderer.film.buffers.image.numpy() - self.aim.target.numpy()
-        squares = difference**2 * self.renderer.film.buffers.inside.numpy()[:, None]
-        return float(squares.sum(dtype="float64")) / self.aim.value_count
+        errors = squares(difference, axis=1) * self.renderer.film.buffers.inside.numpy()
+        return float(errors.sum(dtype="float64")) / self.aim.value_count
 
     def psnr(self) -> float:
         """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
@@ -155,4 +156,5 @@ class Step:
 
     def render_psnr(self) -> float:
         """Of the last render against the image, at its size [dB]. Reads the render back from the device."""
-        return psnr(255 * self.renderer.read_image(), 255 * self.target.image)
+        error = squares(self.renderer.read_image() - self.target.image).mean(dtype="float64") / 3
+        return -10 * math.log10(max(error, 1e-12))

@@ -6,7 +6,7 @@ import numpy as np
 
 from warpsplat.fit.export import export
 from warpsplat.fit.step import Step
-from warpsplat.svg.viewer import on_white, render_own
+from warpsplat.svg.viewer import on_white, premultiplied, render_own
 from warpsplat.svg.write import resized
 
 
@@ -25,5 +25,6 @@ def look_at_file(step: Step) -> None:
         viewport.height,
         viewport.scale,
     )
-    shown = on_white(render_own(text)) / 255
+    picture = render_own(text)
+    shown = (on_white(picture) if image.shape[2] == 3 else premultiplied(picture)) / 255
     step.aim.at(np.asarray(image - (shown - step.renderer.read_image()), np.float32))

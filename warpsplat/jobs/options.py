@@ -61,6 +61,13 @@ OPTIONS = (
     Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
     Option("max-bytes", str, "Best file within 100KB, 1MB ...", metavar="SIZE"),
     Option("seed", int, "Random seed.", str(_defaults.seed), "N"),
+    Option(
+        "background",
+        str,
+        "Transparent as the image is, none, or a colour (#rrggbb).",
+        _defaults.background,
+        "COLOR",
+    ),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
 

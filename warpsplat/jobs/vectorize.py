@@ -17,11 +17,12 @@ from warpsplat.files.image import load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.output import write_result
+from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.settings import Renderer, Settings
+from warpsplat.fit.settings import Renderer, Settings, solid_color
 from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.render.backend import Backend
@@ -29,6 +30,7 @@ from warpsplat.render.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
+from warpsplat.svg.write import rounded
 
 
 @dataclass(frozen=True)
@@ -94,10 +96,11 @@ def vectorize(
     stop: Callable[[], bool] | None = None,
     write: Callable[[str], None] | None = None,
 ) -> Result:
-    """Fit curves to ``target`` (sRGB in [0, 1], (height, width, 3)) and score the file they make.
+    """Fit curves to ``target`` and score the file they make.
 
     Args:
-        target: the image.
+        target: the image, sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape
+            (height, width, 4), it makes a file without a background.
         settings: all that decides the result.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
@@ -130,6 +133,10 @@ def vectorize(
         )
         if settings.renderer != "gaussian":  # which reach beyond the outlines that this order goes by
             made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
+    if target.shape[2] == 4 and not made.interrupted:
+        held = rounded(made.scene, made.per_pixel)
+        clear = clear_empty(held, target, settings, backend, made.per_pixel)
+        made = replace(made, scene=clear)
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
@@ -242,6 +249,19 @@ def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tup
     return tuple(missed)
 
 
+def load_target(source: bytes, name: str | None, background: str) -> FloatArray:
+    """An image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
+
+    Raises:
+        ImageError: as ``load_image``.
+    """
+    color = solid_color(background)
+    image = load_image(source, name, paper=color)
+    if background == "none" and image.shape[2] == 3:
+        image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
+    return image
+
+
 def vectorize_file(
     source: Path | bytes,
     output: Path,
@@ -271,7 +291,7 @@ def vectorize_file(
     """
     if isinstance(source, Path):
         name, source = name or input_name(source), read_input(source)
-    target = load_image(source, name)
+    target = load_target(source, name, settings.background)
     mask, mask_name = (read_input(importance), input_name(importance)) if importance else (None, "")
     height, width = target.shape[:2]
     return vectorize(

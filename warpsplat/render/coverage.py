@@ -19,7 +19,6 @@ from warpsplat.render.grid import Grid
 from warpsplat.render.outline import Outline
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
-from warpsplat.scene import Kind
 
 
 @dataclass
@@ -87,13 +86,17 @@ class Stages:
 class FillCoverage:
     """Fills by signed area: states first, then coverages of what is seen."""
 
+    part = constants.FILL
+
     def __init__(self, stages: Stages) -> None:
         self._stages = stages
         self.buffers = stages.backend.allocate(FillBuffers, {"slots": stages.slots})
+        self._sources = (*stages.sources, self.buffers)
+        self._edges = stages.outline.buffers.vertex.shape[0]
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
-        program.launch(fill.fill_states, self._stages.slots, *self._stages.sources, self.buffers, split=True)
+        program.launch(fill.fill_states, self._stages.slots, *self._sources, own_part=self.part, split=True)
 
     def values(self, program: Program) -> None:
         """See ``Coverage``."""
@@ -101,8 +104,8 @@ class FillCoverage:
         program.launch(
             fill.fill_forward,
             (self._stages.slots, backend.lanes),
-            *self._stages.sources,
-            self.buffers,
+            *self._sources,
+            own_part=self.part,
             lane_rows=backend.lane_size,
             split=True,
         )
@@ -111,15 +114,43 @@ class FillCoverage:
         """Record gradients in the coverages' place -> gradients of the edges' ends."""
         program.launch(
             fill.fill_backward,
-            self._stages.outline.buffers.vertex.shape[0],
-            *self._stages.sources,
+            self._edges,
+            *self._sources,
+            own_part=self.part,
             sum_grad=self._stages.coverage.coverage_pixels,
             split=True,
         )
 
 
+class StyledCoverage(FillCoverage):
+    """Strokes as polygons, whose union is filled."""
+
+    part = constants.STYLED
+
+    def __init__(self, stages: Stages) -> None:
+        super().__init__(stages)
+        stroker = stages.outline.stroker
+        assert stroker
+        self._stroker = stroker
+        nonzero = stages.backend.array(wp.int32, stages.parameters.shape_count)
+        shapes = stages.parameters.arrays | {"rule": nonzero}
+        self._sources = (
+            stages.coverage,
+            stages.bins.buffers,
+            stroker.edges(),
+            shapes,
+            stages.viewport,
+            self.buffers,
+        )
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the centre lines and of the widths."""
+        super().backward(program)
+        self._stroker.backward(program)
+
+
 class StrokeCoverage:
-    """Strokes by distance: states and coverages in one go."""
+    """Round strokes by distance: states and coverages in one go."""
 
     def __init__(self, stages: Stages) -> None:
         self._stages = stages
@@ -155,11 +186,12 @@ class StrokeCoverage:
         program.launch(stroke.widths_backward, stages.parameters.shape_count, *stages.sources)
 
 
-EXACT_PARTS: dict[Kind, type[FillCoverage] | type[StrokeCoverage]] = {
-    Kind.FILL: FillCoverage,
-    Kind.STROKE: StrokeCoverage,
+EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
+    constants.FILL: FillCoverage,
+    constants.STROKE: StrokeCoverage,
+    constants.STYLED: StyledCoverage,
 }
-"""The part that covers each kind of shape."""
+"""What covers the shapes of each of ``Parameters.parts``."""
 
 
 class ExactCoverage:
@@ -179,7 +211,7 @@ class ExactCoverage:
         self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
         self._outline = outline
         stages = Stages(backend, parameters, viewport, outline, bins, self.buffers, slots)
-        self.parts = [EXACT_PARTS[kind](stages) for kind in sorted(parameters.kinds)]
+        self.parts = [EXACT_PARTS[part](stages) for part in parameters.parts]
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""

@@ -12,19 +12,19 @@ from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.bins import Bins
 from warpsplat.render.coverage import Coverage
-from warpsplat.render.paint import Paint
-from warpsplat.render.parameters import Parameters
+from warpsplat.render.paint import Painting
 from warpsplat.render.program import Program
 from warpsplat.render.tiles import to_tiles
+from warpsplat.scene import Canvas
 
 
 @dataclass
 class FilmBuffers:
     """Images by tiles: [tile, channel, column]."""
 
-    image: wp.array = buffer(column, "tiles", 3, constants.TILE)
-    """sRGB in [0, 1]."""
-    image_grad: wp.array = buffer(column, "tiles", 3, constants.TILE)
+    image: wp.array = buffer(column, "tiles", "planes", constants.TILE)
+    """sRGB in [0, 1]; of a transparent canvas premultiplied, and opacity."""
+    image_grad: wp.array = buffer(column, "tiles", "planes", constants.TILE)
     inside: wp.array = buffer(column, "tiles", constants.TILE)
     """1 for pixels of the image, 0 for the padding."""
 
@@ -32,9 +32,13 @@ class FilmBuffers:
 class Film:
     """What the shapes are composited on."""
 
-    def __init__(self, backend: Backend, viewport: Viewport) -> None:
+    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas) -> None:
         self._backend, self._viewport = backend, viewport
-        self.buffers = backend.allocate(FilmBuffers, {"tiles": viewport.tile_count})
+        # Premultiplied, nothing is black.
+        self._background = np.zeros(3) if canvas.background is None else canvas.background
+        self.planes = 4 if canvas.background is None else 3
+        sizes = {"tiles": viewport.tile_count, "planes": self.planes}
+        self.buffers = backend.allocate(FilmBuffers, sizes)
         whole = np.ones((viewport.height, viewport.width, 1), np.float32)
         self.buffers.inside.assign(to_tiles(whole)[:, 0])
 
@@ -42,7 +46,7 @@ class Film:
     def _dim(self) -> tuple[int, int]:
         return self._viewport.tile_count, self._backend.lanes
 
-    def forward(self, program: Program, parameters: Parameters, bins: Bins, coverage: Coverage) -> None:
+    def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record lists and coverages -> ``image``."""
         program.launch(
             composite.composite_forward,
@@ -50,12 +54,13 @@ class Film:
             self.buffers,
             bins.buffers,
             coverage.buffers,
+            paint.buffers,
             lane_columns=self._backend.lane_size,
-            background=wp.vec3(*(float(x) for x in parameters.canvas.background)),
+            background=wp.vec3(*(float(x) for x in self._background)),
             split=True,
         )
 
-    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Paint) -> None:
+    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
         program.launch(
             composite.composite_backward,
@@ -75,6 +80,7 @@ class Film:
         program: Program,
         bins: Bins,
         coverage: Coverage,
+        paint: Painting,
         target: wp.array,
         importance: wp.array | None,
         slot_cost: wp.array,
@@ -86,6 +92,7 @@ class Film:
             self.buffers,
             bins.buffers,
             coverage.buffers,
+            paint.buffers,
             lane_columns=self._backend.lane_size,
             target=target,
             importance=self.buffers.inside if importance is None else importance,

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels import outline
+from warpsplat.kernels import constants, outline
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
 from warpsplat.render.ranges import record_ranges
+from warpsplat.render.stroker import Stroker
 
 
 @dataclass
@@ -26,6 +27,8 @@ class OutlineBuffers:
     vertex_first: wp.array = buffer(wp.int32, "shapes")
     vertex_last: wp.array = buffer(wp.int32, "shapes")
     vertex_shape: wp.array = buffer(wp.int32, "vertices")
+    vertex_next: wp.array = buffer(wp.int32, "vertices")
+    """Where the edge that starts at a vertex ends."""
     vertex: wp.array = buffer(wp.vec2, "vertices")
     """[px]"""
     extent: wp.array = buffer(wp.vec2, "vertices")
@@ -58,6 +61,10 @@ class Outline:
             OutlineBuffers,
             {"beziers": parameters.bezier_count, "shapes": parameters.shape_count, "vertices": capacity},
         )
+        self.stroker: Stroker | None = None
+        """Of the strokes that are drawn as polygons."""
+        if constants.STYLED in parameters.parts:
+            self.stroker = Stroker(backend, parameters, viewport, self.buffers, capacity, needed)
 
     def samples(self) -> dict[str, wp.array]:
         """What tiles are found by: ``bins.rectangles``'s parameters."""
@@ -84,6 +91,8 @@ class Outline:
             capacity=self._capacity,
         )
         program.launch(outline.outline_forward, p.bezier_count, *sources, split=True)
+        if self.stroker:
+            self.stroker.forward(program)
 
     def backward(self, program: Program) -> None:
         """Record gradients of the edges' ends -> gradients of the points."""

@@ -1,6 +1,7 @@
-"""The paint stage: what a shape is coloured with. Flat colour is the only kind so far.
+"""The paint stage: what a shape is coloured with.
 
-Its forward half is part of compositing, which waits for memory: ``kernels.paint.flat`` is inlined there.
+The forward half of flat colours is part of compositing, which waits for memory: ``kernels.paint.flat`` is
+inlined there. Gradients fill arrays that compositing reads, and replaces by their gradients.
 """
 
 from __future__ import annotations
@@ -9,27 +10,40 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels.paint import flat
+from warpsplat.kernels import constants
+from warpsplat.kernels.paint import flat, gradient
 from warpsplat.kernels.tile import column
-from warpsplat.render.backend import Backend, buffer
+from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.bins import Bins
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
+from warpsplat.scene import GRADIENTS
 
 
 @dataclass
 class PaintBuffers:
-    """Gradients of colour (3) and opacity, by slot: as columns where a thread has the tile, else by lane."""
+    """What the stage owns."""
 
     slot_columns: wp.array = buffer(column, "column_slots", 4)
+    """Gradients of colour (3) and opacity, where a thread has the tile."""
     slot_grad: wp.array = buffer(wp.vec4, "lane_slots", "lanes")
+    """The same by lane, where it has not."""
+    paint_columns: wp.array = buffer(column, "paint_slots", 4, constants.TILE)
+    """Colour (3) and opacity of the pixels of slots with gradients."""
+    paint_pixels: wp.array = buffer(
+        wp.float32, "paint_slots", 4, constants.TILE_PIXELS, memory_of="paint_columns"
+    )
 
 
-class Paint:
-    """Flat colours."""
+class Painting:
+    """Flat colours and gradients."""
 
-    def __init__(self, backend: Backend, parameters: Parameters, bins: Bins, slots: int) -> None:
-        self._backend, self._parameters, self._bins = backend, parameters, bins
+    def __init__(
+        self, backend: Backend, parameters: Parameters, viewport: Viewport, bins: Bins, slots: int
+    ) -> None:
+        self._backend, self._parameters, self._viewport, self._bins = backend, parameters, viewport, bins
+        self._slots = slots
+        self._has_gradients = bool(parameters.paints & set(GRADIENTS))
         whole = backend.lanes == 1
         self.buffers = backend.allocate(
             PaintBuffers,
@@ -37,11 +51,30 @@ class Paint:
                 "column_slots": slots if whole else 1,
                 "lane_slots": 1 if whole else slots,
                 "lanes": backend.lanes,
+                "paint_slots": slots if self._has_gradients else 1,
             },
         )
 
+    def forward(self, program: Program) -> None:
+        """Record frames and stops -> colours of the pixels of visible slots with gradients."""
+        if self._has_gradients:
+            program.launch(
+                gradient.gradient_forward,
+                (self._slots, self._backend.lanes),
+                *self._sources,
+                lane_columns=self._backend.lane_size,
+                split=True,
+            )
+
+    @property
+    def _sources(self) -> tuple[object, ...]:
+        return self.buffers, self._bins.buffers, self._parameters.arrays, self._viewport
+
     def backward(self, program: Program) -> None:
-        """Record gradients by slot -> gradients of colours and opacities."""
+        """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
+        if self._has_gradients:
+            shapes = self._parameters.shape_count
+            program.launch(gradient.gradient_backward, shapes, *self._sources, split=True)
         program.launch(
             flat.flat_backward,
             self._parameters.shape_count,

@@ -9,10 +9,15 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
+from warpsplat.kernels import constants
+from warpsplat.kernels.constants import NONE
+from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
-from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
+from warpsplat.scene.attributes import NO_DASHES, Cap, Join
+from warpsplat.scene.scene import starts_of
 
-ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3}
+ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
 
 
@@ -45,22 +50,44 @@ class Parameters:
         self, scene: Scene, moments: tuple[dict[str, FloatArray], dict[str, FloatArray]], ages: np.ndarray
     ) -> None:
         self._scene = scene
-        counts = scene.point_counts()
-        beziers = scene.bezier_counts()
         shapes = np.arange(len(scene))
+        owner = scene.contour_shapes()
+        contours = np.arange(len(owner))
+        in_contour, in_shape = scene.contour_beziers(), scene.bezier_counts()
         self.shape_count, self.point_count = len(scene), len(scene.points)
-        self.bezier_count = int(beziers.sum())
+        self.contour_count, self.bezier_count = len(owner), int(in_shape.sum())
         self.arrays: dict[str, wp.array] = {
             "kind": self._ints(scene.kind),
+            "part": self._ints(parts := _parts(scene)),
             "basis": self._ints(scene.basis),
+            "rule": self._ints(scene.rule),
+            "paint": self._ints(scene.paint),
+            "spread": self._ints(scene.spread),
+            "stop_first": self._ints(scene.stop_first),
             "point_first": self._ints(scene.first),
-            "point_shape": self._ints(np.repeat(shapes, counts)),
-            "bezier_first": self._ints(np.concatenate([[0], np.cumsum(beziers)])),
-            "bezier_shape": self._ints(np.repeat(shapes, beziers)),
+            "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
+            "point_contour": self._ints(np.repeat(contours, np.diff(scene.starts))),
+            "contour_shape": self._ints(owner),
+            "contour_first": self._ints(scene.starts),
+            "contour_closed": self._ints(scene.closed),
+            "contour_bezier": self._ints(starts_of(in_contour)),
+            "bezier_first": self._ints(starts_of(in_shape)),
+            "bezier_contour": self._ints(np.repeat(contours, in_contour)),
             "ages": self._ints(ages),
         }
         """What kernels bind by name: the layout of the shapes, and each attribute with its gradient."""
-        owners = {"point": self.arrays["point_shape"], "shape": self._ints(shapes)}
+        self.has_twins = bool(scene.twin.any())
+        if self.has_twins:
+            self.arrays["point_twin"] = self._ints(_twins(scene))
+        self.parts = tuple(np.unique(parts).tolist())
+        """Of exact coverage, that there are shapes of."""
+        if constants.STYLED in self.parts:
+            self._upload_styles(scene)
+        owners = {
+            "point": self.arrays["point_shape"],
+            "shape": self._ints(shapes),
+            "stop": self._ints(np.repeat(shapes, np.diff(scene.stop_first))),
+        }
         self.groups: dict[str, Group] = {}
         for a in ATTRIBUTES:
             value, m1, m2 = (
@@ -73,6 +100,18 @@ class Parameters:
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
 
+    def _upload_styles(self, scene: Scene) -> None:
+        lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
+        numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
+        self.arrays |= {
+            "cap": self._ints(scene.cap),
+            "join": self._ints(scene.join),
+            "miter_limits": wp.array(scene.miter_limits, dtype=wp.float32, device=self.backend.device),
+            "dash": self._ints(scene.dash),
+            "dash_first": self._ints(starts_of(lengths)),
+            "dashes": wp.array(numbers, dtype=wp.float32, device=self.backend.device),
+        }
+
     def _ints(self, values: np.ndarray) -> wp.array:
         return wp.array(np.ascontiguousarray(values, np.int32), dtype=wp.int32, device=self.backend.device)
 
@@ -84,6 +123,11 @@ class Parameters:
     def kinds(self) -> frozenset[Kind]:
         """Kinds of shapes that there are."""
         return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+
+    @property
+    def paints(self) -> frozenset[Paint]:
+        """Paints of shapes that there are."""
+        return frozenset(Paint(k) for k in np.unique(self._scene.paint))
 
     @property
     def canvas(self) -> Canvas:
@@ -157,3 +201,16 @@ class Parameters:
         moments = carried("moment1"), carried("moment2")
         self._upload(before.take(keep).append(added), moments, ages)
         self.revision += 1
+
+
+def _parts(scene: Scene) -> np.ndarray:
+    """Which part of exact coverage each shape belongs to."""
+    plain = (scene.cap == Cap.ROUND) & (scene.join == Join.ROUND) & (scene.dash == NO_DASHES)
+    return np.where((scene.kind == Kind.STROKE) & ~plain, constants.STYLED, scene.kind)
+
+
+def _twins(scene: Scene) -> IndexArray:
+    """For each point the same point of the shape that its shape is the twin of, or NONE."""
+    owner = np.repeat(np.arange(len(scene)), scene.point_counts())
+    behind = np.arange(len(owner)) - scene.point_counts()[owner]
+    return np.where(scene.twin[owner] == 1, behind, NONE)

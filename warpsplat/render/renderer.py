@@ -12,7 +12,7 @@ from warpsplat.render.backend import Backend, Viewport
 from warpsplat.render.bins import Bins
 from warpsplat.render.film import Film
 from warpsplat.render.models import EXACT, Job, Model
-from warpsplat.render.paint import Paint
+from warpsplat.render.paint import Painting
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
 from warpsplat.render.tiles import from_tiles, to_tiles
@@ -56,7 +56,7 @@ class Renderer:
         self.parameters, self.viewport = parameters, viewport
         self.backend = parameters.backend
         self._model = model
-        self.film = Film(self.backend, viewport)
+        self.film = Film(self.backend, viewport, parameters.canvas)
         self.needed_samples = self.backend.array(wp.int32, 1)
         self.needed_slots = self.backend.array(wp.int32, 1)
         shapes = parameters.shape_count
@@ -72,7 +72,7 @@ class Renderer:
         self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots)
         job = Job(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
         self.geometry, self.coverage = self._model.stages(job)
-        self.paint = Paint(backend, p, self.bins, capacity.slots)
+        self.paint = Painting(backend, p, v, self.bins, capacity.slots)
         self.forward_program = backend.program()
         self._record_forward(self.forward_program)
         self.backward_program = backend.program("backward")
@@ -97,7 +97,8 @@ class Renderer:
         self.coverage.states(program)  # slots, samples -> states
         self.bins.list_visible(program)  # states, paint -> each tile's list
         self.coverage.values(program)  # lists, samples -> coverages
-        self.film.forward(program, self.parameters, self.bins, self.coverage)  # -> image
+        self.paint.forward(program)  # frames, stops -> colours of pixels, where there are gradients
+        self.film.forward(program, self.bins, self.coverage, self.paint)  # -> image
 
     def _record_backward(self, program: Program) -> None:
         self.film.backward(program, self.bins, self.coverage, self.paint)  # image_grad -> by slot
@@ -115,11 +116,13 @@ class Renderer:
         self.backward_program.run()
 
     def read_image(self) -> FloatArray:
-        """The image on the host: sRGB in [0, 1], shape (height, width, 3)."""
+        """The image on the host: sRGB in [0, 1], shape (height, width, 3); of a transparent canvas
+        premultiplied, and opacity: shape (height, width, 4).
+        """
         return from_tiles(self.film.buffers.image.numpy(), self.viewport.width, self.viewport.height)
 
     def write_image_grad(self, gradient: FloatArray) -> None:
-        """Set the image's gradient from the host, shape (height, width, 3)."""
+        """Set the image's gradient from the host, in the image's shape."""
         self.film.buffers.image_grad.assign(to_tiles(gradient))
 
     def removal_costs(self, target: wp.array, importance: wp.array | None = None) -> FloatArray:
@@ -130,7 +133,7 @@ class Renderer:
         """
         cost = self.backend.array(wp.float32, self.capacity.slots, self.backend.lanes)
         program = self.backend.program()
-        self.film.removal_cost(program, self.bins, self.coverage, target, importance, cost)
+        self.film.removal_cost(program, self.bins, self.coverage, self.paint, target, importance, cost)
         program.run()
         shapes = self.bins.buffers.slot_shape.numpy()
         used = shapes >= 0
@@ -183,7 +186,7 @@ def render(
     Samples follow the size in pixels, so a scene can be rendered at any size (paper section 3.3).
 
     Returns:
-        sRGB in [0, 1], shape (height, width, 3).
+        as ``Renderer.read_image``.
     """
     canvas = scene.canvas
     size = max(1, round(canvas.width * scale)), max(1, round(canvas.height * scale))

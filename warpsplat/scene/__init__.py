@@ -1,17 +1,40 @@
 """What is optimised and what a file holds: shapes on a canvas. NumPy only."""
 
-from warpsplat.scene.attributes import ATTRIBUTES, OPACITY_RANGE, Attribute, Basis, Kind, Unit
+from warpsplat.scene.attributes import (
+    ATTRIBUTES,
+    GRADIENTS,
+    NO_DASHES,
+    OPACITY_RANGE,
+    TRAITS,
+    Attribute,
+    Basis,
+    Cap,
+    Join,
+    Kind,
+    Paint,
+    Rule,
+    Spread,
+    Unit,
+)
 from warpsplat.scene.scene import Canvas, FloatArray, IndexArray, Scene
 
 __all__ = [
     "ATTRIBUTES",
+    "GRADIENTS",
+    "NO_DASHES",
     "OPACITY_RANGE",
+    "TRAITS",
     "Attribute",
     "Basis",
     "Canvas",
+    "Cap",
     "FloatArray",
     "IndexArray",
+    "Join",
     "Kind",
+    "Paint",
+    "Rule",
     "Scene",
+    "Spread",
     "Unit",
 ]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene.attributes import ATTRIBUTES, Attribute, Basis, Kind
+from warpsplat.scene.attributes import ATTRIBUTES, TRAITS, Attribute, Basis, Kind, Paint
 
 FloatArray = npt.NDArray[np.float32]
 IndexArray = npt.NDArray[np.intp]
@@ -24,29 +24,36 @@ class Canvas:
     """[px of the input image], which are the canvas units."""
     height: int
     """[px]"""
-    background: FloatArray
-    """sRGB in [0, 1], shape (3,)."""
+    background: FloatArray | None
+    """sRGB in [0, 1], shape (3,); None: transparent."""
 
 
 class Alike(NamedTuple):
-    """Shapes of one kind and basis with equally many points."""
+    """Contours of shapes of one kind and basis, all closed or all open, with equally many points."""
 
     kind: Kind
     basis: Basis
+    closed: bool
     shapes: IndexArray
-    """Which they are, shape (shape,)."""
+    """Whose they are, shape (contour,)."""
+    contours: IndexArray
+    """Which they are, shape (contour,)."""
     points: FloatArray
-    """Shape (shape, point, 2)."""
+    """Shape (contour, point, 2)."""
 
 
 @dataclass(frozen=True)
 class Scene:
     """Bézier shapes on a canvas; row 0 is painted first (furthest back).
 
-    Shapes have as many Béziers as they need: the control points of all lie in one array, those of shape ``i``
-    from ``first[i]`` to ``first[i + 1]``. The shape's ``basis`` says what they are. Of a fill they are a
-    ring: the last cubic ends at point 0, a spline has a quadratic for each point. Of a stroke they are a
+    Shapes have as many contours as they need, and contours as many Béziers: the control points of all lie in
+    one array, those of contour ``c`` from ``starts[c]`` to ``starts[c + 1]``, those of shape ``i`` from
+    ``first[i]`` to ``first[i + 1]``. The shape's ``basis`` says what they are. Of a closed contour they are a
+    ring: the last cubic ends at point 0, a spline has a quadratic for each point. Of an open one they are a
     chain: cubics have one point more, a spline has two points more than quadratics.
+
+    What is left out of contours and traits is what a shape of one contour has by default: fills are closed,
+    strokes open.
     """
 
     canvas: Canvas
@@ -64,9 +71,50 @@ class Scene:
     """In [0, 1], shape (shape,)."""
     widths: FloatArray
     """Stroke widths [canvas units], shape (shape,); 0 for fills."""
-    fades: FloatArray
+    starts: IntArray = None  # type: ignore[assignment]  # __post_init__ fills in what is left out
+    """First control point of each contour and, last, the number of points, shape (contour + 1,)."""
+    closed: IntArray = None  # type: ignore[assignment]
+    """1 for closed contours, else 0, shape (contour,)."""
+    rule: IntArray = None  # type: ignore[assignment]
+    """``Rule`` of each shape, shape (shape,); it says something of fills only."""
+    cap: IntArray = None  # type: ignore[assignment]
+    """``Cap`` of each shape, shape (shape,); this and what follows says something of strokes only."""
+    join: IntArray = None  # type: ignore[assignment]
+    """``Join`` of each shape, shape (shape,)."""
+    miter_limits: FloatArray = None  # type: ignore[assignment]
+    """Longest miter over the width, shape (shape,); a join beyond is a bevel."""
+    dash: IntArray = None  # type: ignore[assignment]
+    """Row of ``dashes`` of each shape, or NO_DASHES, shape (shape,)."""
+    twin: IntArray = None  # type: ignore[assignment]
+    """1 for a shape that shares its points with the one before it, a path that is filled and stroked; shape
+    (shape,)."""
+    layer: IntArray = None  # type: ignore[assignment]
+    """Number of the group that each shape is in, ascending, shape (shape,)."""
+    paint: IntArray = None  # type: ignore[assignment]
+    """``Paint`` of each shape, shape (shape,); what follows says something of gradients only."""
+    spread: IntArray = None  # type: ignore[assignment]
+    """``Spread`` of each shape, shape (shape,)."""
+    frames: FloatArray = None  # type: ignore[assignment]
+    """Where a gradient's unit space lies on the canvas: origin, first axis and second axis [canvas units],
+    shape (shape, 6). A linear one goes from the origin along the first axis; a radial one ends at the unit
+    circle."""
+    focus: FloatArray = None  # type: ignore[assignment]
+    """Centre and radius of the circle where a radial gradient begins, in its unit space, shape (shape, 3)."""
+    stop_first: IntArray = None  # type: ignore[assignment]
+    """First stop of each shape's gradient and, last, the number of stops, shape (shape + 1,)."""
+    stop_offsets: FloatArray = None  # type: ignore[assignment]
+    """Where along the gradient the stops lie, in [0, 1], shape (stop,). One that lies before the one before
+    it counts as lying there."""
+    stop_colors: FloatArray = None  # type: ignore[assignment]
+    """sRGB in [0, 1], shape (stop, 3)."""
+    stop_opacities: FloatArray = None  # type: ignore[assignment]
+    """In [0, 1], besides the shape's, shape (stop,)."""
+    fades: FloatArray = None  # type: ignore[assignment]
     """What is added to a stroke's opacity in each of its thirds (of three cubics: in each), shape (shape, 3).
     Soft Gaussians alone know of it: a path has one opacity."""
+    dashes: tuple[tuple[float, ...], ...] = ()
+    """Patterns of dashes [canvas units]: where in the pattern a stroke begins, then dashes and gaps in turn,
+    as many of these as of those."""
 
     def __post_init__(self) -> None:
         """Check that the arrays fit one another.
@@ -78,21 +126,48 @@ class Scene:
             raise ValueError(
                 f"first does not run from 0 to {len(self.points)} points in {len(self) + 1} numbers"
             )
+        self._fill_in()
         for attribute in ATTRIBUTES:
             shape = np.shape(getattr(self, attribute.name))
             wanted = self.shape_of(attribute)
             if shape != wanted:
                 raise ValueError(f"{attribute.name} has shape {shape}, not {wanted}")
-        if self.basis.shape != self.kind.shape:
-            raise ValueError(f"basis has shape {self.basis.shape}, not {self.kind.shape}")
-        counts = self.point_counts()
-        odd = counts % 3 != np.where(self.kind == Kind.FILL, 0, 1)
-        wrong = (counts < 3) | ((self.basis == Basis.CUBIC) & odd)
+        for name in ("basis", *(trait.name for trait in TRAITS)):
+            if getattr(self, name).shape != self.kind.shape:
+                raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {self.kind.shape}")
+        self._check_contours()
+
+    def _fill_in(self) -> None:
+        defaults: dict[str, Any] = {t.name: np.full(len(self), t.default, t.dtype) for t in TRAITS}
+        defaults["starts"] = self.first
+        defaults["closed"] = (self.kind == Kind.FILL).astype(np.int32)
+        defaults["stop_first"] = np.zeros(len(self) + 1, np.int32)
+        for name, value in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+        for attribute in ATTRIBUTES:
+            if getattr(self, attribute.name) is None:
+                object.__setattr__(self, attribute.name, np.zeros(self.shape_of(attribute), np.float32))
+
+    def _check_contours(self) -> None:
+        starts, counts = self.starts, np.diff(self.starts)
+        if len(self.closed) != len(counts) or starts[0] != 0 or not np.isin(self.first, starts).all():
+            raise ValueError("starts and closed are not those of the shapes' contours")
+        owner = self.contour_shapes()
+        odd = counts % 3 != np.where(self.closed, 0, 1)
+        wrong = (counts < 3) | ((self.basis[owner] == Basis.CUBIC) & odd)
         if wrong.any():
             bad = int(np.flatnonzero(wrong)[0])
-            raise ValueError(
-                f"a {Kind(self.kind[bad]).name.lower()} cannot have {counts[bad]} control points"
-            )
+            name = Kind(self.kind[owner[bad]]).name.lower()
+            raise ValueError(f"a {name} cannot have {counts[bad]} control points")
+        stops = np.diff(self.stop_first)
+        if ((stops < 1) & (self.paint != Paint.FLAT)).any() or (stops < 0).any():
+            raise ValueError("a gradient has no stops")
+        alone = self.twin.astype(np.bool_) & (
+            np.concatenate([[0], self.point_counts()[:-1]]) != self.point_counts()
+        )
+        if alone.any():
+            raise ValueError(f"shape {int(np.flatnonzero(alone)[0])} has not the points of the one before it")
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -103,7 +178,7 @@ class Scene:
         kind: IntArray,
         first: IntArray,
         basis: IntArray | None = None,
-        **attributes: FloatArray,
+        **attributes: Any,
     ) -> Scene:
         """Shapes with the ``attributes`` that are known.
 
@@ -112,12 +187,13 @@ class Scene:
             kind: shape (shape,).
             first: shape (shape + 1,).
             basis: shape (shape,); default: cubics.
-            attributes: of the table, ``points`` among them; those left out are 0.
+            attributes: of the table, ``points`` among them; those left out are 0. Traits and contours as
+                well; those left out are the default.
         """
-        rows: dict[str, Any] = {}
-        for a in ATTRIBUTES:
-            if a.per == "shape":
-                rows[a.name] = np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
+        rows: dict[str, Any] = {
+            name: np.zeros((len(kind), 3) if name == "colors" else len(kind), np.float32)
+            for name in ("colors", "opacities", "widths")
+        }
         if basis is None:
             basis = np.full(len(kind), Basis.CUBIC, np.int32)
         return Scene(canvas, kind, basis, first, **(rows | attributes))
@@ -151,59 +227,111 @@ class Scene:
 
     def shape_of(self, attribute: Attribute) -> tuple[int, ...]:
         """Shape of the array of ``attribute``."""
-        rows = len(self.points) if attribute.per == "point" else len(self)
+        rows = {"point": len(self.points), "shape": len(self), "stop": int(self.stop_first[-1])}[
+            attribute.per
+        ]
         return (rows, attribute.size) if attribute.size > 1 else (rows,)
 
     def point_counts(self) -> IntArray:
         """Control points of each shape, shape (shape,)."""
         return np.diff(self.first)
 
+    def contour_shapes(self) -> IndexArray:
+        """The shape of each contour, shape (contour,)."""
+        owner = np.searchsorted(self.first, self.starts[:-1], "right") - 1
+        return np.asarray(np.minimum(owner, len(self) - 1), np.intp)
+
+    def contour_beziers(self) -> IntArray:
+        """Béziers of each contour, shape (contour,)."""
+        counts = np.diff(self.starts)
+        spline = np.where(self.closed, counts, counts - 2)
+        cubics = self.basis[self.contour_shapes()] == Basis.CUBIC
+        return np.where(cubics, counts // 3, spline).astype(np.int32)
+
     def bezier_counts(self) -> IntArray:
         """Béziers of each shape, shape (shape,)."""
-        counts = self.point_counts()
-        spline = np.where(self.kind == Kind.FILL, counts, counts - 2)
-        return np.where(self.basis == Basis.CUBIC, counts // 3, spline).astype(np.int32)
+        owner = self.contour_shapes()
+        return np.bincount(owner, self.contour_beziers(), len(self)).astype(np.int32)
 
     def points_of(self, shape: int) -> FloatArray:
         """Control points of one shape, shape (point, 2)."""
         return self.points[self.first[shape] : self.first[shape + 1]]
 
+    def contours_of(self, shape: int) -> list[tuple[FloatArray, bool]]:
+        """Points of each contour of a shape, shape (point, 2), and whether it is closed."""
+        low, high = np.searchsorted(self.starts, self.first[shape : shape + 2])
+        return [
+            (self.points[self.starts[c] : self.starts[c + 1]], bool(self.closed[c])) for c in range(low, high)
+        ]
+
     def alike(self) -> Iterator[Alike]:
-        """Groups of shapes of one kind and basis with equally many points."""
-        counts = self.point_counts()
-        keys = np.stack([self.kind, self.basis, counts], axis=1)
-        for kind, basis, count in sorted(set(map(tuple, keys.tolist()))):
-            index = np.flatnonzero((keys == (kind, basis, count)).all(axis=1))
-            points = self.points[self.first[index][:, None] + np.arange(count)]
-            yield Alike(Kind(kind), Basis(basis), index, points)
+        """Groups of contours of shapes of one kind and basis with equally many points."""
+        owner, counts = self.contour_shapes(), np.diff(self.starts)
+        keys = np.stack([self.kind[owner], self.basis[owner], self.closed, counts], axis=1)
+        for kind, basis, closed, count in sorted(set(map(tuple, keys.tolist()))):
+            index = np.flatnonzero((keys == (kind, basis, closed, count)).all(axis=1))
+            points = self.points[self.starts[index][:, None] + np.arange(count)]
+            yield Alike(Kind(kind), Basis(basis), bool(closed), owner[index], index, points)
 
     def rows(self, attribute: Attribute, index: IndexArray) -> IndexArray:
         """Rows of ``attribute``'s array that belong to the shapes ``index``, in that order."""
         if attribute.per == "shape":
             return index
-        counts = self.point_counts()[index].astype(np.intp)
-        starts = np.cumsum(counts) - counts
-        return np.repeat(self.first[index] - starts, counts) + np.arange(counts.sum())
+        if attribute.per == "stop":
+            return ranges(self.stop_first[index], np.diff(self.stop_first)[index])
+        return ranges(self.first[index], self.point_counts()[index])
 
     def take(self, index: IndexArray) -> Scene:
-        """The shapes ``index``, in that order."""
+        """The shapes ``index``, in that order. One that is taken without its twin is a shape of its own."""
         index = np.asarray(index, np.intp)
         values: dict[str, Any] = {a.name: getattr(self, a.name)[self.rows(a, index)] for a in ATTRIBUTES}
-        first = starts_of(self.point_counts()[index])
-        return replace(self, kind=self.kind[index], basis=self.basis[index], first=first, **values)
+        values |= {t.name: getattr(self, t.name)[index] for t in TRAITS}
+        values["twin"] = values["twin"] * (np.concatenate([[-1], index[:-1]]) == index - 1)
+        low, high = (np.searchsorted(self.starts, self.first[index + i]) for i in (0, 1))
+        contours = ranges(low, high - low)
+        return replace(
+            self,
+            kind=self.kind[index],
+            basis=self.basis[index],
+            first=starts_of(self.point_counts()[index]),
+            starts=starts_of(np.diff(self.starts)[contours]),
+            closed=self.closed[contours],
+            stop_first=starts_of(np.diff(self.stop_first)[index]),
+            **values,
+        )
 
     def append(self, other: Scene) -> Scene:
         """This scene with the shapes of ``other`` in front."""
         values: dict[str, Any] = {
-            a.name: np.concatenate([getattr(self, a.name), getattr(other, a.name)]) for a in ATTRIBUTES
+            row.name: np.concatenate([getattr(self, row.name), getattr(other, row.name)])
+            for row in (*ATTRIBUTES, *TRAITS)
         }
+        if other.dashes != self.dashes:
+            moved = np.where(other.dash >= 0, other.dash + len(self.dashes), other.dash)
+            values["dash"] = np.concatenate([self.dash, moved]).astype(np.int32)
+            values["dashes"] = (*self.dashes, *other.dashes)
         return replace(
             self,
             kind=np.concatenate([self.kind, other.kind]),
             basis=np.concatenate([self.basis, other.basis]),
             first=starts_of(np.concatenate([self.point_counts(), other.point_counts()])),
+            starts=starts_of(np.concatenate([np.diff(self.starts), np.diff(other.starts)])),
+            closed=np.concatenate([self.closed, other.closed]),
+            stop_first=starts_of(np.concatenate([np.diff(self.stop_first), np.diff(other.stop_first)])),
             **values,
         )
+
+    def without_points(self, keep: npt.NDArray[np.bool_]) -> Scene:
+        """The same shapes with only the points ``keep``, shape (point,)."""
+        left = np.concatenate([[0], np.cumsum(keep)]).astype(np.int32)
+        return replace(self, first=left[self.first], starts=left[self.starts], points=self.points[keep])
+
+
+def ranges(low: npt.NDArray[np.integer], counts: npt.NDArray[np.integer]) -> IndexArray:
+    """Numbers from each of ``low`` on, so many each, in a row."""
+    counts = counts.astype(np.intp)
+    ends = np.cumsum(counts)
+    return np.repeat(low - (ends - counts), counts) + np.arange(counts.sum())
 
 
 def starts_of(counts: npt.NDArray[np.integer]) -> IntArray:

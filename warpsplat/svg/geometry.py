@@ -1,4 +1,4 @@
-"""Geometry of SVG elements: basic shapes as path data, winding numbers, transforms as matrices."""
+"""Geometry of SVG elements: basic shapes as path data, boxes, clipping, transforms as matrices."""
 
 from __future__ import annotations
 
@@ -9,55 +9,61 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import ImageError
-from warpsplat.svg.inspect import NUMBER
-from warpsplat.svg.paths import Points
-from warpsplat.svg.style import length
+from warpsplat.svg.inspect import NUMBER, view_box
+from warpsplat.svg.paths import Points, Subpath
+from warpsplat.svg.values import Viewport, length, numbers
 
 Matrix = npt.NDArray[np.float64]
 
+ACROSS = {"x", "cx", "x1", "x2", "fx", "width", "rx"}
+DOWN = {"y", "cy", "y1", "y2", "fy", "height", "ry"}
+"""Attributes whose percentages are of the viewport's width, and of its height; those of others are of its
+diagonal."""
 
-def outline(tag: str, attributes: Mapping[str, str], size: tuple[float, float]) -> tuple[str, bool]:
-    """Path data of a shape element (empty: draws nothing), and whether it is a rectangle of sharp corners.
 
-    ``size`` is what percentages refer to.
-    """
-    along = {"x": size[0], "y": size[1], "r": float(np.hypot(*size)) / 2**0.5}
-    along |= {"cx": size[0], "x1": size[0], "x2": size[0], "width": size[0], "rx": size[0]}
-    along |= {"cy": size[1], "y1": size[1], "y2": size[1], "height": size[1], "ry": size[1]}
+def attribute(attributes: Mapping[str, str], name: str, viewport: Viewport) -> float | None:
+    """A length among the attributes [user units]; None if it is not there or is none."""
+    text = attributes.get(name)
+    if text is None:
+        return None
+    reference = viewport.width if name in ACROSS else viewport.height if name in DOWN else viewport.diagonal
+    return length(text, reference, name, viewport.font_size)
 
-    def get(name: str, default: float = 0.0) -> float:
-        text = attributes.get(name, "auto")
-        return default if text == "auto" else length(text, along[name], name)
+
+def outline(tag: str, attributes: Mapping[str, str], viewport: Viewport) -> str:
+    """Path data of a shape element; empty: draws nothing."""
+
+    def get(name: str) -> float:
+        return attribute(attributes, name, viewport) or 0.0
+
+    def radii() -> tuple[float, float]:
+        rx, ry = (attribute(attributes, name, viewport) for name in ("rx", "ry"))
+        rx, ry = (None if r is None or r < 0 else r for r in (rx, ry))
+        return (rx if rx is not None else ry) or 0.0, (ry if ry is not None else rx) or 0.0
 
     if tag == "path":
-        return attributes.get("d", ""), False
+        return attributes.get("d", "")
     if tag == "line":
-        return f"M{get('x1')!r} {get('y1')!r}L{get('x2')!r} {get('y2')!r}", False
+        return f"M{get('x1')!r} {get('y1')!r}L{get('x2')!r} {get('y2')!r}"
     if tag in {"polyline", "polygon"}:
-        return _poly(attributes.get("points", ""), closed=tag == "polygon"), False
+        return _poly(attributes.get("points", ""), closed=tag == "polygon")
     if tag == "rect":
         width, height = get("width"), get("height")
-        rx, ry = get("rx", -1.0), get("ry", -1.0)
-        rx, ry = (ry if rx < 0 else rx), (rx if ry < 0 else ry)
-        rx, ry = min(rx, width / 2), min(ry, height / 2)
-        return _rect(get("x"), get("y"), width, height, rx, ry), not (rx > 0 and ry > 0)
-    if tag == "circle":
-        rx = ry = get("r")
-    else:
-        rx, ry = get("rx", -1.0), get("ry", -1.0)
-        rx, ry = (ry if rx < 0 else rx), (rx if ry < 0 else ry)
+        rx, ry = radii()
+        return _rect(get("x"), get("y"), width, height, min(rx, width / 2), min(ry, height / 2))
+    rx, ry = (get("r"), get("r")) if tag == "circle" else radii()
     if not (rx > 0 and ry > 0):
-        return "", False
+        return ""
     x, y = get("cx"), get("cy")
     arc = f"A{rx!r} {ry!r} 0 0 1 "
     ends = ((x, y + ry), (x - rx, y), (x, y - ry), (x + rx, y))
-    return f"M{x + rx!r} {y!r}" + "".join(f"{arc}{u!r} {v!r}" for u, v in ends) + "z", False
+    return f"M{x + rx!r} {y!r}" + "".join(f"{arc}{u!r} {v!r}" for u, v in ends) + "z"
 
 
 def _poly(text: str, *, closed: bool) -> str:
-    values = NUMBER.findall(text)
+    values, _ = numbers(text)
     values = values[: len(values) // 2 * 2]
-    return f"M{' '.join(values)}{'z' if closed else ''}" if len(values) >= 4 else ""
+    return f"M{' '.join(map(repr, values))}{'z' if closed else ''}" if len(values) >= 4 else ""
 
 
 def _rect(x: float, y: float, width: float, height: float, rx: float, ry: float) -> str:
@@ -73,39 +79,82 @@ def _rect(x: float, y: float, width: float, height: float, rx: float, ry: float)
     )
 
 
-def winding(subpaths: list[Points], size: int = 128) -> npt.NDArray[np.intp]:
-    """Winding numbers of closed subpaths at ``size`` x ``size`` points of their box."""
-    t = np.arange(8)[:, None] / 8
-    weights = np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
-    starts, ends = [], []
-    for points in subpaths:
-        each = points[np.arange(0, len(points) - 1, 3)[:, None] + np.arange(4)]
-        polygon = np.einsum("tk,ckx->ctx", weights, each).reshape(-1, 2)
-        polygon = np.concatenate([polygon, points[-1:]])
-        starts.append(polygon)
-        ends.append(np.roll(polygon, -1, axis=0))
-    a, b = np.concatenate(starts), np.concatenate(ends)
-    low, high = a.min(axis=0), a.max(axis=0)
-    unit = np.where(high > low, high - low, 1.0) / size
-    a, b = (a - low) / unit - 0.5, (b - low) / unit - 0.5
-    turns = np.zeros((size, size + 1), np.intp)
-    for row in range(size):
-        crossing = (a[:, 1] <= row) != (b[:, 1] <= row)
-        p, q = a[crossing], b[crossing]
-        x = p[:, 0] + (row - p[:, 1]) / (q[:, 1] - p[:, 1]) * (q[:, 0] - p[:, 0])
-        column = np.clip(np.ceil(x), 0, size).astype(np.intp)
-        np.add.at(turns[row], column, np.where(q[:, 1] > p[:, 1], 1, -1))
-    return np.cumsum(turns, axis=1)[:, :size]
+def tight_box(subpaths: list[Subpath]) -> Points:
+    """Least and largest coordinates of the curves, shape (2, 2)."""
+    ends = np.concatenate([subpath.points[::3] for subpath in subpaths])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    p0, p1, p2, p3 = (
+        np.concatenate([s.points[i::3][: len(s.points) // 3] for s in subpaths]) for i in range(4)
+    )
+    a, b, c = p3 - 3 * p2 + 3 * p1 - p0, 2 * (p2 - 2 * p1 + p0), p1 - p0
+    root = np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))
+    q = -0.5 * (b + np.where(b < 0, -root, root))
+    for root in (q / a, c / q):  # the stable form of both solutions; what is no number is none
+        t = np.clip(np.nan_to_num(root, nan=0.0, posinf=0.0, neginf=0.0), 0.0, 1.0)
+        u = 1 - t
+        extreme = u**3 * p0 + 3 * u * u * t * p1 + 3 * u * t * t * p2 + t**3 * p3
+        low, high = np.minimum(low, extreme.min(axis=0)), np.maximum(high, extreme.max(axis=0))
+    return np.stack([low, high])
+
+
+def similarity(matrix: Matrix) -> float | None:
+    """By how much a map scales; None if not alike in all directions (to a hundredth)."""
+    sizes = np.linalg.svd(np.nan_to_num(matrix[:2, :2]), compute_uv=False)
+    return float(sizes.mean()) if sizes[1] >= 0.99 * sizes[0] else None
+
+
+def moved(matrix: Matrix, points: Points) -> Points:
+    """Points under an affine map."""
+    return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])
+
+
+def translation(x: float, y: float) -> Matrix:
+    """The map that moves by (x, y)."""
+    matrix = np.eye(3)
+    matrix[:2, 2] = x, y
+    return matrix
+
+
+ALIGN = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)")
+
+
+def view_box_map(attributes: Mapping[str, str], width: float, height: float) -> Matrix | None:
+    """Map of the units of an element's ``viewBox`` to its ``width`` x ``height``; None if it has none.
+
+    Raises:
+        ImageError: it lies too far away, or its ``preserveAspectRatio`` is none.
+    """
+    box = view_box(dict(attributes))
+    if box is None:
+        return None
+    x, y, box_width, box_height = box
+    fit = np.array([width / box_width, height / box_height])
+    words = attributes.get("preserveAspectRatio", "xMidYMid").split()
+    align = words[0] if words else "xMidYMid"
+    shift = np.zeros(2)
+    if align != "none":
+        fit[:] = fit.max() if "slice" in words else fit.min()
+        found = ALIGN.fullmatch(align)
+        if not found:
+            raise ImageError(f"preserveAspectRatio {align[:40]!r} is not known")
+        part = np.array([{"Min": 0.0, "Mid": 0.5, "Max": 1.0}[word] for word in found.groups()])
+        shift = part * (np.array([width, height]) - fit * (box_width, box_height))
+    view = np.diag([*fit, 1.0])
+    with np.errstate(all="ignore"):  # what overflows is found where it is used
+        view[:2, 2] = shift - fit * (x, y)
+        if not np.isfinite(view).all():
+            raise ImageError("its viewBox lies farther than can be drawn")
+    return view
 
 
 FUNCTION = re.compile(r"[\s,]*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
 
 
 def parse_transform(text: str) -> Matrix:
-    """A ``transform`` as a 3x3 matrix.
+    """A ``transform`` as a 3x3 matrix; what is none does nothing.
 
     Raises:
-        ImageError: not a list of the functions of SVG 1.1.
+        ImageError: of functions or units that only some viewers know.
     """
     matrix = np.eye(3)
     position = 0
@@ -119,10 +168,39 @@ def parse_transform(text: str) -> Matrix:
             _function(found[1], values) if found and not NUMBER.sub("", found[2]).strip(" ,\t\r\n") else None
         )
         if found is None or one is None:
+            if "(" not in text:
+                return np.eye(3)
             raise ImageError(f"transform {text[:40]!r} is not supported")
         matrix = matrix @ one
         position = found.end()
     return matrix
+
+
+PLACES = {"left": 0.0, "top": 0.0, "center": 0.5, "right": 1.0, "bottom": 1.0}
+
+
+def about(origin: str, viewport: Viewport, matrix: Matrix) -> Matrix:
+    """A transform about its ``transform-origin``.
+
+    Raises:
+        ImageError: the origin is none.
+    """
+    if origin in {"", "none"}:
+        return matrix
+    words = origin.split()[:2]
+    if words[0] in {"top", "bottom"} or words[1:] in (["left"], ["right"]):
+        words = [*words[1:], "center"][:1] + words[:1]  # the second is the horizontal one
+    at = []
+    for word, size in zip([*words, "center"], (viewport.width, viewport.height), strict=False):
+        place = (
+            PLACES[word] * size
+            if word in PLACES
+            else length(word, size, "transform-origin", viewport.font_size)
+        )
+        if place is None:
+            raise ImageError(f"transform-origin {origin[:40]!r} is not known")
+        at.append(place)
+    return np.asarray(translation(*at) @ matrix @ translation(-at[0], -at[1]))
 
 
 def _function(name: str, v: list[float]) -> Matrix | None:

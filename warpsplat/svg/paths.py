@@ -10,13 +10,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.errors import ImageError
 from warpsplat.svg.inspect import ARGUMENTS, NUMBER
+from warpsplat.svg.values import SPACE, numbers
 
 Points = npt.NDArray[np.float64]
 
 COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
-SPACE = re.compile(r"[\s,]*")
 FLAG = re.compile(r"[01]")
 
 
@@ -58,12 +57,9 @@ class Subpath(NamedTuple):
 
 
 def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
-    """Subpaths of path data.
+    """Subpaths of path data, up to the first error if it has any (SVG 1.1, F.2).
 
     ``keep_dots`` keeps subpaths without extent, which show in a stroke.
-
-    Raises:
-        ImageError: no path data.
     """
     data = data.strip()
     if data in {"", "none"} or data[0] not in "Mm":
@@ -71,13 +67,13 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
     pen = _Pen()
     for command, text in COMMAND.findall(data):
         size = ARGUMENTS[command.lower()]
-        values = _arguments(text, command)
-        if (len(values) % size or not values) if size else (values or text.strip()):
-            raise ImageError(f"path data is broken at {(command + text)[:40]!r}")
-        for i in range(0, max(len(values), 1), max(size, 1)):
+        values, is_whole = _arc_arguments(text) if command in "Aa" else numbers(text)
+        for i in range(0, max(len(values) - size + 1, 1 - size), max(size, 1)):
             # Further pairs after a move are lines.
             move_on = i and command in "Mm"
             pen.draw(("l" if command == "m" else "L") if move_on else command, values[i : i + size])
+        if not is_whole or (len(values) % size or not values if size else values):
+            break
     return [
         Subpath(np.array([(p.real, p.imag) for p in points]), is_closed, is_spline)
         for points, is_closed, is_spline in pen.finish(keep_dots)
@@ -85,21 +81,19 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
     ]
 
 
-def _arguments(text: str, command: str) -> list[float]:
-    if command not in "Aa":
-        if NUMBER.sub(" ", text).strip(", \t\r\n\f"):
-            raise ImageError(f"path data is broken at {(command + text)[:40]!r}")
-        return [float(value) for value in NUMBER.findall(text)]
-    # The flags of an arc are one character, and may stand without anything between them and the next number.
+def _arc_arguments(text: str) -> tuple[list[float], bool]:
+    """The numbers of arcs, and whether that is all. The flags are one character, and may stand without
+    anything between them and the next number.
+    """
     values: list[float] = []
     position = SPACE.match(text).end()  # type: ignore[union-attr]  # matches the empty text
     while position < len(text):
         found = (FLAG if len(values) % 7 in {3, 4} else NUMBER).match(text, position)
         if not found:
-            raise ImageError(f"path data is broken at {(command + text)[:40]!r}")
+            return values, False
         values.append(float(found[0]))
         position = SPACE.match(text, found.end()).end()  # type: ignore[union-attr]
-    return values
+    return values, True
 
 
 class _Pen:

@@ -1,52 +1,70 @@
-"""Any SVG of filled or of stroked paths -> scene.
+"""Any SVG of paths -> scene.
 
-A quadratic with only smooth ones behind it is a spline, in a fill where it closes smoothly; any other path
-becomes cubics. A path with holes becomes one outline: its subpaths are joined by bridges that run there and
-back, so that the area is the same.
+A quadratic with only smooth ones behind it is a spline, closed where it closes smoothly; any other path
+becomes cubics. A path that is filled and stroked becomes two shapes that share their points.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import chain
+from typing import NamedTuple
+
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.scene import Basis, Canvas, Kind, Scene
+from warpsplat.scene import NO_DASHES, Basis, Canvas, Cap, Join, Kind, Paint, Scene, Spread
 from warpsplat.scene.scene import starts_of
+from warpsplat.svg.gradients import Flat, Gradient
 from warpsplat.svg.paths import Points, Subpath, line
-from warpsplat.svg.shapes import Shape, read_shapes
+from warpsplat.svg.shapes import Shape, opacity_of
+from warpsplat.svg.structure import read_shapes
 
 
-def _bridge(start: Points, end: Points) -> Points:
-    return np.array([(p.real, p.imag) for p in line(complex(*start), complex(*end))])
+class _Outline(NamedTuple):
+    """The points of a shape as a scene has them."""
+
+    basis: Basis
+    contours: list[Points]
+    closed: list[bool]
 
 
-def _ring(subpaths: list[Subpath]) -> Points:
-    """One closed ring of cubics around all subpaths, without the repeated end."""
-    start = subpaths[0].points[0]
-    ring = [start[None]]
-    for number, (points, *_) in enumerate(subpaths):
-        if number:
-            ring.append(_bridge(start, points[0]))
-        ring.append(points[1:])
-        if not np.allclose(points[-1], points[0], rtol=0, atol=1e-6):
-            ring.append(_bridge(points[-1], points[0]))
-        if number:
-            ring.append(_bridge(points[0], start))
-    return np.concatenate(ring)[:-1]
+def _ring(subpath: Subpath) -> Points:
+    """A closed ring of cubics, without the repeated end."""
+    points = subpath.points
+    if not np.allclose(points[-1], points[0], rtol=0, atol=1e-6):
+        closing = line(complex(*points[-1]), complex(*points[0]))
+        points = np.concatenate([points, [(p.real, p.imag) for p in closing]])
+    return points[:-1]
 
 
-def _outlines(shape: Shape) -> list[tuple[Basis, Points]]:
-    """Points of a shape as a scene has them: one ring of a fill, a chain for each subpath of a stroke."""
-    if shape.filled:
-        spline = shape.subpaths[0].spline_ring() if len(shape.subpaths) == 1 else None
-        return [(Basis.CUBIC, _ring(shape.subpaths)) if spline is None else (Basis.SPLINE, spline)]
-    chains = [(subpath.points, subpath.spline_chain()) for subpath in shape.subpaths]
-    return [(Basis.CUBIC, points) if spline is None else (Basis.SPLINE, spline) for points, spline in chains]
+def _outline(shape: Shape, is_stroked: bool) -> _Outline:
+    """Points of a shape. What is only filled is closed, as filling closes it."""
+    closed = [subpath.is_closed or not is_stroked for subpath in shape.subpaths]
+    splines = [
+        subpath.spline_ring() if is_closed else subpath.spline_chain()
+        for subpath, is_closed in zip(shape.subpaths, closed, strict=True)
+    ]
+    contours = [spline for spline in splines if spline is not None]
+    if len(contours) == len(splines):
+        return _Outline(Basis.SPLINE, contours, closed)
+    cubics = [
+        _ring(subpath) if is_closed else subpath.points
+        for subpath, is_closed in zip(shape.subpaths, closed, strict=True)
+    ]
+    return _Outline(Basis.CUBIC, cubics, closed)
+
+
+def _outlines(shapes: list[Shape]) -> list[_Outline]:
+    """Points of all shapes, those of twins alike."""
+    twins = [shape.is_twin for shape in shapes] + [False]
+    stroked = [s.line is not None or a or b for s, a, b in zip(shapes, twins[:-1], twins[1:], strict=True)]
+    return [_outline(shape, is_stroked) for shape, is_stroked in zip(shapes, stroked, strict=True)]
 
 
 def _is_background(shape: Shape, width: int, height: int) -> bool:
     """Whether an opaque upright rectangle covers the canvas."""
-    if not (shape.is_rect and shape.filled and shape.opacity == 1):
+    if not (shape.is_rect and isinstance(shape.paint, Flat) and opacity_of(shape) == 1):
         return False
     corners = shape.subpaths[0].points[::3]
     upright = (np.isclose(np.diff(corners, axis=0), 0, atol=1e-6).sum(axis=1) >= 1).all()
@@ -55,7 +73,7 @@ def _is_background(shape: Shape, width: int, height: int) -> bool:
 
 
 def load_scene(text: str, width: int, height: int, name: str) -> tuple[Scene, bool]:
-    """Read an SVG's paths (and basic shapes) as a scene of ``width`` x ``height`` canvas units.
+    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units.
 
     Returns:
         the scene, and whether the SVG itself has a background; where it has none, the scene's is white.
@@ -65,31 +83,67 @@ def load_scene(text: str, width: int, height: int, name: str) -> tuple[Scene, bo
             what).
     """
     try:
-        return _load_scene(text, width, height)
+        shapes = read_shapes(text, width, height)
+        if not shapes:
+            raise ImageError("draws no filled or stroked path")
+        return scene_of(shapes, width, height)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
 
 
-def _load_scene(text: str, width: int, height: int) -> tuple[Scene, bool]:
-    shapes = read_shapes(text, width, height)
+def scene_of(shapes: list[Shape], width: int, height: int) -> tuple[Scene, bool]:
+    """Shapes as a scene, and whether the first is its background, see ``load_scene``."""
     background = np.ones(3)
-    has_background = bool(shapes) and _is_background(shapes[0], width, height)
+    has_background = len(shapes) > 1 and _is_background(shapes[0], width, height) and not shapes[1].is_twin
     if has_background:
-        background = np.array(shapes.pop(0).color)
-    if not shapes:
-        raise ImageError("draws no filled or stroked path")
-    filled = shapes[0].filled
-    if any(shape.filled != filled for shape in shapes):
-        raise ImageError("has both fills and strokes; only one of them can be refined at a time")
-    rows = [(basis, points, shape) for shape in shapes for basis, points in _outlines(shape)]
+        background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # as _is_background says
+        shapes = shapes[1:]
+    outlines = _outlines(shapes)
+    contours = [points for outline in outlines for points in outline.contours]
+    counts = np.array([sum(map(len, outline.contours)) for outline in outlines], np.int32)
+    styles = {dashes: i for i, dashes in enumerate(sorted({s.line.dashes for s in shapes if s.line} - {()}))}
+    lines = [shape.line for shape in shapes]
     scene = Scene.of(
         Canvas(width, height, background.astype(np.float32)),
-        np.full(len(rows), Kind.FILL if filled else Kind.STROKE, np.int32),
-        starts_of(np.array([len(points) for _, points, _ in rows])),
-        basis=np.array([basis for basis, _, _ in rows], np.int32),
-        points=np.concatenate([points for _, points, _ in rows]).astype(np.float32),
-        colors=np.array([shape.color for *_, shape in rows], np.float32),
-        opacities=np.array([shape.opacity for *_, shape in rows], np.float32),
-        widths=np.array([shape.width for *_, shape in rows], np.float32),
+        np.array([Kind.FILL if one is None else Kind.STROKE for one in lines], np.int32),
+        starts_of(counts),
+        basis=np.array([outline.basis for outline in outlines], np.int32),
+        starts=starts_of(np.array([len(points) for points in contours], np.int32)),
+        closed=np.array([c for outline in outlines for c in outline.closed], np.int32),
+        points=np.concatenate([*contours, np.empty((0, 2))]).astype(np.float32),
+        opacities=np.array([opacity_of(shape) for shape in shapes], np.float32),
+        rule=np.array([shape.rule for shape in shapes], np.int32),
+        twin=np.array([shape.is_twin for shape in shapes], np.int32),
+        widths=np.array([one.width if one else 0.0 for one in lines], np.float32),
+        cap=np.array([one.cap if one else Cap.ROUND for one in lines], np.int32),
+        join=np.array([one.join if one else Join.ROUND for one in lines], np.int32),
+        miter_limits=np.array([one.miter_limit if one else 4.0 for one in lines], np.float32),
+        dash=np.array([styles[s.dashes] if s and s.dashes else NO_DASHES for s in lines], np.int32),
+        dashes=tuple(styles),
+        colors=np.array(
+            [s.paint.color if isinstance(s.paint, Flat) else (0.0, 0.0, 0.0) for s in shapes], np.float32
+        ).reshape(-1, 3),
     )
-    return scene, has_background
+    return _with_gradients(scene, shapes), has_background
+
+
+def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:
+    """The scene with the gradients of its shapes."""
+    ramps = [shape.paint if isinstance(shape.paint, Gradient) else None for shape in shapes]
+    if not any(ramps):
+        return scene
+    stops = list(chain.from_iterable(ramp.stops for ramp in ramps if ramp))
+    return replace(
+        scene,
+        paint=np.array(
+            [Paint.FLAT if r is None else Paint.RADIAL if r.is_radial else Paint.LINEAR for r in ramps],
+            np.int32,
+        ),
+        spread=np.array([Spread[r.spread.upper()] if r else Spread.PAD for r in ramps], np.int32),
+        frames=np.array([r.frame[:2, (2, 0, 1)].T.ravel() if r else np.zeros(6) for r in ramps], np.float32),
+        focus=np.array([r.focus if r else (0.0, 0.0, 0.0) for r in ramps], np.float32),
+        stop_first=starts_of(np.array([len(r.stops) if r else 0 for r in ramps], np.int32)),
+        stop_offsets=np.array([offset for r in ramps if r for offset in r.offsets], np.float32),
+        stop_colors=np.array([stop.color for stop in stops], np.float32),
+        stop_opacities=np.array([stop.opacity for stop in stops], np.float32),
+    )

@@ -1,4 +1,4 @@
-"""Reads the shapes of any SVG, and refuses by name what shapes of one colour each cannot hold.
+"""The fills and strokes of an SVG element; what they cannot show of it is refused by name.
 
 Only what is understood in full is read: an element, property or unit that is not known here ends in an error,
 because a picture that silently lost something is worse than none.
@@ -6,264 +6,198 @@ because a picture that silently lost something is worse than none.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
-from xml.etree import ElementTree
 
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.svg.geometry import Matrix, outline, parse_transform, winding
-from warpsplat.svg.inspect import NAMESPACE, inspect_svg, svg_size, view_box
-from warpsplat.svg.paths import Subpath, cubics
-from warpsplat.svg.style import (
-    INHERITED,
-    Style,
-    StyleSheet,
-    element_style,
-    fraction,
-    inherit,
-    length,
-    parse_color,
-)
+from warpsplat.scene import Cap, Join, Rule
+from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
+from warpsplat.svg.gradients import Colouring, Flat, resolve_paint
+from warpsplat.svg.inspect import NUMBER
+from warpsplat.svg.paths import Points, Subpath, cubics
+from warpsplat.svg.style import Style
+from warpsplat.svg.values import Viewport, fraction, length, lengths, parse_color
 
 MAX_EXTENT = 1e5
 """Farthest from the canvas's corner that a shape may reach [px]: beyond, float32 is too coarse."""
 
 
 @dataclass(frozen=True)
+class Line:
+    """How a stroke is drawn, in canvas units."""
+
+    width: float
+    cap: Cap
+    join: Join
+    miter_limit: float
+    dashes: tuple[float, ...]
+    """Where in the pattern it begins, then dashes and gaps in turn; empty: none."""
+
+    @property
+    def reach(self) -> float:
+        """How far it may be from its path."""
+        longest = self.miter_limit if self.join == Join.MITER else 1.0
+        return 0.5 * self.width * max(longest, 2**0.5 if self.cap == Cap.SQUARE else 1.0)
+
+
+@dataclass(frozen=True)
 class Shape:
-    """One fill or stroke of one colour, in canvas units."""
+    """One fill or stroke, in canvas units."""
 
     subpaths: list[Subpath]
-    filled: bool
-    color: tuple[float, float, float]
-    """sRGB in 0..1."""
+    paint: Colouring
     opacity: float
-    width: float
-    """Of the stroke; 0 for a fill."""
-    is_rect: bool
+    """Besides that of the paint."""
+    line: Line | None
+    """Of a stroke; None: a fill."""
+    rule: Rule = Rule.NONZERO
+    is_twin: bool = False
+    """Whether it shares its subpaths with the one before: a path that is filled and stroked."""
+    is_rect: bool = False
     """Whether it is a ``rect`` element with sharp corners."""
 
+    def box(self) -> Points:
+        """Least and largest coordinates, shape (2, 2)."""
+        reach = self.line.reach if self.line else 0.0
+        return tight_box(self.subpaths) + np.array([[-reach], [reach]])
+
 
 @dataclass(frozen=True)
-class _Context:
-    """What an element inherits."""
+class Place:
+    """What an element is drawn with."""
 
     style: Style
+    """Its own."""
     matrix: Matrix
-    size: tuple[float, float]
-    """Of the view box: what percentages refer to."""
+    """Map of its units to those of the canvas."""
+    viewport: Viewport
+    context: tuple[str, str]
+    """What ``context-fill`` and ``context-stroke`` mean."""
 
 
-def read_shapes(text: str, width: int, height: int) -> list[Shape]:
-    """The shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
-
-    Raises:
-        ImageError: not an SVG, of other proportions, or with something that would be lost. The message says
-            what.
-    """
-    facts = inspect_svg(text)
-    try:
-        root = ElementTree.fromstring(text)
-        context = _Context(INHERITED, *_canvas(facts.root, width, height))
-        sheet = StyleSheet(_css(root))
-        with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
-            return _walk(root, context, sheet)
-    except (ImageError, MemoryError):
-        raise
-    except Exception as error:  # arithmetic on absurd numbers overflows in many ways
-        cause = (str(error).splitlines() or [""])[0][:100]
-        raise ImageError(f"not an SVG that can be read: {cause or type(error).__name__}") from error
-
-
-def _canvas(root: dict[str, str], width: int, height: int) -> tuple[Matrix, tuple[float, float]]:
-    """Map of user units to canvas units, and the size of the view box."""
-    size = svg_size(root)
-    if size is None:
-        raise ImageError("says neither its size nor a viewBox")
-    if abs(size[0] / size[1] - width / height) > 0.02 * width / height:
-        raise ImageError(f"{size[0]:g}x{size[1]:g} does not have the proportions of the image")
-    scale = np.diag([width / size[0], height / size[1], 1.0])
-    box = view_box(root)
-    if box is None:
-        return scale, size
-    x, y, box_width, box_height = box
-    fit = np.array([size[0] / box_width, size[1] / box_height])
-    words = root.get("preserveAspectRatio", "xMidYMid").split()
-    align = words[0] if words else "xMidYMid"
-    shift = np.zeros(2)
-    if align != "none":
-        fit[:] = fit.max() if "slice" in words else fit.min()
-        found = re.fullmatch(r"x(Min|Mid|Max)Y(Min|Mid|Max)", align)
-        if not found:
-            raise ImageError(f"preserveAspectRatio {align[:40]!r} is not known")
-        part = np.array([{"Min": 0.0, "Mid": 0.5, "Max": 1.0}[word] for word in found.groups()])
-        shift = part * (np.array(size) - fit * (box_width, box_height))
-    view = np.diag([*fit, 1.0])
-    with np.errstate(all="ignore"):  # what overflows is found where it is used
-        view[:2, 2] = shift - fit * (x, y)
-        if not np.isfinite(view).all():
-            raise ImageError("its viewBox lies farther than can be drawn")
-        return scale @ view, (box_width, box_height)
-
-
-def _css(root: ElementTree.Element) -> str:
-    return "\n".join("".join(e.itertext()) for e in root.iter(f"{{{NAMESPACE}}}style"))
-
-
-CONTAINERS = {"svg", "g", "a"}
-UNDRAWN = {
-    *(
-        "defs",
-        "title",
-        "desc",
-        "metadata",
-        "style",
-        "script",
-        "symbol",
-        "clipPath",
-        "mask",
-        "filter",
-        "marker",
-    ),
-    *("pattern", "linearGradient", "radialGradient", "cursor", "font", "font-face", "view", "color-profile"),
-}
-"""What shows nothing by itself; the properties and elements that refer to it are refused."""
-SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
-
-
-@dataclass(frozen=True)
-class _End:
-    """Where a translucent group ends: its opacity, and the number of its first shape."""
-
-    opacity: float
-    first: int
-
-
-def _walk(root: ElementTree.Element, context: _Context, sheet: StyleSheet) -> list[Shape]:
-    """All shapes. Not recursive: documents may be nested deeper than Python's stack."""
-    shapes: list[Shape] = []
-    todo: list[tuple[ElementTree.Element, _Context] | _End] = [(root, context)]
-    while todo:
-        item = todo.pop()
-        if isinstance(item, _End):
-            if len(shapes) > item.first + 1:
-                raise ImageError("uses opacity of a group of several shapes, not supported")
-            shapes[item.first :] = [
-                replace(s, opacity=s.opacity * item.opacity) for s in shapes[item.first :]
-            ]
-            continue
-        element, context = item
-        space, _, tag = str(element.tag).rpartition("}")
-        if space[1:] != NAMESPACE or tag in UNDRAWN:
-            continue
-        style = element_style(tag, element.attrib, sheet, context.style)
-        if style["display"] == "none":
-            continue
-        if tag not in SHAPES and (tag not in CONTAINERS or (tag == "svg" and element is not root)):
-            raise ImageError(f"uses <{tag[:40]}>{' inside another' if tag == 'svg' else ''}, not supported")
-        if any(name in element.attrib for name in CONDITIONS):
-            raise ImageError("uses conditions on language or features, not supported")
-        matrix = context.matrix @ parse_transform(style["transform"])
-        inner = _Context(inherit(style), matrix, context.size)
-        if tag in CONTAINERS:
-            opacity = fraction(style, "opacity")
-            if opacity < 1:
-                todo.append(_End(opacity, len(shapes)))
-            todo.extend((child, inner) for child in reversed(element))
-        else:
-            shapes += _shape(element, tag, style, inner)
-    return shapes
-
-
-CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
-
-
-def _shape(element: ElementTree.Element, tag: str, style: Style, context: _Context) -> list[Shape]:
-    """The shape that an element draws, in a list; empty if it draws nothing.
+def element_shapes(element: Element, document: Document, place: Place) -> list[Shape]:
+    """The shapes that an element draws, in painter's order.
 
     Raises:
-        ImageError: fill and stroke, or a style that a fill or a round stroke cannot show.
+        ImageError: a style that fills and strokes cannot show.
     """
-    if any(child.tag in ANIMATIONS for child in element):
+    style, tag = place.style, name_of(element)
+    if any(name_of(child) in ANIMATIONS for child in element):
         raise ImageError("uses animation, not supported")
-    diagonal = float(np.hypot(*context.size)) / 2**0.5
-    width = length(style["stroke-width"], diagonal, "stroke-width") if style["stroke"] != "none" else 0.0
     if style["visibility"] in {"hidden", "collapse"}:
         return []
     if style["visibility"] != "visible":
         raise ImageError(f"visibility {style['visibility'][:40]!r} is not known")
-    filled = style["fill"] != "none" and tag != "line"
-    if not (filled or width > 0):
+    line = _line(style, place) if style["stroke"] != "none" else None
+    data = outline(tag, element.attrib, place.viewport)
+    own = cubics(data, keep_dots=line is not None and line.cap != Cap.BUTT)
+    if not own:
         return []
-    data, is_rect = outline(tag, element.attrib, context.size)
-    scale = _similarity(context.matrix)
-    subpaths = [
-        subpath.moved(context.matrix[:2, :2], context.matrix[:2, 2])
-        for subpath in cubics(data, keep_dots=not filled)
-    ]
-    if not subpaths:
-        return []
-    if filled and width > 0:
-        raise ImageError("a shape with both fill and stroke is not supported")
-    _check_properties(style, filled, tag)
-    if not filled:
-        _check_stroke(style, subpaths, scale)
-        width *= scale or 1.0
-    reach = max(width, *(float(np.abs(subpath.points).max()) for subpath in subpaths))
-    if not (reach <= MAX_EXTENT and all(np.isfinite(subpath.points).all() for subpath in subpaths)):
-        raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
-    paint = "fill" if filled else "stroke"
-    color, alpha = parse_color(style["color"] if style[paint].lower() == "currentcolor" else style[paint])
-    opacity = alpha * fraction(style, f"{paint}-opacity") * fraction(style, "opacity")
-    if filled and style["fill-rule"] == "evenodd":
-        around = winding([subpath.points for subpath in subpaths])
-        if ((around % 2 == 0) & (around != 0)).any():
-            raise ImageError("uses the even-odd fill rule where it matters, not supported")
-    if not filled and opacity < 1 and len(subpaths) > 1:
-        raise ImageError("a translucent stroke of several subpaths is not supported")
-    return [Shape(subpaths, filled, color, opacity, width, is_rect)]
+    fill, stroke = (
+        _paint(name, style, document, place, own) if wanted else None
+        for name, wanted in (("fill", tag != "line"), ("stroke", line is not None))
+    )
+    subpaths = [subpath.moved(place.matrix[:2, :2], place.matrix[:2, 2]) for subpath in own]
+    _check(style, tag, subpaths, line if stroke else None)
+    shapes = []
+    if fill:
+        rule = Rule.EVENODD if style["fill-rule"] == "evenodd" else Rule.NONZERO
+        upright = tag == "rect" and len(own[0].points) == 13
+        shapes.append(Shape(subpaths, fill, fraction(style["fill-opacity"]), None, rule, is_rect=upright))
+    if stroke and line:
+        if similarity(place.matrix) is None:
+            raise ImageError("a stroke that a transform stretches is not supported")
+        shapes.append(Shape(subpaths, stroke, fraction(style["stroke-opacity"]), line))
+    if len(shapes) == 2:
+        if _strokes_first(style["paint-order"]):
+            shapes.reverse()
+        shapes[1] = replace(shapes[1], is_twin=True)
+    return shapes
 
 
-ANIMATIONS = {f"{{{NAMESPACE}}}{tag}" for tag in ("animate", "animateTransform", "animateMotion", "set")}
+ANIMATIONS = {"animate", "animateTransform", "animateMotion", "set"}
 
 
-def _check_properties(style: Style, filled: bool, tag: str) -> None:
+def _paint(name: str, style: Style, document: Document, place: Place, own: list[Subpath]) -> Colouring | None:
+    """What a shape is filled or stroked with; None for nothing."""
+    text = style[name].strip()
+    if text in CONTEXTS:
+        text = place.context[CONTEXTS.index(text)]
+        if "url(" in text:
+            raise ImageError("uses the gradient of a context, not supported")
+    if name == "stroke" and "url(" not in text and text.lower() not in {"none", "currentcolor"}:
+        text = text if parse_color(text) else "none"
+    return resolve_paint(text, style, document, place.viewport, own, place.matrix)
+
+
+CONTEXTS = ("context-fill", "context-stroke")
+
+
+def _line(style: Style, place: Place) -> Line | None:
+    """How a stroke is drawn; None: it is not.
+
+    Raises:
+        ImageError: as a scene's strokes cannot be.
+    """
+    viewport, scale = place.viewport, similarity(place.matrix) or 1.0
+
+    def get(name: str, default: float) -> float:
+        value = length(style[name], viewport.diagonal, name, viewport.font_size)
+        return default if value is None else value
+
+    width = get("stroke-width", 1.0)
+    if not width > 0:
+        return None
+    if style["stroke-linejoin"] == "miter-clip":
+        raise ImageError("uses stroke-linejoin miter-clip, not supported")
+    limit = style["stroke-miterlimit"]
+    dashes = lengths(style["stroke-dasharray"], viewport.diagonal, "stroke-dasharray", viewport.font_size)
+    if any(dash < 0 for dash in dashes) or not sum(dashes) > 0:
+        dashes = []
+    dashes *= 1 + len(dashes) % 2
+    offset = get("stroke-dashoffset", 0.0) % sum(dashes) if dashes else 0.0
+    return Line(
+        width * scale,
+        CAPS.get(style["stroke-linecap"], Cap.BUTT),
+        JOINS.get(style["stroke-linejoin"], Join.MITER),
+        max(float(limit), 1.0) if NUMBER.fullmatch(limit) else 4.0,
+        tuple(scale * value for value in (offset, *dashes)) if dashes else (),
+    )
+
+
+CAPS = {"round": Cap.ROUND, "square": Cap.SQUARE}
+JOINS = {"round": Join.ROUND, "bevel": Join.BEVEL}
+
+
+def _strokes_first(order: str) -> bool:
+    """Whether the stroke lies below the fill."""
+    words = order.split()
+    if len(set(words)) < len(words) or not set(words) <= {"fill", "stroke", "markers"}:
+        return False
+    return "stroke" in words and "fill" not in words[: words.index("stroke")]
+
+
+def _check(style: Style, tag: str, subpaths: list[Subpath], line: Line | None) -> None:
+    """Whether a scene can hold an element.
+
+    Raises:
+        ImageError: it cannot.
+    """
     if tag in {"path", "line", "polyline", "polygon"}:
-        for name in ("marker", "marker-start", "marker-mid", "marker-end"):
+        for name in ("marker-start", "marker-mid", "marker-end"):
             if style[name] != "none":
                 raise ImageError("uses markers, not supported")
     if style["shape-rendering"] not in {"auto", "geometricPrecision"}:
         raise ImageError(f"uses shape-rendering {style['shape-rendering'][:40]!r}, not supported")
-    if filled and style["fill-rule"] not in {"nonzero", "evenodd"}:
-        raise ImageError(f"fill-rule {style['fill-rule'][:40]!r} is not known")
-
-
-def _check_stroke(style: Style, subpaths: list[Subpath], scale: float | None) -> None:
-    """Strokes written here have round caps and joins, no dashes, and one width.
-
-    Raises:
-        ImageError: this one is another.
-    """
-    if style["stroke-dasharray"] != "none":
-        raise ImageError("uses dashes, not supported")
-    if style["vector-effect"] != "none":
+    if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")
-    if scale is None:
-        raise ImageError("a stroke that a transform stretches is not supported")
-    for points, is_closed, _ in subpaths:
-        if not is_closed and style["stroke-linecap"] != "round":
-            raise ImageError(
-                f"a stroke with {style['stroke-linecap'][:40]} caps is not supported, only round ones"
-            )
-        if (is_closed or len(points) > 4) and style["stroke-linejoin"] != "round":
-            raise ImageError(
-                f"a stroke with {style['stroke-linejoin'][:40]} joins is not supported, only round ones"
-            )
+    reach = np.array([line.width if line else 0.0, *(np.abs(s.points).max() for s in subpaths)])
+    if not (reach <= MAX_EXTENT).all():  # what is no number is not either
+        raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
 
 
-def _similarity(matrix: Matrix) -> float | None:
-    """By how much a map scales; None if not alike in all directions (to a hundredth)."""
-    sizes = np.linalg.svd(np.nan_to_num(matrix[:2, :2]), compute_uv=False)
-    return float(sizes.mean()) if sizes[1] >= 0.99 * sizes[0] else None
+def opacity_of(shape: Shape) -> float:
+    """Opacity of a shape in one colour; besides that of the stops of a gradient."""
+    return shape.opacity * (shape.paint.opacity if isinstance(shape.paint, Flat) else 1.0)

@@ -142,3 +142,10 @@ def on_white(image: Image.Image) -> Pixels:
     rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
     alpha = rgba[..., 3:] / 255.0
     return np.asarray(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha))
+
+
+def premultiplied(image: Image.Image) -> Pixels:
+    """RGB times opacity, and opacity, in 0..255, shape (height, width, 4)."""
+    rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
+    rgba[..., :3] *= rgba[..., 3:] / 255.0
+    return rgba

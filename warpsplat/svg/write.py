@@ -1,21 +1,20 @@
-"""Scene -> SVG text.
-
-Paths follow SVG 1.1 section 8.3; coordinates are relative (``c``), each rounded against the rounded position
-before it, so that rounding errors do not add up.
-"""
+"""Scene -> SVG text."""
 
 from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat import __version__
-from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Rule, Scene
+from warpsplat.svg.data import shape_data
+from warpsplat.svg.numbers import hex_colors, number
+from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
@@ -31,17 +30,13 @@ OPAQUE = 1 - 0.5 * 10.0**-OPACITY_DECIMALS
 GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 100)))
 """Units of the view box a pixel of the picture: sizes of the view box have few decimals with each."""
 
+DASH_DECIMALS = 2
+"""Of dashes, in units of the view box."""
+
+MITER_LIMIT = 4.0
+"""What holds where nothing is said."""
+
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
-
-
-def number(value: float, decimals: int) -> str:
-    """Shortest decimal form: no trailing zeros, no leading zero, no negative zero."""
-    text = f"{value:.{decimals}f}"
-    if "." in text:
-        text = text.rstrip("0").rstrip(".")
-    if text in {"-0", ""}:
-        return "0"
-    return re.sub(r"^(-?)0\.", r"\1.", text)
 
 
 def width_decimals(per_pixel: float) -> int:
@@ -62,98 +57,69 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
         points=(np.round(points * per_unit) / per_unit).astype(np.float32),
         colors=(np.round(colors * 255) / 255).astype(np.float32),
         opacities=shown.astype(np.float32),
+        stop_offsets=np.round(scene.stop_offsets, SHARE_DECIMALS),
+        stop_colors=(np.round(scene.stop_colors * 255) / 255).astype(np.float32),
+        stop_opacities=np.round(scene.stop_opacities, SHARE_DECIMALS),
         widths=(np.round(widths * per_pixel, width_decimals(per_pixel)) / per_pixel).astype(np.float32),
     )
-
-
-Pair = tuple[int, int]
-
-
-def integers(pairs: Iterable[Pair]) -> str:
-    """Whole numbers in a row with the fewest separators: a sign separates itself."""
-    return " ".join([f"{x} {y}" for x, y in pairs]).replace(" -", "-")
-
-
-def minus(a: Pair, b: Pair) -> Pair:
-    """The way from ``b`` to ``a``."""
-    return a[0] - b[0], a[1] - b[1]
-
-
-def path_data(points: FloatArray, kind: Kind, basis: Basis, per_pixel: float) -> str:
-    """``d`` of one shape, points of shape (point, 2) as in ``Scene``, in whole numbers of the view box."""
-    closed = kind == Kind.FILL
-    # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
-    unit = per_pixel / 2 if basis == Basis.SPLINE else per_pixel
-    grid = [(x, y) for x, y in np.round(points.astype(np.float64) * unit).astype(np.int64).tolist()]
-    return spline_data(grid, closed) if basis == Basis.SPLINE else cubic_data(grid, closed)
-
-
-def cubic_data(grid: list[Pair], closed: bool) -> str:
-    """``d`` of a chain of cubics."""
-    chain = [*grid, grid[0]] if closed else grid
-    steps: list[Pair] = []
-    for i in range(0, len(chain) - 1, 3):
-        cubic = [minus(point, chain[i]) for point in chain[i + 1 : i + 4]]
-        # A cubic without extent draws nothing in a fill; in a stroke it may be the dot that is all there is.
-        if not closed or any(x or y for x, y in cubic):
-            steps += cubic
-    text = f"M{integers(chain[:1])}"
-    return f"{text}c{integers(steps)}" if steps else f"{text}z"
-
-
-def spline_data(half: list[Pair], closed: bool) -> str:
-    """``d`` of a spline: one quadratic, and smooth ones, whose control points follow (SVG 1.1, 8.3.7).
-
-    ``half``: its points in half of the numbers that are written. A ring is written from where that takes the
-    fewest characters.
-    """
-    if closed:
-        start = _cheapest_start(half)
-        ring = half[start:] + half[:start]
-        ring = [ring[-1], *ring, ring[0]]
-    else:
-        ring = half
-    joints = [(a + c, b + d) for (a, b), (c, d) in itertools.pairwise(ring)]
-    if not closed:
-        joints = [(2 * half[0][0], 2 * half[0][1]), *joints[1:-1], (2 * half[-1][0], 2 * half[-1][1])]
-    control = (2 * ring[1][0], 2 * ring[1][1])
-    steps = [minus(after, before) for before, after in itertools.pairwise(joints)]
-    text = f"M{integers(joints[:1])}q{integers([minus(control, joints[0]), steps[0]])}"
-    return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text
-
-
-def _cheapest_start(half: list[Pair]) -> int:
-    """The point of a ring before which to start: the start, and the control point that is written besides,
-    are shortest there. The steps are the same from everywhere, but the second needs no separator.
-    """
-    near = zip([half[-1], *half[:-1]], half, [*half[2:], *half[:2]], strict=True)
-    lengths = [
-        len(f"{a + c} {b + d} {c - a} {d - b}") - (b + d < 0) - (d - b < 0) - (e >= c)
-        for (a, b), (c, d), (e, _) in near
-    ]
-    return lengths.index(min(lengths))
-
-
-def hex_colors(colors: FloatArray) -> list[str]:
-    """sRGB in [0, 1], shape (n, 3) -> ``#rrggbb``, or ``#rgb`` where that is the same."""
-    levels = np.clip(np.round(colors.astype(np.float64) * 255), 0, 255).astype(np.int64)
-    texts = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in levels.tolist()]
-    return [f"#{t[1]}{t[3]}{t[5]}" if t[1] == t[2] and t[3] == t[4] and t[5] == t[6] else t for t in texts]
 
 
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
 
-def _path(scene: Scene, shape: int, color: str, per_pixel: float, opacity: str) -> str:
-    """The path of one shape; ``opacity``: its attribute, or nothing."""
+CAPS = {Cap.BUTT: "butt", Cap.ROUND: "round", Cap.SQUARE: "square"}
+JOINS = {Join.MITER: "miter", Join.ROUND: "round", Join.BEVEL: "bevel"}
+
+
+def _line(scene: Scene, shape: int, per_pixel: float, *, in_group: bool) -> str:
+    """How a stroke is drawn; ``in_group``: besides what the group of strokes says."""
+    width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
+    style = f' stroke-width="{width}"'
+    cap, join, dash = Cap(scene.cap[shape]), Join(scene.join[shape]), int(scene.dash[shape])
+    shared_cap, shared_join = (Cap.ROUND, Join.ROUND) if in_group else (Cap.BUTT, Join.MITER)
+    if cap != shared_cap:
+        style += f' stroke-linecap="{CAPS[cap]}"'
+    if join != shared_join:
+        style += f' stroke-linejoin="{JOINS[join]}"'
+    if join == Join.MITER and scene.miter_limits[shape] != MITER_LIMIT:
+        style += f' stroke-miterlimit="{number(float(scene.miter_limits[shape]), SHARE_DECIMALS)}"'
+    if dash != NO_DASHES:
+        offset, *pattern = (number(value * per_pixel, DASH_DECIMALS) for value in scene.dashes[dash])
+        style += f' stroke-dasharray="{" ".join(pattern)}"'
+        style += f' stroke-dashoffset="{offset}"' if offset != "0" else ""
+    return style
+
+
+def _path(scene: Scene, shape: int, color: str, per_pixel: float, rest: str, *, in_group: bool) -> str:
+    """The path of one shape; ``rest``: further attributes."""
     kind = Kind(int(scene.kind[shape]))
     style = f'{PAINTED[kind]}="{color}"'
     if kind == Kind.STROKE:
-        width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
-        style += f' stroke-width="{width}"'
-    data = path_data(scene.points_of(shape), kind, Basis(int(scene.basis[shape])), per_pixel)
-    return f'<path d="{data}" {style}{opacity}/>'
+        style += _line(scene, shape, per_pixel, in_group=in_group)
+    elif scene.rule[shape] == Rule.EVENODD:
+        style += ' fill-rule="evenodd"'
+    return f'<path d="{shape_data(scene, shape, per_pixel)}" {style}{rest}/>'
+
+
+def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
+    """What the path of a shape says of its twin, the next one."""
+    kind = Kind(int(scene.kind[shape + 1]))
+    style = f' {PAINTED[kind]}="{colors[shape + 1]}"'
+    if kind == Kind.STROKE:
+        return style + _line(scene, shape + 1, per_pixel, in_group=False)
+    return style + (' fill-rule="evenodd"' if scene.rule[shape + 1] == Rule.EVENODD else "") + STROKE_FIRST
+
+
+STROKE_FIRST = ' paint-order="stroke"'
+
+
+def _colors(scene: Scene, per_pixel: float) -> list[str]:
+    """The paint of each shape."""
+    colors = hex_colors(scene.colors)
+    for shape, name in gradients(scene, per_pixel)[1].items():
+        colors[shape] = f"url(#{name})"
+    return colors
 
 
 def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
@@ -167,23 +133,33 @@ def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
-    colors, opacities = hex_colors(scene.colors), _opacities(scene, 1.0)
-    paths = (_path(scene, i, colors[i], per_pixel, opacities[i]) for i in range(len(scene)))
+    colors, opacities = _colors(scene, per_pixel), _opacities(scene, 1.0)
+    paths = (_path(scene, i, colors[i], per_pixel, opacities[i], in_group=True) for i in range(len(scene)))
     return np.array([len(path) for path in paths], np.int64)
 
 
 def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
     """Neighbours of one kind share a group, and what it says of them; neighbours of one opacity a group in it
-    where that is shorter.
+    where that is shorter. Twins are one path.
     """
-    colors, opacities = hex_colors(scene.colors), _opacities(scene, opacity_scale)
-    for kind, shapes in itertools.groupby(range(len(scene)), lambda i: Kind(int(scene.kind[i]))):
-        yield f"<g {STROKE_ATTRIBUTES}>" if kind == Kind.STROKE else "<g>"
-        for opacity, run in itertools.groupby(shapes, lambda i: opacities[i]):
+    colors, opacities = _colors(scene, per_pixel), _opacities(scene, opacity_scale)
+    has_twin = np.append(scene.twin[1:], 0).tolist()
+    rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
+    both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
+    for in_group, shapes in itertools.groupby(
+        np.flatnonzero(scene.twin == 0).tolist(), lambda i: scene.kind[i] == Kind.STROKE and not has_twin[i]
+    ):
+        yield f"<g {STROKE_ATTRIBUTES}>" if in_group else "<g>"
+        for opacity, run in itertools.groupby(shapes, lambda i: both[i]):
             alike = list(run)
             group = f"<g{opacity}>", "</g>"
             shared = len(alike) * len(opacity) > len("".join(group))
-            paths = (_path(scene, i, colors[i], per_pixel, "" if shared else opacity) for i in alike)
+            paths = (
+                _path(
+                    scene, i, colors[i], per_pixel, rest[i] + ("" if shared else opacity), in_group=in_group
+                )
+                for i in alike
+            )
             yield from (group[0], *paths, group[1]) if shared else paths
         yield "</g>"
 
@@ -205,19 +181,24 @@ def write_svg(
         metadata: text for the ``metadata`` element, besides the program's name and version.
         opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
             below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
-        background: whether to write it; without, the picture is transparent where no shape is.
+        background: whether to write it, if the canvas has one; without, the picture is transparent where no
+            shape is.
     """
     canvas = scene.canvas
-    fill = hex_colors(canvas.background[None])[0]
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
-    behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n' if background else ""
+    behind = ""
+    if background and canvas.background is not None:
+        fill = hex_colors(canvas.background[None])[0]
+        behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n'
+    elements, _ = gradients(scene, per_pixel)
+    defs = f"<defs>{''.join(elements)}</defs>\n" if elements else ""
     shapes = "".join(_groups(scene, per_pixel, opacity_scale))
     note = f"warpsplat {__version__} {metadata}".strip()
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
         f'viewBox="0 0 {width} {height}">\n'
         f"<metadata>{note}</metadata>\n"
-        f"{behind}{shapes}\n</svg>\n"
+        f"{defs}{behind}{shapes}\n</svg>\n"
     )
 
 

@@ -33,7 +33,7 @@ def launch(kernel: wp.Kernel, scene: Scene, device: str, weight: float) -> tuple
     """(gradient of the points, loss of each shape)."""
     parameters = Parameters(scene, Backend.on(device))
     each = wp.zeros(len(scene), dtype=float, device=device)
-    run(kernel, len(scene), device, parameters.arrays, weight=weight, shape_loss=each)
+    run(kernel, len(scene), device, parameters.arrays, weight=weight, contour_loss=each)
     return parameters.gradients()["points"], each.numpy()
 
 

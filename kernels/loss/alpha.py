@@ -1,0 +1,44 @@
+"""Loss of an image with opacity, with its gradient: squared error on black and on white."""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.tile import column, total
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+TILE = wp.constant(constants.TILE)
+
+
+@wp.kernel
+def alpha_loss(
+    # In:
+    offset: wp.int32,
+    image: wp.array3d[column],  # [tile_count, 4, TILE] premultiplied, and opacity
+    target: wp.array3d[column],  # [tile_count, 4, TILE]
+    importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
+    value_count: wp.int32,  # pixels x colours
+    # Out:
+    image_grad: wp.array3d[column],  # [tile_count, 4, TILE]
+    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted
+):
+    """Mean over pixels and colours of w (e^2 + (e - a)^2) / 2: e is the error of the premultiplied colour,
+    which is that on black, a the error of the opacity, by which less of the white shows. One thread a tile.
+    """
+    tile = offset + wp.tid()
+    factor = 1.0 / float(value_count)
+    for channel in range(3):
+        squares = column(0.0)
+        for x in range(TILE):
+            e = image[tile, channel, x] - target[tile, channel, x]
+            white = e - (image[tile, 3, x] - target[tile, 3, x])
+            weight = importance[tile, x]
+            inside = wp.min(1.0e30 * weight, column(1.0))
+            squares = squares + 0.5 * wp.cw_mul(inside, wp.cw_mul(e, e) + wp.cw_mul(white, white))
+            image_grad[tile, channel, x] = factor * wp.cw_mul(weight, e + white)
+            opaque = factor * wp.cw_mul(weight, white)
+            if channel == 0:
+                image_grad[tile, 3, x] = -opaque
+            else:
+                image_grad[tile, 3, x] = image_grad[tile, 3, x] - opaque
+        loss[tile, channel] = total(squares)

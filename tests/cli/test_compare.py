@@ -1,0 +1,162 @@
+"""``compare``: our files and another program's, side by side."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import one_line, run
+from tests.tracers import bands, stub
+from warpsplat.jobs.tracer import TRACERS, Options
+
+QUICK = ["--against", "vtracer", "--curves", "8,4", "--iterations", "12", "--device", "cpu"]
+REPORTS = {"comparison.md", "comparison.json", "comparison.svg"}
+
+
+def use(monkeypatch: pytest.MonkeyPatch, trace: Callable[[bytes, Options], str] = bands) -> None:
+    monkeypatch.setitem(sys.modules, "vtracer", None)
+    monkeypatch.setitem(TRACERS, "vtracer", lambda: stub(trace))
+
+
+def test_a_comparison_and_its_files(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Figures are those of eval; nothing is replaced unless that is asked for."""
+    use(monkeypatch)
+    folder = tmp_path / "new" / "folder"
+    assert run("compare", image, *QUICK, "-o", folder, "--json") == 0
+    results = json.loads(capsys.readouterr().out)["results"]
+    names = [f"{r['program'].lower()}-{r['setting']}" for r in results]
+    assert names == ["warpsplat-4", "warpsplat-8", "bands-one", "bands-four"]
+    files = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert set(files) == REPORTS | {f"photo.{name}.svg" for name in names}
+    for name, result in zip(names, results, strict=True):
+        assert run("eval", image, folder / f"photo.{name}.svg", "--json") == 0
+        seen = json.loads(capsys.readouterr().out)
+        assert all(result[k] == seen[k] for k in ("psnr", "ssim", "paths", "nodes", "bytes", "gzip_bytes"))
+    assert json.loads(files["comparison.json"])["results"] == results
+
+    assert run("compare", image, *QUICK, "-o", folder) == 2
+    assert "--overwrite replaces it" in one_line(capsys.readouterr().err)
+    assert files == {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert run("compare", image, *QUICK, "-o", folder, "--overwrite", "--seed", "1") == 0
+    assert capsys.readouterr().out == (folder / "comparison.md").read_text()
+    assert "seed 1" in (folder / "comparison.md").read_text()
+
+
+def test_a_comparison_with_vtracer(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("compare", image, *QUICK) == 0
+    captured = capsys.readouterr()
+    rows = [[cell.strip() for cell in line.split("|")] for line in captured.out.splitlines()]
+    assert [row[2] for row in rows if row[1:2] == ["warpsplat"]] == ["4", "8"]
+    assert "default" in [row[2] for row in rows if row[1:2] == ["VTracer"]]
+    assert captured.err == ""
+
+
+def test_several_images_and_one_failure(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def trace(png: bytes, options: Options) -> str:
+        if options["bands"] == 4:
+            raise ValueError("no more than three")
+        return bands(png, options)
+
+    use(monkeypatch, trace)
+    other = tmp_path / "other.png"
+    Image.new("RGB", (30, 20), "teal").save(other)
+    assert run("compare", image, other, *QUICK, "-o", tmp_path / "out") == 0
+    text = capsys.readouterr().out
+    assert text.count("Bands, four: failed: ValueError: no more than three") == 2
+    assert "## Mean of 2 images" in text
+    assert not list((tmp_path / "out").glob("*four*"))
+
+
+def test_an_interruption_shows_what_there_is(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def trace(png: bytes, options: Options) -> str:
+        if options["bands"] == 4:
+            raise KeyboardInterrupt
+        return bands(png, options)
+
+    use(monkeypatch, trace)
+    assert run("compare", image, *QUICK, "-o", tmp_path / "out") == 130
+    captured = capsys.readouterr()
+    assert one_line(captured.err) == "warpsplat: interrupted"
+    settings = [
+        r["setting"] for r in json.loads((tmp_path / "out" / "comparison.json").read_text())["results"]
+    ]
+    assert settings == ["4", "8", "one"]
+    assert "| Bands " in captured.out
+
+
+def test_a_run_that_is_cut_short_is_no_result(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch)
+    monkeypatch.setattr("warpsplat.cli.signals.Interrupt.__call__", lambda self: True)
+    assert run("compare", image, *QUICK, "-o", tmp_path / "out") == 130
+    captured = capsys.readouterr()
+    assert one_line(captured.err) == "warpsplat: interrupted"
+    assert captured.out == ""
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize(("module", "folder"), [("vtracer", []), ("matplotlib", ["-o", "out"])])
+def test_packages_that_are_missing(
+    image: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    module: str,
+    folder: list[str],
+) -> None:
+    """Said before any work."""
+    monkeypatch.chdir(image.parent)
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr("warpsplat.jobs.vectorize.fit", None)
+    assert run("compare", image, *QUICK, *folder) == 2
+    assert f"pip install {module}" in one_line(capsys.readouterr().err)
+    assert list(image.parent.iterdir()) == [image]
+
+
+WRONG = [
+    (["photo.png", *QUICK, "--curves", "8,x"], 2, "8,x"),
+    (["photo.png", *QUICK, "--curves", "8,,9"], 2, "8,,9"),
+    (["photo.png", *QUICK, "--curves", "0"], 2, "curves must be"),
+    (["photo.png", *QUICK, "--iterations", "0"], 2, "iterations"),
+    (["photo.png", "--against", "pen"], 2, "pen"),
+    (["photo.png"], 2, "--against"),
+    (QUICK, 2, "IMAGES"),
+    (["photo.png", "./photo.jpg", *QUICK], 2, "another image has the name photo"),
+    (["photo.png", "none.png", *QUICK], 3, "none.png: no such file"),
+    (["photo.png", "text.png", *QUICK, "-o", "out"], 3, "text.png: not an image"),
+    (["photo.png", *QUICK, "-o", "text.png"], 2, "text.png"),
+    (["photo.png", *QUICK, "-o", "text.png/in"], 2, "text.png/in: cannot be made"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "code", "words"), WRONG)
+def test_wrong_requests_are_one_line_before_any_work(
+    image: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    words: str,
+) -> None:
+    use(monkeypatch)
+    monkeypatch.chdir(image.parent)
+    monkeypatch.setattr("warpsplat.jobs.vectorize.fit", None)
+    Path("text.png").write_text("no image")
+    Image.new("RGB", (9, 9)).save("photo.jpg")
+    before = set(Path().iterdir())
+    assert run("compare", *arguments) == code
+    captured = capsys.readouterr()
+    assert words in one_line(captured.err)
+    assert captured.out == ""
+    assert set(Path().iterdir()) == before

@@ -1,0 +1,39 @@
+"""What is empty in the picture is empty in the file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tests.scenes import disc, random_scene
+from warpsplat.fit.clear import clear_empty
+from warpsplat.fit.export import export
+from warpsplat.fit.settings import make_settings
+from warpsplat.render.backend import Backend
+from warpsplat.scene import Basis, Canvas, Kind, Scene
+from warpsplat.svg.viewer import premultiplied, render_own
+from warpsplat.svg.write import rounded
+
+SETTINGS = make_settings()
+
+
+def shown(scene: Scene) -> np.ndarray:
+    return premultiplied(render_own(export(scene, SETTINGS, 10.0))) / 255
+
+
+def test_outlines_draw_back(device: str) -> None:
+    scene = replace(disc(12, 40, 20), canvas=Canvas(40, 40, None))
+    target = shown(replace(scene, points=20 + (scene.points - 20) * np.float32(11.3 / 12)))
+    empty = target[..., 3] == 0
+    assert shown(scene)[empty].any()
+    clear = clear_empty(scene, target, SETTINGS, Backend.on(device), 10.0)
+    assert not shown(clear)[empty].any()
+    assert np.abs(clear.points - scene.points).max() < 1.5, "and no further than they must"
+
+
+def test_what_is_clear_stays_as_it_is(device: str) -> None:
+    scene = random_scene(Kind.FILL, 5, basis=Basis.SPLINE)
+    scene = replace(scene, canvas=Canvas(40, 36, None))
+    clear = clear_empty(scene, shown(scene), SETTINGS, Backend.on(device), 10.0)
+    np.testing.assert_array_equal(clear.points, rounded(scene, 10.0).points)

@@ -1,0 +1,88 @@
+"""Gradients and transparent canvases: image and adjoint against the reference."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers import compare, renderer_for
+from tests.scenes import disc, mixed_scene, random_scene, with_gradients
+from warpsplat.scene import Canvas, Kind, Paint, Scene, Spread
+
+
+def transparent(scene: Scene) -> Scene:
+    return replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("scale", [1.0, 1.7])
+def test_gradients(device: str, lanes: int, scale: float) -> None:
+    compare(with_gradients(mixed_scene(seed=1)), device, scale, lanes=lanes)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+def test_transparent_canvas(device: str, lanes: int) -> None:
+    compare(transparent(with_gradients(mixed_scene(seed=2))), device, lanes=lanes)
+    compare(transparent(random_scene(Kind.FILL)), device, lanes=lanes)
+
+
+@pytest.mark.parametrize("spread", Spread)
+@pytest.mark.parametrize("paint", [Paint.LINEAR, Paint.RADIAL])
+def test_spread(device: str, paint: Paint, spread: Spread) -> None:
+    scene = with_gradients(random_scene(Kind.FILL, 3, seed=4), seed=5)
+    both = {"paint": paint, "spread": spread}
+    traits = {name: np.where(scene.paint > 0, value, 0).astype(np.int32) for name, value in both.items()}
+    compare(replace(scene, **traits), device)
+
+
+def test_stops_out_of_order(device: str) -> None:
+    """One that lies before the one before it counts as lying there, and does not move by itself."""
+    scene = with_gradients(random_scene(Kind.FILL, 4, seed=6), seed=7)
+    offsets = scene.stop_offsets.copy()
+    third = slice(int(scene.stop_first[2]), int(scene.stop_first[3]))
+    offsets[third] = [0.2, 0.7, 0.4]
+    compare(replace(scene, stop_offsets=offsets), device)
+
+
+def test_what_is_empty_stays_exactly_empty(device: str) -> None:
+    image = renderer_for(transparent(disc(9, 40, 20)), device).read_image()
+    assert image.shape == (40, 40, 4)
+    assert not image[:8].any()
+    np.testing.assert_allclose(image[20, 20], np.ones(4), atol=1e-6)
+
+
+def test_on_any_background_it_is_the_opaque_picture(device: str) -> None:
+    scene = with_gradients(mixed_scene(seed=3))
+    clear = renderer_for(transparent(scene), device).read_image()
+    opaque = renderer_for(scene, device).read_image()
+    assert scene.canvas.background is not None
+    on = clear[..., :3] + (1 - clear[..., 3:]) * scene.canvas.background
+    np.testing.assert_allclose(on, opaque, atol=1e-5)
+
+
+@pytest.mark.parametrize("opaque", [True, False])
+def test_removal_costs(device: str, opaque: bool) -> None:
+    """Measured by taking shapes away; of a transparent canvas on black and on white."""
+    scene = with_gradients(random_scene(Kind.FILL, 4, seed=8), seed=9)
+    scene = scene if opaque else transparent(scene)
+    renderer = renderer_for(scene, device)
+    target = np.random.default_rng(0).uniform(0, 1, renderer.read_image().shape).astype(np.float32)
+    aim = type(renderer.film.buffers.image)
+
+    def error(image: np.ndarray) -> float:
+        difference = (image - target).astype(np.float64)
+        if opaque:
+            return float((difference**2).mean())
+        black, white = difference[..., :3], difference[..., :3] - difference[..., 3:]
+        return float((black**2).mean() + (white**2).mean()) / 2
+
+    from warpsplat.kernels.tile import column
+    from warpsplat.render.tiles import to_tiles
+
+    costs = renderer.removal_costs(aim(to_tiles(target), dtype=column, device=device))
+    for i in range(len(scene)):
+        without = scene.take(np.delete(np.arange(len(scene)), i))
+        grown = error(renderer_for(without, device).read_image()) - error(renderer.read_image())
+        assert costs[i] == pytest.approx(grown, rel=1e-3, abs=1e-6)

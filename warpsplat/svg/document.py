@@ -1,0 +1,79 @@
+"""An SVG's elements: who is inside of whom, who is called what, and the style of each."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from warpsplat.svg.css import StyleSheet
+from warpsplat.svg.inspect import NAMESPACE
+from warpsplat.svg.style import KNOWN, ROOT, Style, element_style
+
+Element = ElementTree.Element
+
+HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
+"""Attributes that link elements; the first counts more (SVG 2, 16.1.3)."""
+
+
+def name_of(element: Element) -> str:
+    """An element's name in SVG's name space; empty for others."""
+    space, _, name = str(element.tag).rpartition("}")
+    return name if space[1:] == NAMESPACE else ""
+
+
+class Document:
+    """A parsed SVG."""
+
+    def __init__(self, text: str) -> None:
+        """Of a text that ``inspect_svg`` has passed.
+
+        Raises:
+            ImageError: a style sheet of a kind that is not read.
+        """
+        self.root = ElementTree.fromstring(text)
+        self.parents = {child: element for element in self.root.iter() for child in element}
+        self._by_id: dict[str, Element] = {}
+        css: list[str] = []
+        for element in self.root.iter():
+            if "id" in element.attrib:
+                self._by_id.setdefault(element.attrib["id"], element)
+            if name_of(element) == "style" and element.get("type", "text/css") == "text/css":
+                css.append("".join(element.itertext()))
+        self._sheet = StyleSheet("\n".join(css), KNOWN)
+        self._styles: dict[Element, Style] = {}
+
+    def linked(self, element: Element) -> Element | None:
+        """What an element links to; None if it links to nothing in this document."""
+        text = next((element.attrib[name] for name in HREFS if name in element.attrib), "").strip()
+        return self._by_id.get(text[1:]) if text.startswith("#") else None
+
+    def links_out(self, element: Element) -> bool:
+        """Whether an element links to another document."""
+        text = next((element.attrib[name] for name in HREFS if name in element.attrib), "").strip()
+        return bool(text) and not text.startswith("#")
+
+    def called(self, name: str) -> Element | None:
+        """The first element with that ``id``."""
+        return self._by_id.get(name)
+
+    def style_in(self, element: Element, parent: Style) -> Style:
+        """All properties of an element within one of the style ``parent``.
+
+        Raises:
+            ImageError: one of them shows what shapes cannot.
+        """
+        return element_style(element, self._sheet.of(element, self.parents), parent)
+
+    def style_of(self, element: Element) -> Style:
+        """All properties of an element where it stands in the document.
+
+        Raises:
+            ImageError: see ``style_in``.
+        """
+        path = [element]
+        while path[-1] not in self._styles and path[-1] in self.parents:
+            path.append(self.parents[path[-1]])
+        for node in reversed(path):
+            if node not in self._styles:
+                parent = self._styles[self.parents[node]] if node in self.parents else ROOT
+                self._styles[node] = self.style_in(node, parent)
+        return self._styles[element]

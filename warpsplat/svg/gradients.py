@@ -1,0 +1,207 @@
+"""Paints of SVG: colours and gradients (SVG 1.1, sections 11.2 and 13.2)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpsplat.errors import ImageError
+from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, tight_box, translation
+from warpsplat.svg.inspect import NUMBER
+from warpsplat.svg.paths import Subpath
+from warpsplat.svg.style import Style
+from warpsplat.svg.values import Color, Viewport, fraction, parse_color
+
+
+@dataclass(frozen=True)
+class Flat:
+    """One colour."""
+
+    color: Color
+    """sRGB in 0..1."""
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Colours by place."""
+
+    is_radial: bool
+    """Along the first axis; or from the focus to the unit circle."""
+    frame: Matrix
+    """Map of the gradient's own space, that of the unit axes, to where it is drawn, 3x3."""
+    focus: tuple[float, float, float]
+    """Where a radial one begins, in its own space: x, y, radius."""
+    spread: str
+    """``pad``, ``reflect`` or ``repeat``."""
+    offsets: tuple[float, ...]
+    """Of the stops, ascending, in 0..1."""
+    stops: tuple[Flat, ...]
+
+
+Colouring = Flat | Gradient
+
+GRADIENTS = {"linearGradient", "radialGradient"}
+BLACK = Flat((0.0, 0.0, 0.0))
+"""What is filled with a colour that is none; viewers agree on no other."""
+
+LINK = re.compile(r"""url\(\s*(["']?)\s*#?(.*?)\s*\1\s*\)\s*(.*)""", re.DOTALL)
+
+
+def resolve_paint(
+    text: str, style: Style, document: Document, viewport: Viewport, subpaths: list[Subpath], matrix: Matrix
+) -> Colouring | None:
+    """What a shape is painted with; None for nothing.
+
+    Args:
+        text: value of ``fill`` or ``stroke``.
+        style: of the shape.
+        document: where gradients are.
+        viewport: what lengths refer to.
+        subpaths: of the shape [user units].
+        matrix: map of user units to those of the canvas.
+
+    Raises:
+        ImageError: a pattern, or a paint that only some viewers know.
+    """
+    found = LINK.match(text.strip())
+    if not found:
+        return flat_paint(text, style)
+    element = document.called(found[2])
+    fallback = flat_paint(found[3], style) if found[3] else None
+    if element is None:
+        return fallback
+    if name_of(element) in {"pattern", "mesh", "meshgradient", "hatch", "solidcolor"}:
+        raise ImageError(f"uses <{name_of(element)}>, not supported")
+    if name_of(element) not in GRADIENTS:
+        return None
+    return _gradient(element, document, viewport, subpaths, matrix, fallback)
+
+
+def flat_paint(text: str, style: Style) -> Flat | None:
+    """A colour; None for none.
+
+    Raises:
+        ImageError: a colour that only some viewers know.
+    """
+    text = text.strip().lower()
+    if text == "none":
+        return None
+    color = parse_color(style["color"] if text == "currentcolor" else text)
+    return Flat(*color) if color else BLACK
+
+
+def _gradient(
+    element: Element,
+    document: Document,
+    viewport: Viewport,
+    subpaths: list[Subpath],
+    matrix: Matrix,
+    fallback: Flat | None,
+) -> Colouring | None:
+    chain = list(_chain(element, document))
+    with_stops = next((e for e in chain if any(name_of(child) == "stop" for child in e)), None)
+    if with_stops is None or any(name_of(e) not in GRADIENTS for e in chain[: chain.index(with_stops) + 1]):
+        return fallback
+    offsets, stops = _stops(with_stops, document)
+    if len(stops) == 1:
+        return stops[0]
+    is_radial = name_of(element) == "radialGradient"
+
+    def said(name: str) -> str | None:
+        """An attribute of the gradient or of those that it takes over from."""
+        alike = (e for e in chain if name in e.attrib and (name in COMMON or name_of(e) == name_of(element)))
+        return next((e.attrib[name] for e in alike if name_of(e) in GRADIENTS), None)
+
+    of_box = said("gradientUnits") != "userSpaceOnUse"
+    box = tight_box(subpaths)
+    extent = box[1] - box[0]
+    if of_box and not (extent > 0).all():
+        return fallback
+    unit = Viewport(1.0, 1.0, viewport.font_size) if of_box else viewport
+
+    def get(name: str, default: str) -> float:
+        value = attribute({name: said(name) or default}, name, unit)
+        return attribute({name: default}, name, unit) or 0.0 if value is None else value
+
+    transform = parse_transform(said("gradientTransform") or "")
+    if np.linalg.det(transform) == 0:
+        transform = np.eye(3)  # as resvg does
+    transform = about(document.style_of(element)["transform-origin"], viewport, transform)
+    if of_box:
+        transform = translation(*box[0]) @ np.diag([*extent, 1.0]) @ transform
+    own, focus = _radial_frame(get) if is_radial else (_linear_frame(get), (0.0, 0.0, 0.0))
+    if own is None:
+        return stops[-1]
+    if not np.hypot(focus[0], focus[1]) + focus[2] < 1:
+        raise ImageError("uses a radial gradient whose focus is not inside its circle, not supported")
+    frame = matrix @ transform @ own
+    if not abs(np.linalg.det(frame[:2, :2])) > 1e-12:
+        return None
+    spread = said("spreadMethod")
+    return Gradient(
+        is_radial, frame, focus, spread if spread in {"reflect", "repeat"} else "pad", offsets, stops
+    )
+
+
+COMMON = {"gradientUnits", "gradientTransform", "spreadMethod"}
+"""Attributes that linear gradients take over from radial ones, and the other way round."""
+
+
+def _chain(element: Element, document: Document) -> Iterator[Element]:
+    """A gradient and those that it links to, one after another."""
+    seen: set[Element] = set()
+    at: Element | None = element
+    while at is not None and at not in seen:
+        yield at
+        seen.add(at)
+        at = document.linked(at)
+
+
+def _linear_frame(get: Callable[[str, str], float]) -> Matrix | None:
+    """Frame of the axis; None where it has no length."""
+    start = np.array([get("x1", "0%"), get("y1", "0%")])
+    way = np.array([get("x2", "100%"), get("y2", "0%")]) - start
+    if not way.any():
+        return None
+    return np.array([[way[0], -way[1], start[0]], [way[1], way[0], start[1]], [0, 0, 1]])
+
+
+def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tuple[float, float, float]]:
+    """Frame of the circle, None where it has no radius, and the focus in it."""
+    radius, x, y = get("r", "50%"), get("cx", "50%"), get("cy", "50%")
+    if not radius > 0:
+        return None, (0.0, 0.0, 0.0)
+    focus = (
+        (get("fx", repr(x)) - x) / radius,
+        (get("fy", repr(y)) - y) / radius,
+        max(get("fr", "0"), 0.0) / radius,
+    )
+    return translation(x, y) @ np.diag([radius, radius, 1.0]), focus
+
+
+TINY = 1e-7
+"""An offset that is 0 but for the order of stops."""
+
+
+def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[Flat, ...]]:
+    """Offsets and colours of a gradient's stops; each offset is at least the one before."""
+    offsets: list[float] = []
+    stops: list[Flat] = []
+    for child in element:
+        if name_of(child) != "stop":
+            continue
+        style = document.style_of(child)
+        text = child.get("offset", "").strip()
+        before = offsets[-1] if offsets else 0.0
+        given = fraction(text) if NUMBER.fullmatch(text.removesuffix("%")) else before
+        # What lies before two stops at 0 has the colour of the first.
+        offsets.append(max(given, before if before or not offsets else TINY))
+        color = flat_paint("black" if style["stop-color"] == "none" else style["stop-color"], style)
+        assert color
+        stops.append(Flat(color.color, color.opacity * fraction(style["stop-opacity"])))
+    return tuple(offsets), tuple(stops)

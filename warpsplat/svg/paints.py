@@ -1,0 +1,95 @@
+"""Gradients of a scene as elements of ``defs`` (SVG 1.1, 13.2), in units of the view box."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.scene import Paint, Scene, Spread
+from warpsplat.svg.numbers import hex_colors, number
+
+Floats = npt.NDArray[np.float64]
+
+PLACE_DECIMALS = 2
+"""Of a place in units of the view box, which are finer than pixels."""
+
+SHARE_DECIMALS = 3
+"""Of an offset, and of what is in the unit space of a gradient: a thousandth of its extent."""
+
+ROUND = 1e-3
+"""A frame is a circle's where its axes differ by no more than this share in length and from a right angle."""
+
+SPREADS = {Spread.PAD: "", Spread.REFLECT: ' spreadMethod="reflect"', Spread.REPEAT: ' spreadMethod="repeat"'}
+
+
+def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]]:
+    """Elements, and the identifier of each shape that has one; alike gradients are one."""
+    elements: dict[str, str] = {}
+    owners = {}
+    for shape in np.flatnonzero(scene.paint != Paint.FLAT).tolist():
+        body = _gradient(scene, shape, per_pixel)
+        owners[shape] = elements.setdefault(body, f"g{len(elements)}")
+    texts = [body.replace(" ", f' id="{name}" ', 1) for body, name in elements.items()]
+    return texts, owners
+
+
+def _gradient(scene: Scene, shape: int, per_pixel: float) -> str:
+    """The element without its identifier."""
+    frame = scene.frames[shape].astype(np.float64) * per_pixel
+    origin, axes = frame[:2], frame[2:].reshape(2, 2)
+    if scene.paint[shape] == Paint.LINEAR:
+        tag, place = "linearGradient", _line(origin, axes)
+    else:
+        tag, place = "radialGradient", _circle(origin, axes, scene.focus[shape].astype(np.float64))
+    spread = SPREADS[Spread(int(scene.spread[shape]))]
+    return f'<{tag} gradientUnits="userSpaceOnUse"{place}{spread}>{_stops(scene, shape)}</{tag}>'
+
+
+def _attributes(values: dict[str, float], decimals: int) -> str:
+    return "".join(f' {name}="{number(value, decimals)}"' for name, value in values.items())
+
+
+def _line(origin: Floats, axes: Floats) -> str:
+    """From where t is 0 to where it is 1, straight across the lines of equal colour."""
+    along, across = axes
+    normal = np.array([across[1], -across[0]])
+    reach = float(along @ normal)
+    square = float(normal @ normal)
+    way = normal * reach / square if square > 0 else along
+    (x1, y1), (x2, y2) = origin, origin + way
+    return _attributes({"x1": x1, "y1": y1, "x2": x2, "y2": y2}, PLACE_DECIMALS)
+
+
+def _circle(origin: Floats, axes: Floats, focus: Floats) -> str:
+    """A circle where the frame is one, else the unit circle under the frame's map."""
+    along, across = axes
+    length = float(np.linalg.norm(along))
+    turned = np.array([-along[1], along[0]])
+    fx, fy, fr = focus.tolist()
+    if min(np.abs(across - turned).max(), np.abs(across + turned).max()) <= ROUND * length:
+        place = {"cx": origin[0], "cy": origin[1], "r": length}
+        if fx or fy:
+            place["fx"], place["fy"] = origin + fx * along + fy * across
+        if fr:
+            place["fr"] = fr * length
+        return _attributes(place, PLACE_DECIMALS)
+    unit = {"cx": 0.0, "cy": 0.0, "r": 1.0}
+    if fx or fy:
+        unit |= {"fx": fx, "fy": fy}
+    if fr:
+        unit["fr"] = fr
+    matrix = " ".join(number(float(value), SHARE_DECIMALS) for value in (*along, *across, *origin))
+    return f'{_attributes(unit, SHARE_DECIMALS)} gradientTransform="matrix({matrix})"'
+
+
+def _stops(scene: Scene, shape: int) -> str:
+    rows = slice(int(scene.stop_first[shape]), int(scene.stop_first[shape + 1]))
+    offsets = np.maximum.accumulate(scene.stop_offsets[rows].astype(np.float64))
+    texts = []
+    for offset, color, opacity in zip(
+        offsets, hex_colors(scene.stop_colors[rows]), scene.stop_opacities[rows], strict=True
+    ):
+        shown = number(float(opacity), SHARE_DECIMALS)
+        alpha = "" if shown == "1" else f' stop-opacity="{shown}"'
+        texts.append(f'<stop offset="{number(offset, SHARE_DECIMALS)}" stop-color="{color}"{alpha}/>')
+    return "".join(texts)

@@ -1,0 +1,351 @@
+"""The structure of an SVG: groups, links, viewports and their clips (SVG 1.1, chapters 5 and 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from warpsplat.errors import ImageError
+from warpsplat.scene import Rule
+from warpsplat.svg.clip import cut_subpath
+from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.geometry import (
+    Matrix,
+    about,
+    attribute,
+    moved,
+    parse_transform,
+    translation,
+    view_box_map,
+)
+from warpsplat.svg.gradients import Flat
+from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
+from warpsplat.svg.paths import Points, Subpath, line
+from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
+from warpsplat.svg.style import DRAWN, ROOT, Style
+from warpsplat.svg.values import Viewport, fraction, parse_color
+
+MAX_LINKED = 100_000
+"""Most elements that links may add up to: they may multiply."""
+
+MAX_DEPTH = 1000
+"""Deepest nesting with what is linked."""
+
+REFUSED = {
+    *("text", "image", "switch", "foreignObject", "video", "audio", "canvas", "iframe", "mesh", "hatch"),
+    "tref",
+}
+"""Elements that show what is no shape. Those that nobody knows show nothing."""
+
+CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
+
+
+@dataclass(frozen=True)
+class _Context:
+    """What an element inherits."""
+
+    style: Style
+    """Of the element that it is in."""
+    matrix: Matrix
+    viewport: Viewport
+    paints: tuple[str, str]
+    """See ``Place.context``."""
+    path: tuple[Element, ...]
+    """The links that led here."""
+    depth: int
+    use_size: tuple[float | None, float | None] = (None, None)
+    """What a link says of the size of a nested ``svg``."""
+
+
+@dataclass(frozen=True)
+class _End:
+    """Where a group ends."""
+
+    first: int
+    """Number of its first shape."""
+    opacity: float = 1.0
+    clip: Points | None = None
+    """Corners of what is seen of it, shape (4, 2)."""
+
+
+def read_shapes(text: str, width: int, height: int, scale: float | None = None) -> list[Shape]:
+    """The shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
+
+    Args:
+        text: the SVG.
+        width: of the picture.
+        height: of the picture.
+        scale: magnification; None: the SVG fills the picture, which has its proportions.
+
+    Raises:
+        ImageError: not an SVG, of other proportions, or with something that would be lost. The message says
+            what.
+    """
+    facts = inspect_svg(text)
+    try:
+        with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
+            return _Walk(Document(text)).shapes_in(*_canvas(facts.root, width, height, scale))
+    except (ImageError, MemoryError):
+        raise
+    except Exception as error:  # arithmetic on absurd numbers overflows in many ways
+        cause = (str(error).splitlines() or [""])[0][:100]
+        raise ImageError(f"not an SVG that can be read: {cause or type(error).__name__}") from error
+
+
+def _canvas(
+    root: dict[str, str], width: int, height: int, magnified: float | None
+) -> tuple[Matrix, Viewport]:
+    """Map of user units to canvas units, and what lengths refer to."""
+    size = svg_size(root)
+    if size is None:
+        raise ImageError("says neither its size nor a viewBox")
+    if magnified is None:
+        if abs(size[0] / size[1] - width / height) > 0.02 * width / height:
+            raise ImageError(f"{size[0]:g}x{size[1]:g} does not have the proportions of the image")
+        scale = np.diag([width / size[0], height / size[1], 1.0])
+    else:
+        scale = np.diag([magnified, magnified, 1.0])
+    view, box = view_box_map(root, *size), view_box(root)
+    if view is None or box is None:
+        return scale, Viewport(*size)
+    return scale @ view, Viewport(*box[2:])
+
+
+class _Walk:
+    """Through a document, in painter's order. Not recursive: documents may be nested deeper than Python's
+    stack.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._shapes: list[Shape] = []
+        self._todo: list[tuple[Element, _Context] | _End] = []
+        self._linked = 0
+
+    def shapes_in(self, matrix: Matrix, viewport: Viewport) -> list[Shape]:
+        """All shapes, drawn by ``matrix``."""
+        self._background(matrix, viewport)
+        self._todo = [(self._document.root, _Context(ROOT, matrix, viewport, ("none", "none"), (), 0))]
+        while self._todo:
+            item = self._todo.pop()
+            if isinstance(item, _End):
+                self._end(item)
+            else:
+                self._enter(*item)
+        return self._shapes
+
+    def _enter(self, element: Element, context: _Context) -> None:
+        tag = name_of(element)
+        if tag not in VISITED and tag not in REFUSED:
+            return
+        style = self._document.style_in(element, context.style)
+        if style["display"] == "none":
+            return
+        if tag in REFUSED:
+            raise ImageError(f"uses <{tag[:40]}>, not supported")
+        if any(name in element.attrib for name in CONDITIONS):
+            raise ImageError("uses conditions on language or features, not supported")
+        viewport = replace(context.viewport, font_size=float(style["font-size"]))
+        transform = about(style["transform-origin"], viewport, parse_transform(style["transform"]))
+        matrix = context.matrix @ transform
+        if np.linalg.det(matrix[:2, :2]) == 0:
+            return
+        inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=context.depth + 1)
+        if tag in DRAWN:
+            first = len(self._shapes)
+            self._shapes += element_shapes(
+                element, self._document, Place(style, matrix, viewport, context.paints)
+            )
+            self._end(_End(first, fraction(style["opacity"])))
+            return
+        self._todo.append(_End(len(self._shapes), fraction(style["opacity"])))
+        if tag == "use":
+            self._link(element, inner)
+        elif tag == "svg" and element is not self._document.root:
+            self._nested(element, inner, element)
+        else:
+            self._children(element, inner)
+
+    def _children(self, element: Element, context: _Context) -> None:
+        if context.depth > MAX_DEPTH:
+            raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
+        if context.path:
+            self._linked += len(element)
+            if self._linked > MAX_LINKED:
+                raise ImageError(f"links add up to more than {MAX_LINKED} elements")
+        self._todo.extend((child, context) for child in reversed(element))
+
+    def _link(self, element: Element, context: _Context) -> None:
+        """A ``use``."""
+        if self._document.links_out(element):
+            raise ImageError("uses an element of another file, not supported")
+        target = self._document.linked(element)
+        if target is None or target in context.path or self._is_inside(element, target):
+            return  # recursive links show nothing
+        tag = name_of(target)
+        if tag not in VISITED and tag not in REFUSED and tag != "symbol":
+            return
+        viewport = context.viewport
+        x, y = (attribute(element.attrib, name, viewport) or 0.0 for name in "xy")
+        fill, stroke = (_in_context(context.style[name], context.paints) for name in ("fill", "stroke"))
+        inner = replace(context, path=(*context.path, target), paints=(fill, stroke), use_size=(None, None))
+        if tag == "symbol":
+            self._nested(element, inner, target)
+            return
+        inner = replace(inner, matrix=context.matrix @ translation(x, y))
+        if tag == "svg":
+            width, height = (attribute(element.attrib, name, viewport) for name in ("width", "height"))
+            inner = replace(inner, use_size=(width, height))
+        self._linked += 1
+        if self._linked > MAX_LINKED:
+            raise ImageError(f"links add up to more than {MAX_LINKED} elements")
+        self._todo.append((target, inner))
+
+    def _is_inside(self, element: Element, target: Element) -> bool:
+        while element in self._document.parents:
+            element = self._document.parents[element]
+            if element is target:
+                return True
+        return False
+
+    def _nested(self, element: Element, context: _Context, content: Element) -> None:
+        """A new viewport: that of a nested ``svg``, which is its own content, or of a ``use`` of a symbol."""
+        is_svg = element is content
+        viewport = context.viewport
+        x, y = (attribute(element.attrib, name, viewport) or 0.0 for name in "xy")
+        given = [attribute(element.attrib, name, viewport) for name in ("width", "height")]
+        if is_svg:
+            given = [b if b is not None else a for a, b in zip(given, context.use_size, strict=True)]
+        width, height = (
+            whole if size is None else size
+            for size, whole in zip(given, (viewport.width, viewport.height), strict=True)
+        )
+        if not (width > 0 and height > 0):
+            return
+        style = context.style if is_svg else self._document.style_in(content, context.style)
+        view = view_box_map(content.attrib, width, height)
+        box = view_box(dict(content.attrib)) if view is not None else None
+        size = box[2:] if box else (width, height)
+        matrix = context.matrix @ translation(x, y) @ (np.eye(3) if view is None else view)
+        seen = style["overflow"] in {"visible", "auto"}
+        is_clipped = not is_svg or None not in given or context.use_size != (None, None)
+        corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+        clip = moved(context.matrix, corners) if is_clipped and not seen else None
+        opacity = 1.0 if is_svg else fraction(style["opacity"])
+        self._todo.append(_End(len(self._shapes), opacity, clip))
+        inner = replace(
+            context,
+            style=style,
+            matrix=matrix,
+            viewport=replace(viewport, width=size[0], height=size[1]),
+            use_size=(None, None),
+        )
+        self._children(content, inner)
+
+    def _end(self, end: _End) -> None:
+        """Apply the opacity and the clip of a group to its shapes.
+
+        Raises:
+            ImageError: the shapes would show something else.
+        """
+        if end.clip is None and end.opacity == 1:
+            return
+        shapes = self._shapes[end.first :]
+        if end.clip is not None:
+            shapes = _clipped(shapes, end.clip)
+        if end.opacity == 0:
+            shapes = []
+        elif end.opacity < 1:
+            if _overlap(shapes):
+                raise ImageError("uses opacity of a group of shapes that overlap, not supported")
+            shapes = [replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes]
+        self._shapes[end.first :] = shapes
+
+    def _background(self, matrix: Matrix, viewport: Viewport) -> None:
+        """What the root's ``background-color`` paints below all shapes."""
+        style = self._document.style_of(self._document.root)
+        color = parse_color(style["background-color"])
+        if style["background"] != "none":
+            color = parse_color(style["background"])
+            if color is None:
+                raise ImageError("uses a background that is no colour, not supported")
+        if color is None or color[1] == 0:
+            return
+        box = view_box(self._document.root.attrib)
+        x, y = box[:2] if box else (0.0, 0.0)
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [viewport.width, viewport.height] + [x, y]
+        self._shapes.append(
+            Shape([_polygon(moved(matrix, corners))], Flat(*color), 1.0, None, Rule.NONZERO, is_rect=True)
+        )
+
+
+VISITED = {*DRAWN, "svg", "g", "a", "use"}
+"""Elements that show shapes."""
+
+
+def _in_context(paint: str, context: tuple[str, str]) -> str:
+    return context[CONTEXTS.index(paint)] if paint in CONTEXTS else paint
+
+
+def _polygon(corners: Points) -> Subpath:
+    ring = [*map(complex, *corners.T), complex(*corners[0])]
+    points = [ring[0], *(z for a, b in pairwise(ring) for z in line(a, b))]
+    return Subpath(np.array([(z.real, z.imag) for z in points]), True, False)
+
+
+OVERLAP_SHAPES = 2000
+"""Most shapes of a group that are compared with each other."""
+
+
+def _overlap(shapes: list[Shape]) -> bool:
+    """Whether shapes overlap, as far as boxes tell."""
+    if len(shapes) < 2:
+        return False
+    if len(shapes) > OVERLAP_SHAPES:
+        return True
+    boxes = np.stack([shape.box() for shape in shapes])
+    low, high = boxes[:, 0] + EDGE, boxes[:, 1] - EDGE
+    return bool(np.all((low[:, None] < high) & (low < high[:, None]), axis=2).sum() > len(shapes))
+
+
+EDGE = 1e-3
+"""By how much boxes that only touch may overlap [px]."""
+
+
+def _clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
+    """What is seen of shapes within a convex polygon.
+
+    Raises:
+        ImageError: a stroke reaches beyond it.
+    """
+    following = np.roll(corners, -1, axis=0)
+    if np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]) < 0:
+        corners = corners[::-1]
+    kept: list[Shape] = []
+    for shape in shapes:
+        low, high = shape.box()
+        around = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+        inward = [_heights(around, a, b) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+        if all((height >= -EDGE).all() for height in inward):
+            kept.append(shape)
+        elif any((height <= EDGE).all() for height in inward):
+            continue
+        elif shape.line is None:
+            parts = [part for part in (cut_subpath(s, corners) for s in shape.subpaths) if part]
+            if parts:
+                kept.append(replace(shape, subpaths=parts, is_rect=False))
+        else:
+            raise ImageError("a stroke that a viewport cuts off is not supported")
+    # A shape that was cut shares its points with none.
+    return [
+        replace(shape, is_twin=shape.is_twin and i > 0 and kept[i - 1].subpaths is shape.subpaths)
+        for i, shape in enumerate(kept)
+    ]
+
+
+def _heights(points: Points, a: Points, b: Points) -> Points:
+    """Distances of points from a line, positive to its left."""
+    way = (b - a) / np.hypot(*(b - a))
+    return np.asarray((points - a) @ np.array([-way[1], way[0]]))

@@ -1,0 +1,150 @@
+"""Values of SVG attributes and properties: numbers, lengths, opacities, colours."""
+
+from __future__ import annotations
+
+import colorsys
+import re
+from dataclasses import dataclass
+
+from PIL import ImageColor
+
+from warpsplat.errors import ImageError
+from warpsplat.svg.inspect import LENGTH, NUMBER, PIXELS_PER_UNIT
+
+OTHER_UNITS = re.compile(
+    rf"{NUMBER.pattern}(q|ch|cap|ic|lh|rem|rlh|r?ex|vw|vh|vi|vb|vmin|vmax|[sld]v\w+|cq\w+)", re.IGNORECASE
+)
+"""Lengths of CSS that resvg does not read."""
+
+
+@dataclass(frozen=True)
+class Viewport:
+    """What lengths refer to."""
+
+    width: float
+    """[user units]"""
+    height: float
+    """[user units]"""
+    font_size: float = 16.0
+    """[user units]"""
+
+    @property
+    def diagonal(self) -> float:
+        """What percentages that lie in no direction are of (SVG 1.1, 7.10)."""
+        return float(((self.width**2 + self.height**2) / 2) ** 0.5)
+
+
+def length(text: str, reference: float, name: str, font_size: float = 16.0) -> float | None:
+    """A length [user units]; percentages are of ``reference``. None for what is no length.
+
+    Raises:
+        ImageError: of a unit that only some viewers know.
+    """
+    text = text.strip()
+    found = LENGTH.fullmatch(text)
+    if not found:
+        if OTHER_UNITS.fullmatch(text) or "(" in text:
+            raise ImageError(f"{name} {text[:40]!r} is not a number with a unit that is supported")
+        return None
+    number, unit = float(found[1]), found[2]
+    if unit in {"em", "ex"}:
+        return number * font_size * (1.0 if unit == "em" else 0.5)
+    return number * (reference / 100 if unit == "%" else PIXELS_PER_UNIT[unit])
+
+
+def lengths(text: str, reference: float, name: str, font_size: float) -> list[float]:
+    """A list of lengths, as far as it can be read.
+
+    Raises:
+        ImageError: see ``length``.
+    """
+    values: list[float] = []
+    for part in text.replace(",", " ").split():
+        value = length(part, reference, name, font_size)
+        if value is None:
+            break
+        values.append(value)
+    return values
+
+
+def numbers(text: str) -> tuple[list[float], bool]:
+    """The numbers that a list of them begins with, and whether that is all of it."""
+    if not NUMBER.sub(" ", text).strip(", \t\r\n\f"):
+        return [float(value) for value in NUMBER.findall(text)], True
+    values: list[float] = []
+    position = SPACE.match(text).end()  # type: ignore[union-attr]  # matches the empty text
+    while found := NUMBER.match(text, position):
+        values.append(float(found[0]))
+        position = SPACE.match(text, found.end()).end()  # type: ignore[union-attr]
+    return values, False
+
+
+SPACE = re.compile(r"[\s,]*")
+
+
+def fraction(text: str, default: float = 1.0) -> float:
+    """An opacity: a number or a percentage, in 0..1; ``default`` for what is neither."""
+    text = text.strip()
+    number = text.removesuffix("%")
+    if not NUMBER.fullmatch(number):
+        return default
+    return min(max(float(number) / (100 if text.endswith("%") else 1), 0.0), 1.0)
+
+
+Color = tuple[float, float, float]
+
+UNSURE = re.compile(
+    r"(rgba?|hsla?|hwb|(ok)?lab|(ok)?lch|color|color-mix|device-cmyk|light-dark)\s*\(|rebeccapurple|.*icc-color\("
+)
+"""Colours that some viewers read, and resvg does not."""
+
+
+def parse_color(text: str) -> tuple[Color, float] | None:
+    """An SVG colour as sRGB in 0..1, and its opacity; None for what is no colour.
+
+    Raises:
+        ImageError: one that only some viewers know.
+    """
+    name = text.strip().lower()
+    if name == "transparent":
+        return (0.0, 0.0, 0.0), 0.0
+    if name in ImageColor.colormap and name != "rebeccapurple":
+        red, green, blue = ImageColor.getrgb(name)[:3]
+        return (red / 255, green / 255, blue / 255), 1.0
+    color = _hex(name[1:]) if name.startswith("#") else _function(name)
+    if color is None and UNSURE.match(name):
+        raise ImageError(f"{text[:40]!r} is not a colour that is supported")
+    return color
+
+
+def _hex(digits: str) -> tuple[Color, float] | None:
+    if len(digits) in {3, 4}:
+        digits = "".join(2 * digit for digit in digits)
+    if len(digits) not in {6, 8} or digits.strip("0123456789abcdef"):
+        return None
+    red, green, blue, alpha = bytes.fromhex(f"{digits}ff"[:8])
+    return (red / 255, green / 255, blue / 255), alpha / 255
+
+
+FUNCTION = re.compile(r"(rgb|hsl)a?\(([^()]*)\)")
+
+
+def _function(text: str) -> tuple[Color, float] | None:
+    found = FUNCTION.fullmatch(text)
+    parts = found[2].replace(",", " ").split() if found else []
+    percent = [part.endswith("%") for part in parts]
+    digits = [part.removesuffix("%") for part in parts]
+    if len(parts) not in {3, 4} or percent[3:] == [True] or not all(map(NUMBER.fullmatch, digits)):
+        return None
+    values = [float(number) / (100 if share else 1) for number, share in zip(digits, percent, strict=True)]
+    alpha = min(max(values[3], 0.0), 1.0) if len(values) == 4 else 1.0
+    if found and found[1] == "rgb" and len(set(percent[:3])) == 1:
+        red, green, blue = (
+            round(255 * min(max(value if percent[0] else value / 255, 0.0), 1.0)) / 255
+            for value in values[:3]
+        )
+        return (red, green, blue), alpha
+    if found and found[1] == "hsl" and percent[:3] == [False, True, True]:
+        saturation, light = (min(max(value, 0.0), 1.0) for value in values[1:3])
+        return colorsys.hls_to_rgb(values[0] / 360 % 1, light, saturation), alpha
+    return None
