@@ -14,6 +14,8 @@ Conventions and glossary, here once:
 * A **sample** is a point by which a shape's tiles are found: a **vertex** of its polyline (exact coverage),
   or a **Gaussian** (splats). A shape's samples are the range [``*_first``, ``*_last``), empty where they did
   not fit into the capacity.
+* A **corner** is a vertex of the polygons that a styled stroke is drawn as; they lie one after the other as
+  the vertices do. The **part** of a shape says which kernels cover it: its kind, or STYLED.
 * Gaussians lie on a grid of **rows** across a shape and **stations** along it, number
   ``gaussian_first + row * stations + station``. Stations fall into **runs**: neighbours only inside a run.
 * The **strength** of a soft Gaussian is its opacity inside the product over its shape's Gaussians; the
@@ -37,6 +39,7 @@ Conventions and glossary, here once:
 Data flow of a step (forward, then its adjoint in reverse order)::
 
     points         --outline-->  vertices    --bins-->  slots by tile  --coverage/fill, stroke-->  coverage
+    vertices       --stroker, corners-->  polygons of styled strokes, covered as fills are
     points, widths --grid-->     Gaussians   --bins-->  slots by tile  --coverage/splat-->         coverage
     shapes         --grid/soft--> Gaussians  --bins-->  slots by tile  --coverage/gaussian-->      coverage
     coverage, paint --composite--> image --loss--> image_grad      gradients --adam--> new parameters

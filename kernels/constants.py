@@ -133,6 +133,9 @@ optimiser and then missing in the file, whose curves are smooth (docs/experiment
 FLATNESS_STROKE = 0.08
 """The same for strokes: their corners are rounded by their width, and each piece costs the stroke's width."""
 
+SLANT = 0.2
+"""Largest distance [px] of a corner of a cap or join from where it would be at the curve itself."""
+
 PIECES_MIN = 3
 PIECES_MAX = 64
 """Bounds of the straight pieces of one cubic; 64 are enough for one as large as 8,000 px."""

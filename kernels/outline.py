@@ -5,6 +5,9 @@ beside it so that the polyline is on either side of the curve in turn (``bezier.
 by at most max |B''| / (12 n^2), where |B''| is at most 6 times the larger second difference of its control
 points (Sederberg, Computer Aided Geometric Design, 10.6). Where two Béziers meet, the vertex is half-way
 between what either asks for; a chain's ends lie on the curve. The n is taken as a constant by the adjoint.
+
+Caps and joins stand at right angles to the first and last pieces, whose direction is off the curve's by half
+of what it turns within them: the wider a stroke that has such ends, the more pieces.
 """
 
 import warp as wp
@@ -19,6 +22,8 @@ NONE = wp.constant(constants.NONE)
 REACH_MAX = wp.constant(constants.REACH_MAX)
 FLATNESS = wp.constant(constants.FLATNESS)
 FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
+STYLED = wp.constant(constants.STYLED)
+SLANT = wp.constant(constants.SLANT)
 CUBIC = wp.constant(constants.CUBIC)
 PIECES_MIN_SPLINE = wp.constant(constants.PIECES_MIN_SPLINE)
 PIECES_MIN = wp.constant(constants.PIECES_MIN)
@@ -40,12 +45,22 @@ def bezier_of(
     return bezier_points(points, contour_closed[contour], basis, first, count, local)
 
 
+@wp.func
+def turn_rate(leg: wp.vec2, middle: wp.vec2) -> wp.float32:
+    """How fast a cubic's direction turns by t at an end: |B' x B''| / |B'|^2, from two legs
+    of its control polygon, that at the end first.
+    """
+    return 2.0 * wp.abs(leg[0] * middle[1] - leg[1] * middle[0]) / wp.max(wp.dot(leg, leg), 1.0e-12)
+
+
 @wp.kernel
 def plan_outline(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
+    widths: wp.array[wp.float32],  # [shape_count] canvas units; of fills not read
     kind: wp.array[wp.int32],  # [shape_count] FILL or STROKE
+    part: wp.array[wp.int32],  # [shape_count] of STYLED ones the ends have directions
     basis: wp.array[wp.int32],  # [shape_count] CUBIC or SPLINE
     bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier of each shape
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
@@ -75,7 +90,12 @@ def plan_outline(
         p = bezier_of(points, basis[shape], contour, contour_first, contour_closed, local)
         worst = wp.max(wp.length(p[0] - 2.0 * p[1] + p[2]), wp.length(p[1] - 2.0 * p[2] + p[3]))
         wanted = wp.ceil(wp.sqrt(0.5 * scale * worst / flatness))
-        pieces = wp.clamp(int(wp.min(wanted, 1.0e6)), least, PIECES_MAX)
+        is_end = local == 0 or bezier + 1 == contour_bezier[contour + 1]
+        # Splines are smooth but for the ends of open ones.
+        if part[shape] == STYLED and (basis[shape] == CUBIC or (is_end and contour_closed[contour] == 0)):
+            slant = wp.max(turn_rate(p[1] - p[0], p[2] - p[1]), turn_rate(p[3] - p[2], p[2] - p[1]))
+            wanted = wp.max(wanted, 0.25 * scale * widths[shape] * slant / (SLANT * slack))
+        pieces = wp.clamp(int(wp.min(wp.ceil(wanted), 1.0e6)), least, PIECES_MAX)
         bezier_vertex[bezier] = vertices
         bezier_pieces[bezier] = pieces
         vertices += pieces

@@ -6,7 +6,8 @@ All wind the same way, so that their winding-weighted areas add up to 1 and more
 coverage of a fill, clamped, is that of the union. Where polygons overlap within a pixel's edge it would count
 twice; so neighbours meet on the line that halves their angle, on the inner side of the turn and, for mitres
 and turns that are too small to see, on the outer one too, wherever the pieces are long enough for it. That is
-the case where the line bends less than the width: only beyond do their ends overlap.
+the case where the line bends less than the width: only beyond do their ends overlap. Caps overlap too where a
+gap between dashes is shorter than the width: pixels on the border of both are covered too much.
 """
 
 import warp as wp

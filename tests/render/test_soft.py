@@ -13,7 +13,7 @@ from tests.reference import soft as reference
 from tests.reference.composite import composite
 from tests.reference.curves import tensors
 from tests.reference.grid import Plan
-from tests.scenes import mixed_scene, random_scene
+from tests.scenes import mixed_scene, random_scene, with_gradients
 from warpsplat.render.models import GaussianModel
 from warpsplat.render.renderer import Renderer, render
 from warpsplat.render.soft import SoftGrid
@@ -100,6 +100,11 @@ def test_an_opacity_beyond_its_bounds_is_only_led_back(device: str) -> None:
     assert (shrinks > 0).all(), "less of the stroke is what the first gradient asks for"
     assert gradients[1][0] == 0, "it cannot be more than opaque"
     np.testing.assert_allclose(gradients[1][1:], -shrinks[1:], rtol=1e-5)
+
+
+def test_gradients_are_refused(device: str) -> None:
+    with pytest.raises(ValueError, match="flat colours, no gradients"):
+        renderer_for(with_gradients(random_scene(FILL)), device, model=SOFT)
 
 
 def test_a_render_at_twice_the_size_is_the_same_picture() -> None:

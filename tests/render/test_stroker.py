@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.helpers import compare, renderer_for
+from tests.helpers import compare, pieces_of, renderer_for
 from tests.scenes import DASHES, polyline_scene, random_scene, styled_scene
 from warpsplat.errors import CapacityError
 from warpsplat.metrics import psnr
@@ -58,7 +58,7 @@ def test_sixteen_lanes_do_what_one_does(device: str, dash: int) -> None:
         renderer.backward()
         outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
     for one, many in zip(*outcomes, strict=True):
-        np.testing.assert_allclose(many, one, atol=1e-5 * np.abs(one).max())
+        np.testing.assert_allclose(many, one, atol=1e-5 * np.abs(one).max(initial=0))
 
 
 @pytest.mark.parametrize(
@@ -66,10 +66,12 @@ def test_sixteen_lanes_do_what_one_does(device: str, dash: int) -> None:
     [(Cap.SQUARE, Join.MITER, NO_DASHES), (Cap.BUTT, Join.BEVEL, 1), (Cap.ROUND, Join.ROUND, 1)],
 )
 def test_finite_differences(device: str, cap: Cap, join: Join, dash: int) -> None:
-    """No reference at all: random directions in all points and widths, central differences. A direction may
-    meet a step, where a curve gets another piece or a dash's end passes a vertex; most do not.
+    """No reference at all: random directions in the points and widths of a shape, central differences.
+
+    Where curves get other numbers of pieces the image jumps; and it may where a dash's end passes a vertex,
+    which few directions meet.
     """
-    scene = styled_scene(cap, join, dash, seed=8)
+    scene = styled_scene(cap, join, dash, seed=8).take(np.arange(1))
     rng = np.random.default_rng(0)
     weights = cv2.GaussianBlur(rng.normal(size=(36, 40, 3)), (0, 0), 2.0)
     renderer = renderer_for(scene, device)
@@ -79,15 +81,17 @@ def test_finite_differences(device: str, cap: Cap, join: Join, dash: int) -> Non
     step = 0.002
     for name in ("points", "widths"):
         value, errors = getattr(scene, name), []
-        for _ in range(7):
+        for _ in range(14):
             direction = rng.normal(size=value.shape)
-            sides = []
-            for sign in (1, -1):
-                moved = replace(scene, **{name: (value + sign * step * direction).astype(np.float32)})
-                sides.append((renderer_for(moved, device).read_image().astype(np.float64) * weights).sum())
-            products = gradients[name] * direction
-            numeric = (sides[0] - sides[1]) / (2 * step)
-            errors.append(abs(numeric - products.sum()) / np.abs(products).sum())
+            moved = [
+                renderer_for(replace(scene, **{name: (value + s * direction).astype(np.float32)}), device)
+                for s in (step, -step)
+            ]
+            if all(pieces_of(one) == pieces_of(renderer) for one in moved):
+                ahead, back = ((one.read_image().astype(np.float64) * weights).sum() for one in moved)
+                products = gradients[name] * direction
+                errors.append(abs((ahead - back) / (2 * step) - products.sum()) / np.abs(products).sum())
+        assert len(errors) > 2
         assert np.median(errors) < 0.003, name
 
 

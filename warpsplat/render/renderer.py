@@ -23,7 +23,7 @@ GROWTH = 1.5
 SLOT_LIMIT = 1_500_000
 """Most slots (1.3 KiB each, 2.4 for strokes) before a scene is refused: up to 3.5 GiB."""
 SAMPLE_LIMIT = 16_000_000
-"""Most Gaussians or vertices (about 120 bytes each) before a scene is refused."""
+"""Most Gaussians or vertices (about 120 bytes each, 200 with styled strokes) before a scene is refused."""
 SLOTS_PER_SHAPE = 8
 """First guess of the need, besides one for each tile."""
 

@@ -16,7 +16,7 @@ from warpsplat.render.grid import GridBuffers
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
 from warpsplat.render.ranges import record_ranges
-from warpsplat.scene import Kind
+from warpsplat.scene import GRADIENTS, Kind
 
 
 @dataclass
@@ -50,8 +50,11 @@ class SoftGrid:
         """Allocate.
 
         Raises:
-            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
+            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2); or a
+                gradient, whose opacities would count besides the Gaussians'.
         """
+        if parameters.paints & set(GRADIENTS):
+            raise ValueError("soft Gaussians have flat colours, no gradients")
         self._parameters, self._viewport = parameters, viewport
         self._softness, self._density = softness, density
         self._through_scales, self._fold = through_scales, fold
