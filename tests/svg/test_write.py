@@ -19,8 +19,8 @@ from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.models import SplatModel
 from warpsplat.render.renderer import render
-from warpsplat.scene import Basis, Kind
-from warpsplat.svg.data import integers, path_data, spline_data
+from warpsplat.scene import Basis, Canvas, Kind, Scene
+from warpsplat.svg.data import PathData, integers, spline_data
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
@@ -71,7 +71,7 @@ def steps_of(data: str, command: str) -> np.ndarray:
 def test_rounding_does_not_add_up(basis: Basis) -> None:
     """A thousand steps of 0.4 units: the end is at 400, not at 0."""
     points = np.stack([0.4 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
-    data = path_data(points, Kind.STROKE, basis, 1, closed=False)
+    data = PathData(Scene.uniform(Kind.STROKE, Canvas(400, 1, None), points[None], basis), 1).of(0)
     if basis == Basis.CUBIC:
         # Each cubic is relative to the end of the one before.
         ends = steps_of(data, "c")[2::3]
@@ -83,7 +83,7 @@ def test_rounding_does_not_add_up(basis: Basis) -> None:
 @pytest.mark.parametrize("kind", list(Kind))
 def test_a_spline_is_one_quadratic_and_smooth_ones(kind: Kind) -> None:
     scene = random_scene(kind, count=1, basis=Basis.SPLINE, beziers=7)
-    data = path_data(scene.points, kind, Basis.SPLINE, 10, closed=kind == Kind.FILL)
+    data = PathData(scene, 10).of(0)
     assert re.fullmatch(r"M-?\d+[ -]\d+q[-\d ]+t[-\d ]+", data)
     assert len(steps_of(data.split("t")[0], "q")) == 2
     assert len(steps_of(data, "t")) == 6

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 
 Pair = tuple[int, int]
 
@@ -25,39 +25,37 @@ def minus(a: Pair, b: Pair) -> Pair:
     return a[0] - b[0], a[1] - b[1]
 
 
-def shape_data(scene: Scene, shape: int, per_pixel: float) -> str:
-    """``d`` of one shape: its contours one after another."""
-    kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
-    # Fills close by themselves, but a twin may be the stroke of what is written here.
-    says_closed = kind == Kind.STROKE or bool(scene.twin[shape + 1 : shape + 2].any())
-    # A stroke's pattern begins where its contour does.
-    turns = not says_closed
-    return "".join(
-        path_data(points, kind, basis, per_pixel, closed=closed, turns=turns)
-        + ("z" if closed and says_closed else "")
-        for points, closed in scene.contours_of(shape)
-    )
+class PathData:
+    """``d`` of the shapes of a scene, with ``per_pixel`` units of the view box a pixel."""
 
+    def __init__(self, scene: Scene, per_pixel: float) -> None:
+        spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
+        # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
+        unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
+        grid = np.round(scene.points.astype(np.float64) * unit).astype(np.int64).tolist()
+        self._grid: list[Pair] = [(x, y) for x, y in grid]
+        self._starts, self._closed = scene.starts.tolist(), scene.closed.tolist()
+        self._contours = np.searchsorted(scene.starts, scene.first).tolist()
+        self._strokes = (scene.kind == Kind.STROKE).tolist()
+        self._splines = (scene.basis == Basis.SPLINE).tolist()
+        self._has_twin = np.append(scene.twin[1:], 0).tolist()
 
-def path_data(
-    points: FloatArray, kind: Kind, basis: Basis, per_pixel: float, *, closed: bool, turns: bool = True
-) -> str:
-    """``d`` of one contour.
-
-    Args:
-        points: as in ``Scene``, shape (point, 2).
-        kind: of the shape.
-        basis: of the shape.
-        per_pixel: units of the view box a pixel.
-        closed: whether the points are a ring.
-        turns: whether a ring may begin anywhere.
-    """
-    # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
-    unit = per_pixel / 2 if basis == Basis.SPLINE else per_pixel
-    grid = [(x, y) for x, y in np.round(points.astype(np.float64) * unit).astype(np.int64).tolist()]
-    if basis == Basis.SPLINE:
-        return spline_data(grid, closed, turns=turns)
-    return cubic_data(grid, closed, keep_dots=kind == Kind.STROKE)
+    def of(self, shape: int) -> str:
+        """Of one shape: its contours one after another."""
+        # Fills close by themselves, but the stroke of the same path does not. Where its pattern begins
+        # matters, too.
+        is_stroked = self._strokes[shape] or self._has_twin[shape]
+        texts = []
+        for contour in range(*self._contours[shape : shape + 2]):
+            points = self._grid[self._starts[contour] : self._starts[contour + 1]]
+            closed = bool(self._closed[contour])
+            if self._splines[shape]:
+                texts.append(spline_data(points, closed, turns=not is_stroked))
+            else:
+                texts.append(cubic_data(points, closed, keep_dots=self._strokes[shape]))
+            if closed and is_stroked:
+                texts.append("z")
+        return "".join(texts)
 
 
 def cubic_data(grid: list[Pair], closed: bool, *, keep_dots: bool) -> str:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from warpsplat import __version__
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Rule, Scene
-from warpsplat.svg.data import shape_data
+from warpsplat.svg.data import PathData
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 
@@ -91,7 +91,9 @@ def _line(scene: Scene, shape: int, per_pixel: float, *, in_group: bool) -> str:
     return style
 
 
-def _path(scene: Scene, shape: int, color: str, per_pixel: float, rest: str, *, in_group: bool) -> str:
+def _path(
+    scene: Scene, shape: int, data: str, color: str, per_pixel: float, rest: str, *, in_group: bool
+) -> str:
     """The path of one shape; ``rest``: further attributes."""
     kind = Kind(int(scene.kind[shape]))
     style = f'{PAINTED[kind]}="{color}"'
@@ -99,7 +101,7 @@ def _path(scene: Scene, shape: int, color: str, per_pixel: float, rest: str, *, 
         style += _line(scene, shape, per_pixel, in_group=in_group)
     elif scene.rule[shape] == Rule.EVENODD:
         style += ' fill-rule="evenodd"'
-    return f'<path d="{shape_data(scene, shape, per_pixel)}" {style}{rest}/>'
+    return f'<path d="{data}" {style}{rest}/>'
 
 
 def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
@@ -134,7 +136,11 @@ def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
     colors, opacities = _colors(scene, per_pixel), _opacities(scene, 1.0)
-    paths = (_path(scene, i, colors[i], per_pixel, opacities[i], in_group=True) for i in range(len(scene)))
+    data = PathData(scene, per_pixel)
+    paths = (
+        _path(scene, i, data.of(i), colors[i], per_pixel, opacities[i], in_group=True)
+        for i in range(len(scene))
+    )
     return np.array([len(path) for path in paths], np.int64)
 
 
@@ -143,11 +149,13 @@ def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[st
     where that is shorter. Twins are one path.
     """
     colors, opacities = _colors(scene, per_pixel), _opacities(scene, opacity_scale)
+    data = PathData(scene, per_pixel)
     has_twin = np.append(scene.twin[1:], 0).tolist()
+    strokes = (scene.kind == Kind.STROKE).tolist()
     rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
     both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
     for in_group, shapes in itertools.groupby(
-        np.flatnonzero(scene.twin == 0).tolist(), lambda i: scene.kind[i] == Kind.STROKE and not has_twin[i]
+        np.flatnonzero(scene.twin == 0).tolist(), lambda i: strokes[i] and not has_twin[i]
     ):
         yield f"<g {STROKE_ATTRIBUTES}>" if in_group else "<g>"
         for opacity, run in itertools.groupby(shapes, lambda i: both[i]):
@@ -156,7 +164,13 @@ def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[st
             shared = len(alike) * len(opacity) > len("".join(group))
             paths = (
                 _path(
-                    scene, i, colors[i], per_pixel, rest[i] + ("" if shared else opacity), in_group=in_group
+                    scene,
+                    i,
+                    data.of(i),
+                    colors[i],
+                    per_pixel,
+                    rest[i] + ("" if shared else opacity),
+                    in_group=in_group,
                 )
                 for i in alike
             )
