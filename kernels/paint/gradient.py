@@ -66,12 +66,8 @@ def parameter(paint: wp.int32, focus: wp.vec3, p: wp.vec2) -> wp.vec3:
 
 @wp.func
 def spread_out(spread: wp.int32, t: wp.float32) -> wp.vec2:
-    """t brought into [0, 1], and the derivative of that."""
+    """t brought into [0, 1], and the derivative of that; where the end stops go on, t as it is."""
     if spread == PAD:
-        if t < 0.0:
-            return wp.vec2(0.0, 0.0)
-        if t > 1.0:
-            return wp.vec2(1.0, 0.0)
         return wp.vec2(t, 1.0)
     if spread == REPEAT:
         return wp.vec2(t - wp.floor(t), 1.0)

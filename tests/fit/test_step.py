@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from tests.fit.pictures import picture
 from tests.kernels.modules import kernel_modules, kernels_of
-from tests.scenes import mixed_scene
+from tests.scenes import mixed_scene, with_gradients
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases
@@ -22,7 +23,7 @@ from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import Capacity
 from warpsplat.render.tiles import from_tiles
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.viewer import on_white, render_svg
 
@@ -84,6 +85,15 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
         step = step_for(picture(), settings, device, threads=1, scene=scene)
         assert step._graph is not None
         launched |= {launch.name for program in step.programs for launch in program.launches}
+    scene = with_gradients(mixed_scene(64, 48))
+    stroke = int(np.flatnonzero(scene.kind == Kind.STROKE)[0])
+    twins = scene.take(np.array([stroke, stroke]))
+    scene = scene.append(replace(twins, twin=np.array([0, 1], np.int32)))
+    scene = replace(scene, cap=np.full(len(scene), Cap.BUTT, np.int32), canvas=Canvas(64, 48, None))
+    target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)
+    step = step_for(target, make_settings(iterations=50), device, threads=1, scene=scene)
+    assert step._graph is not None
+    launched |= {launch.name for program in step.programs for launch in program.launches}
     every = {kernel.key for module in kernel_modules() for kernel in kernels_of(module)}
     assert every <= launched
     assert launched - every == {"array_scan", "radix_sort_pairs"}

@@ -39,9 +39,9 @@ def circle_through(p: torch.Tensor, focus: torch.Tensor) -> torch.Tensor:
 
 
 def within(t: torch.Tensor, spread: Spread) -> torch.Tensor:
-    """t brought into [0, 1]."""
+    """t brought into [0, 1], but where the end stops go on."""
     if spread == Spread.PAD:
-        return t.clamp(0, 1)
+        return t
     if spread == Spread.REPEAT:
         return t - t.floor()
     return 1 - (t % 2 - 1).abs()

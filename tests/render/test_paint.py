@@ -46,6 +46,22 @@ def test_stops_out_of_order(device: str) -> None:
     compare(replace(scene, stop_offsets=offsets), device)
 
 
+def test_two_stops_in_one_place_are_a_step(device: str) -> None:
+    """Also at either end, where what lies beyond has the outer one's colour."""
+    colors = np.eye(3, dtype=np.float32)[[0, 1, 1, 2]]
+    scene = replace(
+        disc(60, 40, 20),
+        paint=np.array([Paint.LINEAR], np.int32),
+        frames=np.array([[10, 0, 20, 0, 0, 20]], np.float32),
+        stop_first=np.array([0, 4], np.int32),
+        stop_offsets=np.array([0, 0, 1, 1], np.float32),
+        stop_colors=colors,
+        stop_opacities=np.ones(4, np.float32),
+    )
+    row = renderer_for(scene, device).read_image()[20]
+    np.testing.assert_allclose(row[[9, 10, 29, 30]], colors, atol=1e-6)
+
+
 def test_what_is_empty_stays_exactly_empty(device: str) -> None:
     image = renderer_for(transparent(disc(9, 40, 20)), device).read_image()
     assert image.shape == (40, 40, 4)

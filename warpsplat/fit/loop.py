@@ -13,7 +13,15 @@ from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
-from warpsplat.fit.schedule import CHECK_INTERVAL, LOOK_INTERVAL, phase_at, phases, shapes_at, work_done
+from warpsplat.fit.schedule import (
+    CHECK_INTERVAL,
+    LOOK_FROM,
+    LOOK_INTERVAL,
+    phase_at,
+    phases,
+    shapes_at,
+    work_done,
+)
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
@@ -128,7 +136,8 @@ def fit(
             settled = True
         density = settings.density
         surgical = done < density.stop * settings.iterations
-        if settings.viewer and finest and not surgical and not rounding and done % LOOK_INTERVAL == 0:
+        late = done >= LOOK_FROM * settings.iterations
+        if settings.viewer and finest and late and not rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
         due = density.interval > 0 and done % density.interval == 0
         if due and budget and phase is plan[0] and surgical:  # then what is due when stays as it is

@@ -16,6 +16,9 @@ SLACK = 2.0
 CHECK_INTERVAL = 10
 """Steps between two looks at the loss and the counters of the device."""
 
+LOOK_FROM = 0.75
+"""Fraction of a run from which on the file is looked at."""
+
 LOOK_INTERVAL = 50
 """Steps between two looks at the file as a viewer shows it."""
 

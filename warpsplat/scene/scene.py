@@ -191,8 +191,9 @@ class Scene:
                 well; those left out are the default.
         """
         rows: dict[str, Any] = {
-            name: np.zeros((len(kind), 3) if name == "colors" else len(kind), np.float32)
-            for name in ("colors", "opacities", "widths")
+            a.name: np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
+            for a in ATTRIBUTES
+            if a.per == "shape"
         }
         if basis is None:
             basis = np.full(len(kind), Basis.CUBIC, np.int32)

@@ -184,10 +184,6 @@ def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tupl
     return translation(x, y) @ np.diag([radius, radius, 1.0]), focus
 
 
-TINY = 1e-7
-"""An offset that is 0 but for the order of stops."""
-
-
 def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[Flat, ...]]:
     """Offsets and colours of a gradient's stops; each offset is at least the one before."""
     offsets: list[float] = []
@@ -199,8 +195,7 @@ def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tup
         text = child.get("offset", "").strip()
         before = offsets[-1] if offsets else 0.0
         given = fraction(text) if NUMBER.fullmatch(text.removesuffix("%")) else before
-        # What lies before two stops at 0 has the colour of the first.
-        offsets.append(max(given, before if before or not offsets else TINY))
+        offsets.append(max(given, before))
         color = flat_paint("black" if style["stop-color"] == "none" else style["stop-color"], style)
         assert color
         stops.append(Flat(color.color, color.opacity * fraction(style["stop-opacity"])))
