@@ -6,9 +6,10 @@ share and so knows the share of all that lies behind, without stored lists:
 dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
 A coverage may come from splats or from any other model: this stage knows only the tiles' lists of visible
 slots. It takes the magnitude (an exact fill stores which way round it is as a sign), and 1 throughout a FULL
-slot. A flat paint comes with the lists; of a gradient the colours of a slot's pixels lie in memory as its
-coverage does. A transparent canvas has a fourth plane: how opaque a pixel is, as a colour that all shapes
-have and the background has not. Images are arrays of tiles, planes and columns (see ``warpsplat.tiles``).
+slot. A flat paint comes with the lists; of a gradient (``composite_paint``) the colours of a slot's pixels
+lie in memory as its coverage does. A transparent canvas has a fourth plane: how opaque a pixel is, as a colour
+that all shapes have and the background has not. Images are arrays of tiles, planes and columns (see
+``warpsplat.tiles``).
 """
 
 import warp as wp
@@ -35,10 +36,9 @@ def composite_forward(
     list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] of gradients: colour and opacity
     background: wp.vec3,
     # Out:
-    image: wp.array3d[column],  # [tile_count, planes, TILE]
+    image: wp.array3d[column],  # [tile_count, 3, TILE]
 ):
     """One thread a tile and lane."""
     i, lane = wp.tid()
@@ -53,25 +53,16 @@ def composite_forward(
         for k in range(start, stop):
             paint = list_paint[k]
             slot = list_slot[k]
-            share = wp.abs(paint[3]) * t
+            share = paint[3] * t
             if slot >= 0:
                 share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
-            if paint[3] >= 0.0:
-                red = red + paint_times(paint, 0, share)
-                green = green + paint_times(paint, 1, share)
-                blue = blue + paint_times(paint, 2, share)
-            else:
-                s = wp.max(slot, -1 - slot)
-                share = wp.cw_mul(share, paint_columns[s, 3, x])
-                red = red + wp.cw_mul(share, paint_columns[s, 0, x])
-                green = green + wp.cw_mul(share, paint_columns[s, 1, x])
-                blue = blue + wp.cw_mul(share, paint_columns[s, 2, x])
+            red = red + paint_times(paint, 0, share)
+            green = green + paint_times(paint, 1, share)
+            blue = blue + paint_times(paint, 2, share)
             t = t - share
         image[tile, 0, x] = red + background[0] * t
         image[tile, 1, x] = green + background[1] * t
         image[tile, 2, x] = blue + background[2] * t
-        if image.shape[1] == 4:
-            image[tile, 3, x] = column(1.0) - t
 
 
 @wp.kernel
@@ -85,10 +76,9 @@ def composite_backward(
     list_paint: wp.array[wp.vec4],  # [slot_capacity]
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
     law: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-    image: wp.array3d[column],  # [tile_count, planes, TILE] of the forward pass
-    image_grad: wp.array3d[column],  # [tile_count, planes, TILE]
+    image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
+    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     # Out:
-    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] replaced by their gradients
     sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
     slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3) and opacity by pixel row: one lane
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
@@ -110,10 +100,6 @@ def composite_backward(
         behind = wp.cw_mul(image[tile, 0, x], red)
         behind = behind + wp.cw_mul(image[tile, 1, x], green)
         behind = behind + wp.cw_mul(image[tile, 2, x], blue)
-        opaque = zero
-        if image.shape[1] == 4:
-            opaque = image_grad[tile, 3, x]
-            behind = behind + wp.cw_mul(image[tile, 3, x], opaque)
         t = one
         for k in range(start, stop):
             paint = list_paint[k]
@@ -126,20 +112,8 @@ def composite_backward(
             else:
                 signed = coverage[slot, x]
                 covered = wp.abs(signed)
-            gradient = paint[3] < 0.0
-            opacity = wp.abs(paint[3])
-            alpha = opacity * covered
-            own = covered
-            share = opaque
-            if gradient:
-                own = wp.cw_mul(own, paint_columns[slot, 3, x])
-                alpha = opacity * own
-                share = share + wp.cw_mul(paint_columns[slot, 0, x], red)
-                share = share + wp.cw_mul(paint_columns[slot, 1, x], green)
-                share = share + wp.cw_mul(paint_columns[slot, 2, x], blue)
-            else:
-                share = share + paint_against(paint, red, green, blue)
-            share = wp.cw_mul(t, share)
+            alpha = paint[3] * covered
+            share = wp.cw_mul(t, paint_against(paint, red, green, blue))
             seen = wp.cw_mul(t, alpha)
             behind = behind - wp.cw_mul(alpha, share)
             # Where no light is left, only rounding is; Adam would make steps of it.
@@ -152,19 +126,11 @@ def composite_backward(
                 if law == AREA:
                     slope = wp.min(STEEP * slope, one)
                     slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
-                slope = opacity * wp.cw_mul(slope, alpha_grad)
-                if gradient:
-                    slope = wp.cw_mul(slope, paint_columns[slot, 3, x])
-                sum_grad[slot, x] = slope
+                sum_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
             red_grad = wp.cw_mul(seen, red)
             green_grad = wp.cw_mul(seen, green)
             blue_grad = wp.cw_mul(seen, blue)
-            opacity_grad = wp.cw_mul(own, alpha_grad)
-            if gradient:
-                paint_columns[slot, 0, x] = red_grad
-                paint_columns[slot, 1, x] = green_grad
-                paint_columns[slot, 2, x] = blue_grad
-                paint_columns[slot, 3, x] = opacity * wp.cw_mul(covered, alpha_grad)
+            opacity_grad = wp.cw_mul(covered, alpha_grad)
             if lane_columns == 1:
                 slot_grad[slot, lane] = wp.vec4(
                     total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)

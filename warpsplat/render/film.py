@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import composite, constants
+from warpsplat.kernels import composite, composite_paint, constants
 from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.bins import Bins
@@ -46,10 +46,15 @@ class Film:
     def _dim(self) -> tuple[int, int]:
         return self._viewport.tile_count, self._backend.lanes
 
+    def _is_plain(self, paint: Painting) -> bool:
+        """Whether all is flat and opaque behind."""
+        return self.planes == 3 and not paint.has_gradients
+
     def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record lists and coverages -> ``image``."""
+        plain = self._is_plain(paint)
         program.launch(
-            composite.composite_forward,
+            composite.composite_forward if plain else composite_paint.paint_forward,
             self._dim,
             self.buffers,
             bins.buffers,
@@ -62,8 +67,9 @@ class Film:
 
     def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
+        plain = self._is_plain(paint)
         program.launch(
-            composite.composite_backward,
+            composite.composite_backward if plain else composite_paint.paint_backward,
             self._dim,
             self.buffers,
             bins.buffers,

@@ -43,7 +43,7 @@ class Painting:
     ) -> None:
         self._backend, self._parameters, self._viewport, self._bins = backend, parameters, viewport, bins
         self._slots = slots
-        self._has_gradients = bool(parameters.paints & set(GRADIENTS))
+        self.has_gradients = bool(parameters.paints & set(GRADIENTS))
         whole = backend.lanes == 1
         self.buffers = backend.allocate(
             PaintBuffers,
@@ -51,13 +51,13 @@ class Painting:
                 "column_slots": slots if whole else 1,
                 "lane_slots": 1 if whole else slots,
                 "lanes": backend.lanes,
-                "paint_slots": slots if self._has_gradients else 1,
+                "paint_slots": slots if self.has_gradients else 1,
             },
         )
 
     def forward(self, program: Program) -> None:
         """Record frames and stops -> colours of the pixels of visible slots with gradients."""
-        if self._has_gradients:
+        if self.has_gradients:
             program.launch(
                 gradient.gradient_forward,
                 (self._slots, self._backend.lanes),
@@ -72,7 +72,7 @@ class Painting:
 
     def backward(self, program: Program) -> None:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
-        if self._has_gradients:
+        if self.has_gradients:
             shapes = self._parameters.shape_count
             program.launch(gradient.gradient_backward, shapes, *self._sources, split=True)
         program.launch(
