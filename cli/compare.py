@@ -91,13 +91,7 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
 
 @click.command("compare", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", nargs=-1, required=True, type=FILE)
-@click.option(
-    "--against",
-    type=click.Choice(list(TRACERS)),
-    default=next(iter(TRACERS)),
-    show_default=True,
-    help="The other program.",
-)
+@click.option("--against", type=click.Choice(list(TRACERS)), required=True, help="The other program.")
 @click.option(
     "-o",
     "--output",
