@@ -80,7 +80,7 @@ TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
     (ExitCode.USAGE, "unknown option", "info --nonsense", None),
     (ExitCode.USAGE, "unknown option", "compare photo.png --nonsense", None),
     (ExitCode.USAGE, "missing argument", "compare", None),
-    (ExitCode.INPUT, "no image", "compare missing.png", None),
+    (ExitCode.INPUT, "no image", "compare missing.png --against vtracer", None),
     (ExitCode.USAGE, "missing argument", "vectorize", None),
     (ExitCode.USAGE, "missing argument", "refine drawing.svg photo.png", None),
     (ExitCode.USAGE, "a value out of range", "vectorize photo.png --curves 0", None),
