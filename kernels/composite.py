@@ -7,8 +7,8 @@ dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
 A coverage may come from splats or from any other model: this stage knows only the tiles' lists of visible
 slots. It takes the magnitude (an exact fill stores which way round it is as a sign), and 1 throughout a FULL
 slot. A flat paint comes with the lists; of a gradient (``composite_paint``) the colours of a slot's pixels
-lie in memory as its coverage does. A transparent canvas has a fourth plane: how opaque a pixel is, as a colour
-that all shapes have and the background has not. Images are arrays of tiles, planes and columns (see
+lie in memory as its coverage does. A transparent canvas has a fourth plane: how opaque a pixel is, as a
+colour that all shapes have and the background has not. Images are arrays of tiles, planes and columns (see
 ``warpsplat.tiles``).
 """
 
