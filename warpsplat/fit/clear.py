@@ -42,7 +42,7 @@ def clear_empty(
     """The scene, its points moved so that the file shows nothing where the picture is empty.
 
     Args:
-        scene: on a transparent canvas, as the file has it.
+        scene: on a transparent canvas; it is rounded as in the file.
         target: premultiplied with opacity, shape (height, width, 4).
         settings: of the file.
         backend: where to compute.
@@ -85,8 +85,8 @@ def _drawn_back(scene: Scene, spill: npt.NDArray[np.bool_], backend: Backend, st
     renderer.write_image_grad(gradient)
     renderer.backward()
     ways = renderer.parameters.gradients()["points"]
-    # As far as takes off all that spills over, were it linear, and half as much again: less than that flips
-    # slivers over.
+    # As far as takes off all that spills over, were it linear, and half as much again. Further, slivers would
+    # flip over.
     spilt = float((renderer.read_image()[..., 3] * gradient[..., 3]).sum())
     moved = 1.5 * spilt * ways / max(float((ways**2).sum()), 1e-30)
     lengths = np.linalg.norm(moved, axis=1, keepdims=True)

@@ -30,7 +30,6 @@ from warpsplat.render.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
-from warpsplat.svg.write import rounded
 
 
 @dataclass(frozen=True)
@@ -134,8 +133,7 @@ def vectorize(
         if settings.renderer != "gaussian":  # which reach beyond the outlines that this order goes by
             made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     if target.shape[2] == 4 and not made.interrupted:
-        held = rounded(made.scene, made.per_pixel)
-        clear = clear_empty(held, target, settings, backend, made.per_pixel)
+        clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
