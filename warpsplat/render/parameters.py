@@ -15,7 +15,7 @@ from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
 from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
-from warpsplat.scene.scene import starts_of
+from warpsplat.scene.scene import level_ends, starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
@@ -100,6 +100,18 @@ class Parameters:
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
 
+    def prefix(self, count: int) -> Parameters:
+        """The first ``count`` shapes: the same values, in the same memory, with gradients of their own.
+
+        It holds as long as the arrays do: until the next ``rearrange``.
+        """
+        part = Parameters(self._scene.take(np.arange(count)), self.backend)
+        for name, group in part.groups.items():
+            rows, size = group.value.shape
+            group.value = view(self.groups[name].value, wp.float32, (rows, size))
+            part.arrays[name] = view(group.value, ELEMENTS[size], (rows,))
+        return part
+
     def _upload_styles(self, scene: Scene) -> None:
         lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
         numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
@@ -128,6 +140,11 @@ class Parameters:
     def paints(self) -> frozenset[Paint]:
         """Paints of shapes that there are."""
         return frozenset(Paint(k) for k in np.unique(self._scene.paint))
+
+    @property
+    def level_ends(self) -> tuple[int, ...]:
+        """Of the scene."""
+        return level_ends(self._scene)
 
     @property
     def canvas(self) -> Canvas:
