@@ -113,6 +113,8 @@ class Settings:
 
     kind: Kind = Kind.FILL
     """Of new shapes."""
+    mixed: bool = False
+    """Whether new shapes are strokes where these remove more error than fills: where it is a bar."""
     basis: Basis = Basis.SPLINE
     """Of new shapes; splats need cubics."""
     spline_points: int = 12
@@ -121,7 +123,7 @@ class Settings:
     simplify: bool = False
     """Whether an image that is simple gets fewer curves (``place.simple_curves``)."""
     iterations: int = 1000
-    coarse: float = 0.72
+    coarse: float = 0.82
     """Fraction of the iterations on a reduced image."""
     coarse_pixels: int = 100_000
     """Size of that image [pixels]; a smaller image is not reduced."""
@@ -216,7 +218,8 @@ class Settings:
         for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
             if not isinstance(value, kind):
                 raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
-        for name, given in (("through-scales", self.through_scales), ("viewer", self.viewer)):
+        flags = (("through-scales", self.through_scales), ("viewer", self.viewer), ("mixed", self.mixed))
+        for name, given in flags:
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")
         self._check_levels()
@@ -226,6 +229,10 @@ class Settings:
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
+        if self.mixed and self.kind != Kind.FILL:
+            raise UsageError("mixed and open do not go together")
+        if self.mixed and self.renderer != "exact":
+            raise UsageError(f"mixed and the renderer {self.renderer} do not go together")
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
