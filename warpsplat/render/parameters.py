@@ -13,7 +13,18 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.constants import NONE
 from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
-from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
+from warpsplat.scene import (
+    ATTRIBUTES,
+    Attribute,
+    Basis,
+    Canvas,
+    FloatArray,
+    IndexArray,
+    Kind,
+    Paint,
+    Picture,
+    Scene,
+)
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
 from warpsplat.scene.scene import starts_of
 
@@ -63,6 +74,7 @@ class Parameters:
             "rule": self._ints(scene.rule),
             "paint": self._ints(scene.paint),
             "spread": self._ints(scene.spread),
+            "picture": self._ints(scene.picture),
             "stop_first": self._ints(scene.stop_first),
             "point_first": self._ints(scene.first),
             "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
@@ -128,6 +140,11 @@ class Parameters:
     def paints(self) -> frozenset[Paint]:
         """Paints of shapes that there are."""
         return frozenset(Paint(k) for k in np.unique(self._scene.paint))
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """See ``Scene.pictures``."""
+        return self._scene.pictures
 
     @property
     def canvas(self) -> Canvas:
