@@ -9,8 +9,9 @@ import pytest
 
 from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
-from warpsplat.fit.settings import make_settings
+from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.refine import refine
+from warpsplat.jobs.vectorize import Result
 from warpsplat.metrics import score_svg
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
@@ -20,12 +21,19 @@ from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
 
+def improved(
+    text: str, target: np.ndarray, settings: Settings, device: str, **how: bool
+) -> tuple[Result, float]:
+    refined = refine(text, target, settings, Backend.on(device), name="a.svg", **how)
+    return refined.result, refined.before
+
+
 def test_nothing_is_added(device: str) -> None:
     """A file without a background gets none; one with a background keeps it."""
     target = np.full((30, 40, 3), 0.4, np.float32)
     for behind in ("", '<rect width="40" height="30" fill="#ccc"/>'):
         text = f'{HEAD}width="40" height="30">{behind}<path d="M5 5H35V25Z" fill="red"/></svg>'
-        result, before = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
+        result, before = improved(text, target, make_settings(iterations=10), device)
         assert result.score and result.score.psnr > before
         assert result.svg.count("<rect") == (1 if behind else 0)
         assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
@@ -37,7 +45,7 @@ def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
     rng = np.random.default_rng(0)
     moved = replace(scene, points=scene.points + rng.normal(0, 1, scene.points.shape).astype(np.float32))
     text = write_svg(moved)
-    result, before = refine(text, target, make_settings(iterations=120), Backend.on(device), name="a.svg")
+    result, before = improved(text, target, make_settings(iterations=120), device)
     assert result.score
     assert result.score.psnr > before + 4
     assert result.score.paths == 6
@@ -51,7 +59,7 @@ def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
         + ('<path d="M9 9h2v2h2v2h2v2h2v2h-10z" fill="red"/></svg>')
     )
     target = np.full((30, 40, 3), 0.4, np.float32)
-    result, _ = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
+    result, _ = improved(text, target, make_settings(iterations=10), device)
     assert result.score
     assert result.score.nodes <= 20
 
@@ -59,7 +67,7 @@ def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
 def test_no_improvement_changes_nothing(device: str) -> None:
     text = HEAD + FOREIGN["lines"]
     target = (on_white(render_svg(text)) / 255).astype(np.float32)
-    result, _ = refine(text, target, make_settings(iterations=5), Backend.on(device), name="a.svg")
+    result, _ = improved(text, target, make_settings(iterations=5), device)
     assert result.svg == text
 
 
@@ -71,7 +79,7 @@ def test_splines_of_own_files_stay_splines(device: str, kind: Kind) -> None:
     noise = np.random.default_rng(0).normal(0, 0.5, scene.points.shape)
     text = write_svg(replace(scene, points=(scene.points + noise).astype(np.float32)), per_pixel=10)
     settings = make_settings(iterations=60, precision=1)
-    result, before = refine(text, target, settings, Backend.on(device), name="a.svg")
+    result, before = improved(text, target, settings, device)
     assert result.score
     assert result.score.psnr > before + 3
     assert set(result.scene.basis) == {Basis.SPLINE}
@@ -86,7 +94,7 @@ def test_an_own_file_of_both_bases_is_refined(device: str) -> None:
     outlines = [(Kind.FILL, basis, n) for n in (3, 5) for basis in Basis]
     text = write_svg(ragged_scene(outlines, 48, 40, seed=1), per_pixel=3)
     target = np.full((80, 96, 3), 0.4, np.float32)
-    result, before = refine(text, target, make_settings(iterations=10), Backend.on(device), name="a.svg")
+    result, before = improved(text, target, make_settings(iterations=10), device)
     assert result.score
     assert result.score.psnr > before
     assert result.scene.basis.tolist() == [basis for _, basis, _ in outlines]
@@ -105,7 +113,7 @@ def test_shapes_of_any_kind_are_refined_together(device: str) -> None:
     text = f'{HEAD}width="40" height="30">{MIXED}</svg>'
     wanted = text.replace("M3 3h20v20", "M4 4h19v22").replace("#a33", "#393").replace("l9 18", "l7 19")
     target = (on_white(render_svg(wanted)) / 255).astype(np.float32)
-    result, before = refine(text, target, make_settings(iterations=80), Backend.on(device), name="a.svg")
+    result, before = improved(text, target, make_settings(iterations=80), device)
     assert result.score
     assert result.score.psnr > before + 6
     assert result.svg.count("<path") == 3
