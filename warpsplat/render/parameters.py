@@ -152,11 +152,14 @@ class Parameters:
         return self._scene.canvas
 
     def check_chains(self) -> None:
-        """Whether all shapes are cubics and each fill can be halved into two chains of them.
+        """Whether all shapes are cubics of one contour and each fill can be halved into two chains of them.
 
         Raises:
-            ValueError: one is a spline, or has an odd number of cubics.
+            ValueError: one is a spline, or has several contours or an odd number of cubics.
         """
+        several = np.bincount(self._scene.contour_shapes(), minlength=self.shape_count) > 1
+        if several.any():
+            raise ValueError(f"shape {int(np.flatnonzero(several)[0])} has several contours, splats have one")
         splines = self._scene.basis != Basis.CUBIC
         if splines.any():
             raise ValueError(f"shape {int(np.flatnonzero(splines)[0])} is a spline, not cubics")
