@@ -94,6 +94,11 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     step = step_for(target, make_settings(iterations=50), device, threads=1, scene=scene)
     assert step._graph is not None
     launched |= {launch.name for program in step.programs for launch in program.launches}
+    layered = mixed_scene(64, 48)
+    layered = replace(layered, layer=np.minimum(np.arange(len(layered)), 1).astype(np.int32))
+    step = step_for(picture(), make_settings(iterations=50), device, threads=1, scene=layered)
+    assert step._graph is not None
+    launched |= {launch.name for program in step.programs for launch in program.launches}
     every = {kernel.key for module in kernel_modules() for kernel in kernels_of(module)}
     assert every <= launched
     assert launched - every == {"array_scan", "radix_sort_pairs"}

@@ -26,7 +26,7 @@ from warpsplat.scene import (
     Scene,
 )
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
-from warpsplat.scene.scene import starts_of
+from warpsplat.scene.scene import level_ends, starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
@@ -112,6 +112,18 @@ class Parameters:
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
 
+    def prefix(self, count: int) -> Parameters:
+        """The first ``count`` shapes: the same values, in the same memory, with gradients of their own.
+
+        It holds as long as the arrays do: until the next ``rearrange``.
+        """
+        part = Parameters(self._scene.take(np.arange(count)), self.backend)
+        for name, group in part.groups.items():
+            rows, size = group.value.shape
+            group.value = view(self.groups[name].value, wp.float32, (rows, size))
+            part.arrays[name] = view(group.value, ELEMENTS[size], (rows,))
+        return part
+
     def _upload_styles(self, scene: Scene) -> None:
         lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
         numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
@@ -145,6 +157,11 @@ class Parameters:
     def pictures(self) -> tuple[Picture, ...]:
         """See ``Scene.pictures``."""
         return self._scene.pictures
+
+    @property
+    def level_ends(self) -> tuple[int, ...]:
+        """Of the scene."""
+        return level_ends(self._scene)
 
     @property
     def canvas(self) -> Canvas:

@@ -347,3 +347,8 @@ def ranges(low: npt.NDArray[np.integer], counts: npt.NDArray[np.integer]) -> Ind
 def starts_of(counts: npt.NDArray[np.integer]) -> IntArray:
     """Prefix sum with a 0 in front: ``Scene.first`` of shapes with ``counts`` points."""
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+
+
+def level_ends(scene: Scene) -> tuple[int, ...]:
+    """Shapes of each layer and of those before it; not of the last, which has all."""
+    return tuple(int(i) + 1 for i in np.flatnonzero(np.diff(scene.layer)))

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from warpsplat import __version__
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
@@ -115,6 +116,9 @@ def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
 
 STROKE_FIRST = ' paint-order="stroke"'
 
+LEVEL_ID = "level-"
+"""What the name of a layer's group begins with; the number of shapes up to its end follows."""
+
 
 def _colors(scene: Scene, ramps: Mapping[int, str]) -> list[str]:
     """The paint of each shape; ``ramps``: identifiers of gradients."""
@@ -154,8 +158,9 @@ def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
 
 
 def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float) -> Iterator[str]:
-    """Neighbours of one kind share a group, and what it says of them; neighbours of one opacity a group in it
-    where that is shorter. Twins are one path, pictures what they are.
+    """Layers, where there are several, are groups that say how many shapes they complete. In them neighbours
+    of one kind share a group, and what it says of them; neighbours of one opacity a group in it where that
+    is shorter. Twins are one path, pictures what they are.
     """
     colors, opacities = _colors(scene, ramps), _opacities(scene, opacity_scale)
     data = PathData(scene, per_pixel)
@@ -164,9 +169,17 @@ def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_sc
     rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
     both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
     pictures = (scene.paint == Paint.PICTURE).tolist()
-    for (is_picture, in_group), shapes in itertools.groupby(
-        np.flatnonzero(scene.twin == 0).tolist(), lambda i: (pictures[i], strokes[i] and not has_twin[i])
+    ends = level_ends(scene)
+    layer = np.searchsorted(ends, np.arange(len(scene)), "right").tolist()
+    names = [f"{LEVEL_ID}{end}" for end in (*ends, len(scene))]
+    last = None
+    for (level, is_picture, in_group), shapes in itertools.groupby(
+        np.flatnonzero(scene.twin == 0).tolist(),
+        lambda i: (layer[i], pictures[i], strokes[i] and not has_twin[i]),
     ):
+        if ends and level != last:
+            yield ("" if last is None else "</g>") + f'<g id="{names[level]}">'
+            last = level
         if is_picture:
             yield from (_picture(scene.pictures[scene.picture[i]], scene, per_pixel) for i in shapes)
             continue
@@ -188,6 +201,8 @@ def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_sc
                 for i in alike
             )
             yield from (group[0], *paths, group[1]) if shared else paths
+        yield "</g>"
+    if last is not None:
         yield "</g>"
 
 
