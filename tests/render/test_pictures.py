@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.helpers import renderer_for
-from tests.scenes import disc, random_scene
+from tests.scenes import picture_scene, random_scene
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
-from warpsplat.scene import NO_PICTURE, Canvas, Kind, Paint, Picture, Scene
+from warpsplat.scene import NO_PICTURE, Canvas, Kind, Picture, Scene
 
 
 def shown(height: int, width: int, seed: int = 0) -> Picture:
@@ -25,16 +25,7 @@ def shown(height: int, width: int, seed: int = 0) -> Picture:
 
 def between(below: Scene, above: Scene, picture: Picture) -> Scene:
     """The picture on a rectangle between two scenes."""
-    frame = disc(500, 60, 30)  # all of the canvas
-    frame = replace(
-        frame,
-        canvas=below.canvas,
-        opacities=np.ones(1, np.float32),
-        paint=np.array([Paint.PICTURE], np.int32),
-        picture=np.zeros(1, np.int32),
-        pictures=(picture,),
-    )
-    return below.append(frame).append(above)
+    return below.append(picture_scene(below.canvas, picture)).append(above)
 
 
 @pytest.mark.parametrize("clear", [False, True])
