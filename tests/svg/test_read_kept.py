@@ -154,6 +154,21 @@ def test_entities_and_name_spaces() -> None:
     assert psnr(shows(text), shows(written)) > 40
 
 
+def test_style_sheets_hold_for_what_is_kept_only() -> None:
+    """Those inside of it as well; and what a root says of its own size, for the root only."""
+    sheet = "<style>path{stroke:blue} svg{fill:#070}</style>"
+    text = (
+        f'{HEAD}width="40" height="30" style="width:9px; stroke-width:3; height:100%">{BLUR}{BELOW}'
+        f'<g filter="url(#f)">{sheet}<path d="M5 5h9v9z"/></g>'
+        '<path d="M15 8l20 3l-9 15z" style="stroke:none"/></svg>'
+    )
+    written = write_svg(load_kept(text, 40, 30, "a.svg").scene)
+    assert written.count("<style>") == 1
+    assert ".kept0 path{" in written
+    assert ' style=" stroke-width:3; "' in written
+    assert psnr(shows(text), shows(written)) > 40
+
+
 def test_nothing_else_changes() -> None:
     text = f'{HEAD}width="40" height="30">{BELOW}{ABOVE}</svg>'
     read = load_kept(text, 40, 30, "a.svg")

@@ -9,7 +9,7 @@ from xml.sax.saxutils import escape
 
 from warpsplat.errors import ImageError
 from warpsplat.svg.css import RULE, without_comments
-from warpsplat.svg.document import Document, Element
+from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.inspect import view_box
 
 HEAD = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
@@ -19,8 +19,9 @@ REFERENCE = re.compile(
 )
 """Mention of another element."""
 
+STYLE_OF_ROOTS = re.compile(r"(?<![\w-])(?:x|y|width|height|overflow)\s*:[^;\"']*;?")
 OF_ROOTS = frozenset({"x", "y", "width", "height", "version", "baseProfile", "overflow"})
-"""Attributes that mean nothing, or something else, where a root has become an element."""
+"""What means nothing, or something else, where a root has become an element: in its style, and attributes."""
 
 AT_RULE = re.compile(r"@(?:charset|namespace)\b[^;{}]*;|@font-face\s*\{[^{}]*\}")
 RELATIVE = re.compile(r"[+~](?!=)|:(?!hover|active|focus|visited|link)")
@@ -41,6 +42,7 @@ class Excerpts:
         spans, self._entities = _spans(self._data)
         self._spans = dict(zip(document.root.iter(), spans, strict=True))
         self._places = {element: i for i, element in enumerate(self._spans)}
+        self._sheets = [(s[0], s[3]) for element, s in self._spans.items() if name_of(element) == "style"]
         self._named: set[Element] = set()
         """Ancestors whose ``id`` has been written."""
 
@@ -74,7 +76,7 @@ class Excerpts:
         while todo:
             for names in REFERENCE.findall(todo.pop()):
                 target = self._document.called(names[0] or names[1])
-                if target is not None and target not in given | found:
+                if target is not None and target not in given and target not in found:
                     found.add(target)
                     todo += self._texts(target)
         return [element for element in found if not found & set(self.path(element))]
@@ -105,7 +107,14 @@ class Excerpts:
         return text
 
     def _whole(self, element: Element) -> str:
-        return self._slice(self._spans[element][0], self._spans[element][3])
+        """An element without style sheets, which ``style`` has."""
+        start, _, _, end = self._spans[element]
+        parts = []
+        for sheet_start, sheet_end in self._sheets:
+            if start <= sheet_start and sheet_end <= end:
+                parts.append(self._slice(start, sheet_start))
+                start = sheet_end
+        return "".join([*parts, self._slice(start, end)])
 
     def _tail(self, element: Element) -> str:
         return self._slice(*self._spans[element][2:])
@@ -127,6 +136,10 @@ class Excerpts:
         if element is self._document.root and not re.search(r"\sxmlns\s*=", tag):
             own += ' xmlns=""'
         tag = ATTRIBUTE.sub(lambda found: "" if found[1] in left_out else found[0], tag)
+        if element is self._document.root:
+            tag = re.sub(
+                r"(?<=\sstyle)\s*=\s*(?:\"[^\"]*\"|'[^']*')", lambda s: STYLE_OF_ROOTS.sub("", s[0]), tag
+            )
         return f"{tag[:-1].rstrip()}{own}>"
 
 

@@ -22,6 +22,9 @@ from warpsplat.svg.shapes import Shape
 from warpsplat.svg.structure import read_parts
 from warpsplat.svg.viewer import premultiplied, render_svg
 
+MAX_PICTURES = 1000
+"""Most pictures of a scene: each is drawn by itself, which takes a tenth of a second."""
+
 MARGIN = 4
 """By how much a picture's rectangle is larger than what is seen of it [px]: its edges move nothing."""
 
@@ -102,6 +105,8 @@ def _with_pictures(
     shared = excerpts.style(scope) + (f"<defs>{definitions}</defs>" if definitions else "")
     shapes: list[Shape] = []
     is_first = True
+    if sum(1 for is_kept, _ in groupby(parts, lambda part: isinstance(part, Kept)) if is_kept) > MAX_PICTURES:
+        raise ImageError(f"has what no path can show in more than {MAX_PICTURES} places between paths")
     for is_kept, run in groupby(parts, lambda part: isinstance(part, Kept)):
         if not is_kept:
             shapes += [part for part in run if isinstance(part, Shape)]
