@@ -85,7 +85,7 @@ def command(
         result, before = refined.result, refined.before
         write_result(output, result.svg.encode())
     if refined.kept and not quiet:
-        say(f"{input_name(svg)}: kept as it is: {refined.kept}", err=True)
+        say(f"warpsplat: {input_name(svg)}: kept as it is: {refined.kept}", err=True)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if as_json:
         say(json.dumps(values), err=output == STANDARD)
