@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import resvg_py
 from PIL import Image
 
 from tests.svg.foreign import HEAD
@@ -21,7 +22,7 @@ from warpsplat.svg.document import Document
 from warpsplat.svg.excerpts import Excerpts
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import load_kept
-from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.viewer import on_white
 from warpsplat.svg.write import write_svg
 
 BLUR = '<filter id="f"><feGaussianBlur stdDeviation="2"/></filter>'
@@ -89,7 +90,10 @@ KEPT = {
 
 
 def shows(text: str, width: int = 40, height: int = 30) -> np.ndarray:
-    return on_white(render_svg(text, width=width, height=height))
+    png = resvg_py.svg_to_bytes(
+        svg_string=text, width=width, height=height, dpi=96.0, skip_system_fonts="<text" not in text
+    )
+    return on_white(Image.open(io.BytesIO(bytes(png))))
 
 
 @pytest.mark.parametrize("name", KEPT)
