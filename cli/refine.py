@@ -87,6 +87,8 @@ def command(
     if refined.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {refined.kept}", err=True)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
+    if keep:
+        values["kept"] = refined.kept
     if as_json:
         say(json.dumps(values), err=output == STANDARD)
     elif not quiet:

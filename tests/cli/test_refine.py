@@ -51,7 +51,9 @@ def test_what_is_kept_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "filter" in one_line(capsys.readouterr().err)
     assert run(*arguments, "--keep", "--json") == 0
     captured = capsys.readouterr()
-    assert json.loads(captured.out)["psnr"] > json.loads(captured.out)["psnr_before"]
+    values = json.loads(captured.out)
+    assert values["psnr"] > values["psnr_before"]
+    assert values["kept"] == "<path> (filter)"
     assert one_line(captured.err).endswith("a.svg: kept as it is: <path> (filter)")
     assert KEPT.partition("</filter>")[2] in output.read_text()
     assert run(*arguments, "--keep", "-q") == 0

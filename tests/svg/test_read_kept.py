@@ -193,6 +193,13 @@ def test_neighbours_share_a_picture() -> None:
     assert markup.index(">a<") < markup.index(">b<")
 
 
+def test_what_shows_nothing_here_is_said() -> None:
+    body = f'{BELOW}<image href="elsewhere.png" width="9" height="9"/>{ABOVE}'
+    read = load_kept(f'{HEAD}width="40" height="30">{body}</svg>', 40, 30, "a.svg")
+    assert read.kept == "<image>; 1 of 1 such places show nothing here"
+    assert "elsewhere.png" in write_svg(read.scene)
+
+
 @pytest.mark.parametrize(
     ("body", "words"),
     [
