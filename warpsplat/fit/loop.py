@@ -143,7 +143,8 @@ def fit(
             settled = True
         density = settings.density
         surgical = done < density.stop * settings.iterations
-        late = done >= LOOK_FROM * settings.iterations
+        # What is kept may show other than over what lies below.
+        late = done >= LOOK_FROM * settings.iterations or bool(start.pictures)
         if settings.viewer and finish and finest and late and not rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
         due = density.interval > 0 and done % density.interval == 0

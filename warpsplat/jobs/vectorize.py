@@ -81,7 +81,7 @@ class Result:
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
-            "curves": len(self.scene),
+            "curves": len(self.scene) - len(self.scene.pictures),
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
