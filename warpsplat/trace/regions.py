@@ -37,6 +37,14 @@ SPECK = 8
 BESIDE = 5
 """How far from a thin part the colours are looked for that it may be mixed of [px]."""
 
+SMALL = 60
+"""Pixels of the largest region that may be given up."""
+
+UNSEEN = 120.0
+"""How far all the pixels of a region may be from mixtures of what is around it, taken together, for that
+[levels].
+"""
+
 MOST_THIN = 4000
 """Thin parts that are looked at; a picture with more is no drawing."""
 
@@ -97,6 +105,7 @@ def find_regions(image: Floats) -> Regions:
     _assign(calm, labels, pure)
     painted = paint[_fill(labels, pure)]
     _adopt(calm, painted, pure, seeds)
+    _prune(calm, painted, pure, noise)
     regions = components(painted, image)
     return Regions(regions, pure, _paint_of(regions, painted), colorings, noise)
 
@@ -269,6 +278,23 @@ def _adopt(image: Floats, painted: Ints, pure: Floats, seeds: Bools) -> None:
         painted[rows, columns] = painted.reshape(-1)[source]
         pure[rows, columns] = pure.reshape(-1, pure.shape[2])[source]
         orphan[rows[found], columns[found]] = False
+
+
+def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
+    """Give up small regions that are seen as little more than mixtures of what is around them."""
+    regions = components(painted, image)
+    small = np.bincount(regions.reshape(-1)) <= SMALL
+    doubtful = small[regions]
+    rows, columns = np.nonzero(doubtful)
+    if not len(rows) or doubtful.all():
+        return
+    large = np.where(doubtful, NOBODY, painted).astype(np.int32)
+    result = explain(image, large, pure, rows, columns)
+    seen = np.maximum(result.residual - (MIXED + noise), 0)
+    energy = np.bincount(regions[rows, columns], seen, len(small))
+    gone = energy[regions[rows, columns]] <= UNSEEN
+    rows, columns = rows[gone], columns[gone]
+    painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
 
 
 def _thin_parts(

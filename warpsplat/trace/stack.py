@@ -20,8 +20,8 @@ SEEN, EDGE, HIDDEN = range(3)
 UNDER = 1.0
 """How far an outline goes on under the region above it before it turns [px]."""
 
-DEPTHS = (1.5, 0.5)
-"""How far beyond its boundary a hidden outline goes, the first that there is room for [px]."""
+NEAR, DEEP = 0.5, 16.0
+"""How far beyond its boundary a hidden outline is looked for, half as far it goes [px]."""
 
 MARGIN = 0.7
 """What a hidden outline keeps from where it would be seen [px]."""
@@ -59,6 +59,8 @@ class Tracer:
     """Which of them to use, shape (crack,)."""
     offsets: Floats
     """Of the cracks [px]."""
+    trend: Floats
+    """Direction of the outline at the cracks, shape (crack, 2)."""
     runs: list[Run]
     """What was found so far."""
 
@@ -221,19 +223,27 @@ class Tracer:
         """Corners of a way from ``start`` to ``end`` under what lies above the region."""
         if self._is_free(region, start, end):
             return np.zeros((0, 2))
-        steps = STEPS[self.loops.ways[cracks]]
-        outward = np.stack([steps[:, 1], -steps[:, 0]], axis=1).astype(np.float64)
-        middle = self.loops.vertices[cracks] + 0.5 * steps
-        deep = middle + DEPTHS[0] * outward
-        inside = self._covered(region, deep) & self._covered(region, deep + MARGIN * outward)
-        way = np.where(inside[:, None], deep, middle + DEPTHS[1] * outward)
-        goals = np.concatenate([way, end[None]])
+        goals = np.concatenate([self._middles(region, cracks), end[None]])
         here, at, found = start, -1, []
         while at < len(goals) - 1:
             at = self._furthest(region, here, goals, at)
             here = goals[at]
             found.append(here)
         return np.asarray(found[:-1]).reshape(-1, 2)
+
+    def _middles(self, region: int, cracks: Ints) -> Floats:
+        """Points beyond cracks, halfway through what lies above the region there, shape (crack, 2)."""
+        trend = self.trend[cracks]
+        outward = np.stack([trend[:, 1], -trend[:, 0]], axis=1) / np.hypot(*trend.T)[:, None]
+        steps = STEPS[self.loops.ways[cracks]]
+        middle = self.loops.vertices[cracks] + 0.5 * steps
+        reach, open_ = np.full(len(cracks), NEAR), np.ones(len(cracks), np.bool_)
+        for depth in np.arange(NEAR, DEEP, 0.5):
+            open_ &= self._covered(region, middle + depth * outward)
+            reach[open_] = depth
+        straight_out = np.stack([steps[:, 1], -steps[:, 0]], axis=1)
+        near = middle + NEAR * straight_out
+        return np.where(reach[:, None] > NEAR, middle + 0.5 * reach[:, None] * outward, near)
 
     def _furthest(self, region: int, here: Floats, goals: Floats, at: int) -> int:
         """The last of the goals after ``at`` that is reached in a straight line."""

@@ -14,7 +14,7 @@ from warpsplat.trace.curves import Pieces, fit_runs
 from warpsplat.trace.grids import Bools, Floats, Ints
 from warpsplat.trace.joints import ALONE, CORNER, FREE, LINE_HANDLE, SMOOTH
 from warpsplat.trace.order import Layers, find_layers
-from warpsplat.trace.outlines import crack_offsets, places
+from warpsplat.trace.outlines import crack_offsets, places, trends
 from warpsplat.trace.planar import Loops, find_loops
 from warpsplat.trace.regions import Coloring, Regions, find_regions
 from warpsplat.trace.stack import Outline, Tracer, assembled
@@ -88,7 +88,7 @@ def trace_regions(image: Floats, regions: Regions) -> Traced:
     layers = find_layers(loops, sizes, unpainted)
     opacity = np.array([coloring.color[3] for coloring in regions.colorings])[regions.paint]
     see_through = (opacity < OPAQUE) | unpainted
-    tracer = Tracer(loops, regions.labels, layers, see_through, points, good, offsets, [])
+    tracer = Tracer(loops, regions.labels, layers, see_through, points, good, offsets, trends(loops), [])
     outlines = _outlines(tracer, layers, loops)
     fitted = fit_runs(tracer.runs, tolerance_of(offsets, loops, regions.noise))
     shapes = []
