@@ -12,7 +12,7 @@ import numpy as np
 from warpsplat.trace.corners import find_corners, lengths
 from warpsplat.trace.grids import Bools, Floats, Ints
 
-SAMPLES = 20
+SAMPLES = 16
 """Points that a candidate is measured at."""
 
 KNOTS = 36
@@ -30,7 +30,7 @@ LINE_COST, CUBIC_COST = 1.0, 1.4
 ERROR_COST = 0.35
 """What an error of the size of the tolerance counts for each piece."""
 
-TURNS = 4
+TURNS = 3
 """Times that the parameters of points are found anew."""
 
 FLAT_SLOPE = 0.012
@@ -379,12 +379,17 @@ def fit_cubics(
 
 
 def _with_handles(start: Floats, way: Floats, back: Floats, end: Floats, points: Floats, t: Floats) -> Floats:
+    """The handles by least squares, in the directions given."""
     s = 1 - t
-    b0, b1, b2, b3 = s**3, 3 * s * s * t, 3 * s * t * t, t**3
-    rest = points - (b0 + b1)[..., None] * start[:, None] - (b2 + b3)[..., None] * end[:, None]
-    one, two = b1[..., None] * way[:, None], b2[..., None] * back[:, None]
-    a11, a22, a12 = (one**2).sum((1, 2)), (two**2).sum((1, 2)), (one * two).sum((1, 2))
-    y1, y2 = (one * rest).sum((1, 2)), (two * rest).sum((1, 2))
+    near_start, near_end = s * s * (1 + 2 * t), t * t * (3 - 2 * t)
+    b1, b2 = 3 * s * s * t, 3 * s * t * t
+    a11, a22 = (b1 * b1).sum(axis=1), (b2 * b2).sum(axis=1)
+    a12 = (b1 * b2).sum(axis=1) * (way * back).sum(axis=1)
+    y1, y2 = np.zeros(len(t)), np.zeros(len(t))
+    for axis in (0, 1):
+        rest = points[..., axis] - near_start * start[:, None, axis] - near_end * end[:, None, axis]
+        y1 += (b1 * rest).sum(axis=1) * way[:, axis]
+        y2 += (b2 * rest).sum(axis=1) * back[:, axis]
     det = a11 * a22 - a12**2
     safe = np.where(np.abs(det) > 1e-9, det, 1)
     first, second = (a22 * y1 - a12 * y2) / safe, (a11 * y2 - a12 * y1) / safe
@@ -397,19 +402,25 @@ def _with_handles(start: Floats, way: Floats, back: Floats, end: Floats, points:
 
 def _at(cubics: Floats, t: Floats) -> Floats:
     s = 1 - t
-    weights = np.stack([s**3, 3 * s * s * t, 3 * s * t * t, t**3], axis=-1)
-    return np.asarray(np.einsum("nkw,nwc->nkc", weights, cubics))
+    weights = s**3, 3 * s * s * t, 3 * s * t * t, t**3
+    return np.stack(
+        [sum(w * cubics[:, k, axis, None] for k, w in enumerate(weights)) for axis in (0, 1)], axis=-1
+    )
 
 
 def _nearer(cubics: Floats, points: Floats, t: Floats) -> Floats:
     """Parameters of nearer points: a step of Newton's method."""
     hodograph = 3 * np.diff(cubics, axis=1)
+    second = 2 * np.diff(hodograph, axis=1)
     s = 1 - t
-    speed = np.einsum("nkw,nwc->nkc", np.stack([s * s, 2 * s * t, t * t], axis=-1), hodograph)
-    bend = np.einsum("nkw,nwc->nkc", np.stack([s, t], axis=-1), 2 * np.diff(hodograph, axis=1))
     away = _at(cubics, t) - points
-    slope = (speed**2).sum(axis=2) + (away * bend).sum(axis=2)
-    step = (away * speed).sum(axis=2) / np.where(np.abs(slope) > 1e-9, slope, 1)
+    slope, along = np.zeros_like(t), np.zeros_like(t)
+    for axis in (0, 1):
+        h, c, off = hodograph[:, :, axis, None], second[:, :, axis, None], away[..., axis]
+        speed = s * s * h[:, 0] + 2 * s * t * h[:, 1] + t * t * h[:, 2]
+        slope += speed * speed + off * (s * c[:, 0] + t * c[:, 1])
+        along += off * speed
+    step = along / np.where(np.abs(slope) > 1e-9, slope, 1)
     moved = np.clip(t - np.clip(step, -0.1, 0.1), 0, 1)
     moved[:, 0], moved[:, -1] = 0, 1
     return np.maximum.accumulate(moved, axis=1)

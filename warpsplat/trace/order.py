@@ -17,8 +17,80 @@ LOOK = 6
 STRAIGHT = 0.85
 """Cosine from which on an outline goes straight on there."""
 
+THIN = 7.0
+"""Width of the widest region that is a line [px]."""
+
 SIBLINGS = 400
 """Neighbours that are put in order by their outlines; more are by size."""
+
+
+@dataclass(frozen=True)
+class Tree:
+    """What lies in the holes of what."""
+
+    children: dict[int, list[list[int]]]
+    """The networks of regions in the holes of each region; those of NOBODY make up the picture."""
+    parent: Ints
+    """The region in a hole of which each lies; NOBODY for the outermost. Shape (region,)."""
+    touches: Bools
+    """Whether it has a boundary with its parent, shape (region,)."""
+
+    def downwards(self) -> list[int]:
+        """All regions, parents before children."""
+        order, waiting = [], [NOBODY]
+        while waiting:
+            for siblings in self.children.get(waiting.pop(), []):
+                order.extend(siblings)
+                waiting.extend(siblings)
+        return order
+
+
+def find_tree(loops: Loops, count: int) -> Tree:
+    """The tree of ``count`` regions."""
+    outer: dict[int, int] = {}
+    touching: set[tuple[int, int]] = set()
+    inside: dict[int, list[int]] = {}
+    for loop in range(len(loops)):
+        region, network = int(loops.region[loop]), int(loops.network[loop])
+        # What is outside of the picture has its loop around the picture, as a hole of it.
+        if loops.is_hole[loop]:
+            outer[network] = region
+            others = loops.others[loops.first[loop] : loops.first[loop + 1]]
+            touching |= {(int(other), region) for other in np.unique(others)}
+        else:
+            inside.setdefault(network, []).append(region)
+    children: dict[int, list[list[int]]] = {}
+    parent = np.full(count, NOBODY, np.int64)
+    for network, regions in inside.items():
+        around = outer.get(network, NOBODY)
+        children.setdefault(around, []).append(regions)
+        parent[regions] = around
+    touches = np.array([(region, int(parent[region])) in touching for region in range(count)], np.bool_)
+    return Tree(children, parent, touches)
+
+
+def bare_ground(tree: Tree, like_ground: Bools) -> Bools:
+    """Which regions of the ground's colour need no paint: nothing that is painted lies under them."""
+    bare = np.zeros(len(like_ground), np.bool_)
+    for region in tree.downwards():
+        around = int(tree.parent[region])
+        if not like_ground[region]:
+            continue
+        if around == NOBODY or bare[around]:
+            bare[region] = True
+        elif tree.touches[region]:
+            beyond = int(tree.parent[around])
+            bare[region] = beyond == NOBODY or bare[beyond]
+    return bare
+
+
+def over_clear(tree: Tree, clear: Bools) -> Bools:
+    """Regions that have something clear inside of them."""
+    found = clear.copy()
+    for region in reversed(tree.downwards()):
+        if found[region] and tree.parent[region] != NOBODY:
+            found[tree.parent[region]] = True
+    return np.asarray(found)
 
 
 @dataclass(frozen=True)
@@ -31,44 +103,31 @@ class Layers:
     """The painted regions from the back on."""
 
 
-def find_layers(loops: Loops, sizes: Ints, unpainted: Bools) -> Layers:
+def find_layers(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Layers:
     """Put the regions in order.
 
     Args:
         loops: of all regions.
+        tree: of the regions.
         sizes: pixels of each region, shape (region,).
         unpainted: regions that lie below all others and are left out, shape (region,).
     """
-    children = _tree(loops, len(sizes))
     votes = _votes(loops, unpainted)
+    cracks = np.bincount(
+        np.maximum(loops.region, 0), np.where(loops.region >= 0, np.diff(loops.first), 0), len(sizes)
+    )
+    thin = 2 * sizes < THIN * cracks
     order: list[int] = []
     waiting = [NOBODY]
     while waiting:
         region = waiting.pop()
         if region != NOBODY and not unpainted[region]:
             order.append(region)
-        for siblings in children.get(region, []):
-            waiting.extend(reversed(_sorted(siblings, votes, sizes)))
+        for siblings in tree.children.get(region, []):
+            waiting.extend(reversed(_sorted(siblings, votes, sizes, thin)))
     rank = np.full(len(sizes), -1, np.int64)
     rank[order] = np.arange(len(order))
     return Layers(rank, np.asarray(order, np.int64))
-
-
-def _tree(loops: Loops, count: int) -> dict[int, list[list[int]]]:
-    """For each region the networks of regions that lie in its holes."""
-    outer = {}
-    inside: dict[int, list[int]] = {}
-    for loop in range(len(loops)):
-        region, network = int(loops.region[loop]), int(loops.network[loop])
-        # What is outside of the picture has its loop around the picture, as a hole of it.
-        if loops.is_hole[loop]:
-            outer[network] = region
-        else:
-            inside.setdefault(network, []).append(region)
-    tree: dict[int, list[list[int]]] = {}
-    for network, regions in inside.items():
-        tree.setdefault(outer.get(network, NOBODY), []).append(regions)
-    return tree
 
 
 def _votes(loops: Loops, unpainted: Bools) -> dict[int, dict[int, float]]:
@@ -100,16 +159,18 @@ def _votes(loops: Loops, unpainted: Bools) -> dict[int, dict[int, float]]:
     return votes
 
 
-def _sorted(siblings: list[int], votes: dict[int, dict[int, float]], sizes: Ints) -> list[int]:
-    """From the back on."""
-    by_size = sorted(siblings, key=lambda region: -int(sizes[region]))
+def _sorted(siblings: list[int], votes: dict[int, dict[int, float]], sizes: Ints, thin: Bools) -> list[int]:
+    """From the back on. Lines lie below: what they separate is drawn over them, and where it does not quite
+    meet, the line shows.
+    """
+    by_size = sorted(siblings, key=lambda region: (not thin[region], -int(sizes[region])))
     if len(by_size) > SIBLINGS or len(by_size) < 2:
         return by_size
     index = {region: i for i, region in enumerate(by_size)}
     above: Floats = np.zeros((len(by_size), len(by_size)))
     for region in by_size:
         for other, weight in votes.get(region, {}).items():
-            if other in index:
+            if other in index and not thin[region]:
                 above[index[region], index[other]] += weight
     net = above - above.T
     left = list(range(len(by_size)))

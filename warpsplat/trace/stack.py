@@ -70,6 +70,8 @@ class Tracer:
         region = int(self.loops.region[loop])
         others = self.loops.others[low:high]
         kinds = self._kinds(region, others)
+        if self.loops.is_hole[loop] and self.see_through[others].any():
+            kinds[:] = SEEN
         if (kinds == HIDDEN).all():
             if self.loops.is_hole[loop]:
                 return []

@@ -13,7 +13,7 @@ from warpsplat.scene.scene import IntArray, starts_of
 from warpsplat.trace.curves import Pieces, fit_runs
 from warpsplat.trace.grids import Bools, Floats, Ints
 from warpsplat.trace.joints import ALONE, CORNER, FREE, LINE_HANDLE, SMOOTH
-from warpsplat.trace.order import Layers, find_layers
+from warpsplat.trace.order import Layers, Tree, bare_ground, find_layers, find_tree, over_clear
 from warpsplat.trace.outlines import crack_offsets, places, trends
 from warpsplat.trace.planar import Loops, find_loops
 from warpsplat.trace.regions import Coloring, Regions, find_regions
@@ -83,11 +83,12 @@ def trace_regions(image: Floats, regions: Regions) -> Traced:
     loops = find_loops(regions.labels, image)
     offsets = crack_offsets(loops, image, regions.labels, regions.pure)
     points, good = places(loops, offsets)
-    unpainted, ground = _ground(regions)
+    tree = find_tree(loops, len(regions.paint))
+    unpainted, ground = _ground(regions, tree)
     sizes = np.bincount(regions.labels.reshape(-1), minlength=len(regions.paint))
-    layers = find_layers(loops, sizes, unpainted)
+    layers = find_layers(loops, tree, sizes, unpainted)
     opacity = np.array([coloring.color[3] for coloring in regions.colorings])[regions.paint]
-    see_through = (opacity < OPAQUE) | unpainted
+    see_through = over_clear(tree, opacity < OPAQUE) | unpainted
     tracer = Tracer(loops, regions.labels, layers, see_through, points, good, offsets, trends(loops), [])
     outlines = _outlines(tracer, layers, loops)
     fitted = fit_runs(tracer.runs, tolerance_of(offsets, loops, regions.noise))
@@ -109,7 +110,7 @@ def tolerance_of(offsets: Floats, loops: Loops, noise: float) -> float:
     return (COARSE if moved.mean() < 0.1 else TOLERANCE) + NOISY * noise if len(moved) else TOLERANCE
 
 
-def _ground(regions: Regions) -> tuple[Bools, Coloring | None]:
+def _ground(regions: Regions, tree: Tree) -> tuple[Bools, Coloring | None]:
     """Regions that are not painted, and the colour of the canvas, None if it is transparent."""
     clear = np.array([coloring.clear for coloring in regions.colorings])
     if clear[regions.paint].any() or any(c.color[3] < OPAQUE for c in regions.colorings):
@@ -121,7 +122,7 @@ def _ground(regions: Regions) -> tuple[Bools, Coloring | None]:
     paint = int(areas.argmax())
     if regions.colorings[paint].ramp is not None:
         return np.zeros(len(regions.paint), np.bool_), None
-    return regions.paint == paint, regions.colorings[paint]
+    return bare_ground(tree, regions.paint == paint), regions.colorings[paint]
 
 
 def _outlines(tracer: Tracer, layers: Layers, loops: Loops) -> dict[int, list[Outline]]:
