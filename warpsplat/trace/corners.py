@@ -20,6 +20,9 @@ SIDE = 6.0
 FAR = 4.0
 """How far a corner may lie from the outline's points [px]: the tips of stars do."""
 
+NEAR = 1.2
+"""The same of one with short sides."""
+
 Corner = tuple[float, Floats]
 """Where along the polyline, and the point."""
 
@@ -99,10 +102,12 @@ def _located(points: Floats, along: Floats, closed: bool, corners: list[int]) ->
             after = after if number + 1 < len(corners) else float(along[corners[0]]) + total
         else:
             before, after = max(before, -ROUNDED), min(after, total + ROUNDED)
+        low, high = max(here - SIDE, before + ROUNDED), min(here + SIDE, after - ROUNDED)
         point = _meeting(
-            _side(points, along, closed, max(here - SIDE, before + ROUNDED), here - ROUNDED),
-            _side(points, along, closed, here + ROUNDED, min(here + SIDE, after - ROUNDED)),
+            _side(points, along, closed, low, here - ROUNDED),
+            _side(points, along, closed, here + ROUNDED, high),
             points[i],
+            FAR if min(here - low, high - here) > 0.6 * SIDE else NEAR,
         )
         result.append((here, point))
     return result
@@ -120,8 +125,10 @@ def _side(
     return middle, way
 
 
-def _meeting(one: tuple[Floats, Floats] | None, other: tuple[Floats, Floats] | None, near: Floats) -> Floats:
-    """Where two sides meet; ``near`` where they do not, or far away."""
+def _meeting(
+    one: tuple[Floats, Floats] | None, other: tuple[Floats, Floats] | None, near: Floats, far: float
+) -> Floats:
+    """Where two sides meet; ``near`` where they do not, or farther away from it than ``far`` [px]."""
     if one is None or other is None:
         return near
     matrix = np.stack([one[1], -other[1]], axis=1)
@@ -129,4 +136,4 @@ def _meeting(one: tuple[Floats, Floats] | None, other: tuple[Floats, Floats] | N
         return near
     share = np.linalg.solve(matrix, other[0] - one[0])
     point = one[0] + share[0] * one[1]
-    return np.asarray(point if np.hypot(*(point - near)) <= FAR else near)
+    return np.asarray(point if np.hypot(*(point - near)) <= far else near)

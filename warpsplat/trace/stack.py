@@ -5,6 +5,7 @@ the lower one goes on under it, the shortest way.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,9 @@ UNDER = 1.0
 
 NEAR, DEEP = 0.5, 16.0
 """How far beyond its boundary a hidden outline is looked for, half as far it goes [px]."""
+
+ASIDE = 1.0
+"""Area of the region that a hidden outline may cut off [px squared]."""
 
 MARGIN = 0.7
 """What a hidden outline keeps from where it would be seen [px]."""
@@ -223,14 +227,22 @@ class Tracer:
 
     def _hidden(self, region: int, cracks: Ints, start: Floats, end: Floats) -> Floats:
         """Corners of a way from ``start`` to ``end`` under what lies above the region."""
-        if self._is_free(region, start, end):
-            return np.zeros((0, 2))
-        goals = np.concatenate([self._middles(region, cracks), end[None]])
-        here, at, found = start, -1, []
+        goals = np.concatenate([start[None], self._middles(region, cracks), end[None]])
+        vertices = self.loops.vertices[np.append(cracks, cracks[-1])].astype(np.float64)
+        ahead = np.concatenate([vertices, vertices[-1:]])
+        swept = np.cumsum(vertices[:, 0] * ahead[1:, 1] - vertices[:, 1] * ahead[1:, 0])
+        swept = np.concatenate([[0.0], swept])
+
+        def is_free(i: int, j: int) -> bool:
+            # Cutting short must not cut off the region itself, which lies on the right.
+            way = ahead[j], goals[j], goals[i], ahead[i]
+            beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(way))
+            return beside <= 2 * ASIDE and self._is_free(region, goals[i], goals[j])
+
+        at, found = 0, []
         while at < len(goals) - 1:
-            at = self._furthest(region, here, goals, at)
-            here = goals[at]
-            found.append(here)
+            at = _furthest(is_free, at, len(goals) - 1)
+            found.append(goals[at])
         return np.asarray(found[:-1]).reshape(-1, 2)
 
     def _middles(self, region: int, cracks: Ints) -> Floats:
@@ -247,20 +259,6 @@ class Tracer:
         near = middle + NEAR * straight_out
         return np.where(reach[:, None] > NEAR, middle + 0.5 * reach[:, None] * outward, near)
 
-    def _furthest(self, region: int, here: Floats, goals: Floats, at: int) -> int:
-        """The last of the goals after ``at`` that is reached in a straight line."""
-        reach, best = 1, at + 1
-        while at + reach < len(goals) and self._is_free(region, here, goals[at + reach]):
-            best = at + reach
-            reach *= 2
-        low, high = best, min(at + reach, len(goals) - 1)
-        if low < high and self._is_free(region, here, goals[high]):
-            return high
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if self._is_free(region, here, goals[middle]) else (low, middle)
-        return max(low, at + 1)
-
     def _is_free(self, region: int, start: Floats, end: Floats) -> bool:
         """Whether a straight line is hidden, its ends aside."""
         way = end - start
@@ -276,6 +274,21 @@ class Tracer:
             and self._covered(region, points[1:-1] + normal).all()
             and self._covered(region, points[1:-1] - normal).all()
         )
+
+
+def _furthest(is_free: Callable[[int, int], bool], at: int, last: int) -> int:
+    """The last of some places after ``at`` that is reached in a straight line, looked for in growing steps."""
+    if is_free(at, last):
+        return last
+    reach, best = 1, at + 1
+    while at + reach < last and is_free(at, at + reach):
+        best = at + reach
+        reach *= 2
+    low, high = best, min(at + reach, last)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if is_free(at, middle) else (low, middle)
+    return low
 
 
 def assembled(outline: Outline, fitted: list[Pieces]) -> Pieces | None:
