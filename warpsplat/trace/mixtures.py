@@ -40,7 +40,9 @@ class Explained:
     """How many different regions are near, shape (pixel,)."""
 
 
-def explain(image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints) -> Explained:
+def explain(
+    image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints, slack: float = 0.0
+) -> Explained:
     """Find for each pixel the two neighbouring regions that it is nearest to a mixture of.
 
     Args:
@@ -49,9 +51,11 @@ def explain(image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints
         pure: colours of the sure pixels' regions there, shape (height, width, channel).
         rows: of the pixels, shape (pixel,).
         columns: shape (pixel,).
+        slack: how far a mixture may be off for the difference of its two colours: JPEG blurs hues more than
+            lightness.
     """
     parts = [
-        _explain(image, labels, pure, rows[i : i + CHUNK], columns[i : i + CHUNK])
+        _explain(image, labels, pure, rows[i : i + CHUNK], columns[i : i + CHUNK], slack)
         for i in range(0, max(len(rows), 1), CHUNK)
     ]
     return Explained(
@@ -78,7 +82,7 @@ def _neighbours(labels: Ints, rows: Ints, columns: Ints) -> tuple[Ints, Ints, Fl
     return found, index, distance
 
 
-def _explain(image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints) -> Explained:
+def _explain(image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints, slack: float) -> Explained:
     found, index, distance = _neighbours(labels, rows, columns)
     colors = pure.reshape(-1, pure.shape[2])[index]
     pixel = image[rows, columns]
@@ -92,6 +96,7 @@ def _explain(image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Int
         square = np.maximum((between**2).sum(axis=1), 1e-6)
         t = np.clip(((pixel - colors[b]) * between).sum(axis=1) / square, 0, 1)
         off = np.abs(pixel - colors[b] - t[:, None] * between).max(axis=1)
+        off = np.maximum(off - slack * np.abs(between).max(axis=1), 0) + 0.01 * off
         cost = np.where(known, off + FAR * (distance[a] + distance[b]), np.inf)
         better = cost < best
         best[better], residual[better] = cost[better], off[better]

@@ -19,11 +19,23 @@ MIXED = 7.0
 ALIKE = 1.5
 """Flat regions whose colours are that near are of one colour [levels], besides noise."""
 
+BLURRED = 6.0
+"""What a level of noise adds to that [levels]."""
+
+SLACK = 0.2
+"""How far off a mixture may be in a noisy picture, for the difference of its colours."""
+
+CALM = 12.0
+"""Steps that are smoothed in a noisy picture [levels], besides noise."""
+
 CLEAR = 2.5
 """Opacity below which a region is not painted [levels]."""
 
 NARROW = 30
 """Pixels of the smallest region that cannot be a coincidence of antialiasing."""
+
+WIDE = 400
+"""Pixels of the smallest ramp in a noisy picture."""
 
 FAINT = 24.0
 """How far a small part must be from all mixtures to be a region of its own [levels]."""
@@ -110,13 +122,18 @@ def find_regions(image: Floats) -> Regions:
     return Regions(regions, pure, _paint_of(regions, painted), colorings, noise)
 
 
+def _slack(noise: float) -> float:
+    """Share of their contrast by which mixtures may be off."""
+    return SLACK if noise else 0.0
+
+
 def _calmed(image: Floats, noise: float) -> Floats:
     """Without what JPEG leaves beside edges."""
     calm = np.ascontiguousarray(image, np.float32)
-    for _ in range(2):
+    for _ in range(3):
         for channels in (slice(0, 3), slice(3, 4)):
             part = np.ascontiguousarray(calm[..., channels])
-            calm[..., channels] = cv2.bilateralFilter(part, 7, 8 + 3 * noise, 2.5).reshape(part.shape)
+            calm[..., channels] = cv2.bilateralFilter(part, 7, CALM + 6 * noise, 2.5).reshape(part.shape)
     return calm
 
 
@@ -134,7 +151,7 @@ def _without_coincidences(image: Floats, labels: Ints, pure: Floats, count: int,
     if not len(rows):
         return labels
     large = np.where(doubtful, NOBODY, labels).astype(np.int32)
-    result = explain(image, large, pure, rows, columns)
+    result = explain(image, large, pure, rows, columns, _slack(noise))
     mixed = (result.residual <= MIXED + noise) & (result.share < 0.99)
     owners = labels[rows, columns]
     explained = np.bincount(owners, mixed, count)
@@ -193,11 +210,11 @@ def _palette(image: Floats, labels: Ints, noise: float) -> tuple[Ints, Ints, lis
     off = np.zeros(labels.shape, np.float32)
     off[inside] = np.abs(image[inside] - modes[labels[inside]]).max(axis=1)
     square = np.bincount(labels[inside], off[inside].astype(np.float64) ** 2, count) / sizes
-    uneven = np.sqrt(square) > RAMP + noise
+    uneven = np.sqrt(square) > RAMP + 3 * noise
     flat_colors = modes if noise == 0 else means
     paint = np.full(count, NOBODY, np.int32)
     colorings: list[Coloring] = []
-    for part in np.flatnonzero(uneven & (sizes >= NARROW)).tolist():
+    for part in np.flatnonzero(uneven & (sizes >= (NARROW if noise == 0 else WIDE))).tolist():
         ramp = _ramp_of(image, labels, part, float(np.sqrt(square[part])), noise)
         if ramp is not None:
             paint[part] = len(colorings)
@@ -223,7 +240,7 @@ def _join_flats(paint: Ints, colorings: list[Coloring], colors: Floats, sizes: I
     """Give parts of nearly one colour one colouring, that of the largest."""
     first = len(colorings)
     known = np.zeros((0, colors.shape[1]))
-    alike = ALIKE + min(noise, 6.0)
+    alike = ALIKE + min(BLURRED * noise, 24.0)
     for part in np.argsort(-sizes, kind="stable").tolist():
         if paint[part] != NOBODY:
             continue
@@ -289,7 +306,7 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
     if not len(rows) or doubtful.all():
         return
     large = np.where(doubtful, NOBODY, painted).astype(np.int32)
-    result = explain(image, large, pure, rows, columns)
+    result = explain(image, large, pure, rows, columns, _slack(noise))
     seen = np.maximum(result.residual - (MIXED + noise), 0)
     energy = np.bincount(regions[rows, columns], seen, len(small))
     gone = energy[regions[rows, columns]] <= UNSEEN
@@ -302,7 +319,7 @@ def _thin_parts(
 ) -> tuple[Ints, Ints, list[Coloring]]:
     """Seeds in lines and dots that are too thin to have any: pixels that no mixture explains."""
     rows, columns = np.nonzero(labels == NOBODY)
-    result = explain(image, labels, pure, rows, columns)
+    result = explain(image, labels, pure, rows, columns, _slack(noise))
     limit = MIXED + noise
     strange = np.zeros(labels.shape, np.float32)
     strange[rows, columns] = np.where(np.isfinite(result.residual), result.residual, 256)

@@ -277,7 +277,7 @@ class Tracer:
 
 
 def _furthest(is_free: Callable[[int, int], bool], at: int, last: int) -> int:
-    """The last of some places after ``at`` that is reached in a straight line, looked for in growing steps."""
+    """The last of some places after ``at`` that is reached in a straight line, found in growing steps."""
     if is_free(at, last):
         return last
     reach, best = 1, at + 1
