@@ -1,0 +1,151 @@
+"""Ink and paper told apart: how much of each pixel is inked, and where the lines of ink are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from warpsplat.scene import FloatArray
+from warpsplat.trace.grids import Bools, Floats
+
+BROAD = 0.05
+"""Width from which on what is dark is paper of another colour, over the longer side of the picture."""
+
+LEAST_BROAD = 25
+"""The same in a small picture [px]."""
+
+REDUCED = 512
+"""Longer side of the picture that the paper is looked for in, about [px]."""
+
+FAINTEST = 0.07
+"""Least contrast of ink with the paper around it, in [0, 1]."""
+
+NOISE = 5.0
+"""The same in standard deviations of the paper's noise."""
+
+SEED = 0.35
+"""Contrast that a line must reach somewhere, over that of strong ink."""
+
+NEAR = 9
+"""Side of the window in which ink is compared with the strongest beside it [px]."""
+
+BESIDE = 31
+"""Side of the window that knows what full ink is [px]."""
+
+TINT, PAINTED = 0.05, 0.05
+"""How far a channel of an area differs from the paper more than the others do, if it is coloured in, and the
+share of such areas from which on lines must be dark."""
+
+CLEAR = 0.02
+"""Share of clear pixels from which on a picture has no paper."""
+
+SPECK, SMALLEST = 0.7, 3.0
+"""Area of the least piece of ink, over the square of a line's width, and at the least [px]."""
+
+
+@dataclass(frozen=True)
+class Ink:
+    """What is drawn."""
+
+    cover: FloatArray
+    """Inked share of each pixel, shape (height, width)."""
+    mask: Bools
+    """The pixels of lines, shape (height, width)."""
+    shown: FloatArray
+    """The picture without transparency, sRGB in [0, 1], shape (height, width, 3)."""
+    paper: FloatArray | None
+    """The paper's colour, sRGB in [0, 1], shape (3,); None: transparent."""
+
+
+def find_ink(image: FloatArray) -> Ink:
+    """Tell ink and paper apart; paper may be coloured, in places and unevenly lit.
+
+    Args:
+        image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
+    """
+    shown, is_clear = _shown(image)
+    paper = np.asarray(np.median(shown.reshape(-1, 3)[:: max(1, shown.size // 300_000)], axis=0), np.float32)
+    contrast = _contrast(shown, is_dark=bool(paper.mean() < 0.4))
+    noise = _noise(contrast)
+    if noise > 0.01:
+        contrast = cv2.GaussianBlur(contrast, (0, 0), 0.8)
+        noise *= 0.5
+    floor = max(FAINTEST, NOISE * noise)
+    dark = contrast[contrast > floor]
+    strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
+    seed = max(floor, SEED * strong)
+    near = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
+    mask = contrast > np.maximum(0.5 * np.maximum(near, seed), floor)
+    mask = _held(mask, contrast > seed)
+    full = cv2.blur(cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8)), (NEAR, NEAR))
+    around = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    cover = np.where(around, np.clip((contrast - 0.5 * floor) / np.maximum(full - 0.5 * floor, seed), 0, 1), 0)
+    return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper)
+
+
+def _shown(image: FloatArray) -> tuple[FloatArray, bool]:
+    """The picture on white, or on black where its ink is light, and whether its paper is clear."""
+    if image.shape[2] == 3:
+        return np.asarray(image, np.float32), False
+    opacity = image[..., 3:]
+    is_clear = bool((opacity < 0.5).mean() > CLEAR)
+    light = float(image[..., :3].sum() / max(3 * float(opacity.sum()), 1e-6))
+    behind = 0.0 if is_clear and light > 0.7 else 1.0
+    return np.asarray(image[..., :3] + (1 - opacity) * behind, np.float32), is_clear
+
+
+def _contrast(shown: FloatArray, *, is_dark: bool) -> FloatArray:
+    """How much darker than the paper around it each pixel is in the channel that shows it most; on dark
+    paper, how much lighter.
+    """
+    light = 1 - shown if is_dark else shown
+    height, width = light.shape[:2]
+    factor = max(1, round(max(height, width) / REDUCED))
+    size = (max(1, width // factor), max(1, height // factor))
+    small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    broad = max(LEAST_BROAD, BROAD * max(height, width)) / factor
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(broad / 2) + 1,) * 2)
+    paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, kernel, borderType=cv2.BORDER_REPLICATE)
+    # The edge of what is coloured broadly is no line, although the reduced picture blurs it.
+    paper = cv2.erode(paper, np.ones((3, 3), np.uint8))
+    paper = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR)
+    contrast = np.clip(paper - light, 0, 1)
+    # What is coloured in has a texture that shows in some channel; its outlines show in all.
+    return np.asarray(contrast.min(axis=2) if _is_colored_in(small) else contrast.max(axis=2), np.float32)
+
+
+def _is_colored_in(small: FloatArray) -> bool:
+    """Whether areas of the picture, not only lines, have a colour of their own."""
+    areas = cv2.medianBlur((255 * np.clip(small, 0, 1)).astype(np.uint8), 15) / np.float32(255)
+    away = areas - np.median(areas.reshape(-1, 3), axis=0)
+    tint = np.abs(away - away.mean(axis=2, keepdims=True)).max(axis=2)
+    return bool((tint > TINT).mean() > PAINTED)
+
+
+def _noise(contrast: FloatArray) -> float:
+    """Standard deviation of the noise, from the second differences of most pixels."""
+    rough = cv2.filter2D(contrast, -1, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32))
+    return float(np.median(np.abs(rough))) / (0.6745 * 6)
+
+
+def _held(mask: Bools, seeds: Bools) -> Bools:
+    """The parts of ``mask`` that are no specks and have a seed, without pinholes."""
+    edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
+    width = 2 * mask.sum() / max(1, edge.sum())
+    least = max(SMALLEST, SPECK * width**2)
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    held = stats[:, cv2.CC_STAT_AREA] >= least
+    held &= np.bincount(parts[seeds], minlength=len(stats)) > 0
+    held[0] = False
+    inked = held[parts]
+    _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)
+    pinholes = stats[:, cv2.CC_STAT_AREA] < 0.5 * least
+    pinholes[0] = False
+    return np.asarray(inked | pinholes[parts], np.bool_)
+
+
+def inked_picture(cover: Floats, color: FloatArray, paper: FloatArray) -> FloatArray:
+    """The paper with ink of one colour on it, shape (height, width, 3)."""
+    return np.asarray(paper + cover[..., None] * (color - paper), np.float32)

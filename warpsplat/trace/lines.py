@@ -1,0 +1,101 @@
+"""Line art -> a scene of strokes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
+from warpsplat.scene.scene import starts_of
+from warpsplat.trace.centerlines import Line, find_lines
+from warpsplat.trace.curves import Pieces, Run, fit_runs
+from warpsplat.trace.grids import Floats
+from warpsplat.trace.ink import Ink, find_ink
+from warpsplat.trace.pens import width_steps
+
+TOLERANCE = 0.45
+"""Largest distance of a centre line from its curve [px]."""
+
+LEAST_WIDTH = 1.0
+"""Of a stroke [px]."""
+
+
+@dataclass(frozen=True)
+class TracedLines:
+    """What line art was traced to."""
+
+    scene: Scene
+    """Strokes; ``layer`` is the pen of each."""
+    ink: Ink
+
+
+@dataclass(frozen=True)
+class _Stroke:
+    points: Floats
+    closed: bool
+    width: float
+    pen: int
+
+
+def trace_lines(image: FloatArray) -> Scene:
+    """The centre lines of line art as opaque strokes, a layer for each pen.
+
+    Args:
+        image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
+    """
+    return trace_ink(find_ink(image)).scene
+
+
+def trace_ink(ink: Ink) -> TracedLines:
+    """The same, of ink that is known."""
+    drawing = find_lines(ink)
+    strokes = [stroke for line in drawing.lines for stroke in _strokes(line)]
+    strokes.sort(key=lambda stroke: stroke.pen)
+    fitted = fit_runs([_run(stroke) for stroke in strokes], TOLERANCE)
+    height, width = ink.mask.shape
+    return TracedLines(_scene(Canvas(width, height, ink.paper), strokes, fitted, drawing.pens), ink)
+
+
+def _strokes(line: Line) -> list[_Stroke]:
+    """A line, in parts of one width."""
+    length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())
+    steps = width_steps(line.widths, length / max(1, len(line.points) - 1))
+    if len(steps) == 1:
+        return [_Stroke(line.points, line.closed, max(LEAST_WIDTH, steps[0][2]), line.pen)]
+    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
+    ends = [*(low for low, _, _ in steps[1:]), len(points) - 1]
+    return [
+        _Stroke(points[low : end + 1], False, max(LEAST_WIDTH, width), line.pen)
+        for (low, _, width), end in zip(steps, ends, strict=True)
+    ]
+
+
+def _run(stroke: _Stroke) -> Run:
+    if stroke.closed:
+        return Run(stroke.points, True)
+    return Run(stroke.points[1:-1], False, stroke.points[0], stroke.points[-1])
+
+
+def _scene(canvas: Canvas, strokes: list[_Stroke], fitted: list[Pieces], pens: FloatArray) -> Scene:
+    """Strokes as ``Scene`` has them: closed chains end where they begin without saying so."""
+    chains = [
+        pieces.cubics[:, :3].reshape(-1, 2)
+        if stroke.closed
+        else np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3]])
+        for stroke, pieces in zip(strokes, fitted, strict=True)
+    ]
+    owner = np.array([stroke.pen for stroke in strokes], np.int32)
+    first = starts_of(np.array([len(chain) for chain in chains], np.int64))
+    return Scene.of(
+        canvas,
+        np.full(len(strokes), Kind.STROKE, np.int32),
+        first,
+        np.full(len(strokes), Basis.CUBIC, np.int32),
+        points=np.concatenate([*chains, np.zeros((0, 2))]).astype(np.float32),
+        closed=np.array([stroke.closed for stroke in strokes], np.int32),
+        colors=pens[owner].reshape(-1, 3),
+        opacities=np.ones(len(strokes), np.float32),
+        widths=np.array([stroke.width for stroke in strokes], np.float32),
+        layer=owner,
+    )
