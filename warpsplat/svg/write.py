@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -157,10 +157,12 @@ def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
     return f'<g transform="scale({across:.9g} {down:.9g})">{picture.markup}</g>'
 
 
-def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float) -> Iterator[str]:
-    """Layers, where there are several, are groups that say how many shapes they complete. In them neighbours
-    of one kind share a group, and what it says of them; neighbours of one opacity a group in it where that
-    is shorter. Twins are one path, pictures what they are.
+def _groups(
+    scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float, groups: Sequence[str]
+) -> Iterator[str]:
+    """Layers are groups with the names ``groups``; without names, where there are several, such that say how
+    many shapes they complete. In them neighbours of one kind share a group, and what it says of them;
+    neighbours of one opacity a group in it where that is shorter. Twins are one path, pictures what they are.
     """
     colors, opacities = _colors(scene, ramps), _opacities(scene, opacity_scale)
     data = PathData(scene, per_pixel)
@@ -171,13 +173,13 @@ def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_sc
     pictures = (scene.paint == Paint.PICTURE).tolist()
     ends = level_ends(scene)
     layer = np.searchsorted(ends, np.arange(len(scene)), "right").tolist()
-    names = [f"{LEVEL_ID}{end}" for end in (*ends, len(scene))]
+    names = list(groups) or [f"{LEVEL_ID}{end}" for end in (*ends, len(scene))]
     last = None
     for (level, is_picture, in_group), shapes in itertools.groupby(
         np.flatnonzero(scene.twin == 0).tolist(),
         lambda i: (layer[i], pictures[i], strokes[i] and not has_twin[i]),
     ):
-        if ends and level != last:
+        if (ends or groups) and level != last:
             yield ("" if last is None else "</g>") + f'<g id="{names[level]}">'
             last = level
         if is_picture:
@@ -213,6 +215,7 @@ def write_svg(
     metadata: str = "",
     opacity_scale: float = 1.0,
     background: bool = True,
+    groups: Sequence[str] = (),
 ) -> str:
     """The scene as an SVG document: a background and one path a shape, in painter's order.
 
@@ -225,6 +228,8 @@ def write_svg(
             below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
         background: whether to write it, if the canvas has one; without, the picture is transparent where no
             shape is.
+        groups: names of the layers that have shapes, in their order; without, several are named by how many
+            shapes they complete.
     """
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
@@ -234,7 +239,7 @@ def write_svg(
         behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n'
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>\n" if elements else ""
-    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale))
+    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale, groups))
     note = f"warpsplat {__version__} {metadata}".strip()
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '

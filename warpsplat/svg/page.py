@@ -1,0 +1,135 @@
+"""A file as large as a sheet of paper: what plotters and printers take."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from warpsplat.errors import UsageError
+from warpsplat.svg.numbers import number
+from warpsplat.svg.write import OUR_HEAD
+
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
+"""Of a unit of CSS."""
+
+PAGES = {"a3": (297.0, 420.0), "a4": (210.0, 297.0), "a5": (148.0, 210.0), "letter": (215.9, 279.4)}
+"""Width and height of sheets upright [mm]."""
+
+MARGIN = 10.0
+"""Of a page on each side, where none is given [mm]."""
+
+LARGEST = 10_000.0
+"""Of a side [mm]."""
+
+NUMBER = r"(\d+(?:\.\d+)?)"
+SIZE = re.compile(rf"{NUMBER}\s*[x×]\s*{NUMBER}\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
+
+DECIMALS = 3
+"""Of a size [mm]."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What a picture is drawn on."""
+
+    width: float
+    """[mm]"""
+    height: float
+    """[mm]"""
+    margin: float = 0.0
+    """Kept free on each side [mm]."""
+    unit: str = "mm"
+    """In which the file says its size."""
+
+
+def parse_size(text: str, unit: str = "mm") -> Sheet:
+    """``200x150mm`` or ``8x6in`` -> a sheet that the picture fills as far as its proportions allow.
+
+    Args:
+        text: width and height; without a unit, in ``unit``.
+        unit: in which the file says its size.
+
+    Raises:
+        UsageError: it is no size.
+    """
+    check_unit(unit)
+    found = SIZE.fullmatch(text.strip())
+    if not found:
+        raise UsageError(f"not a size: {text!r}; write 200x150mm")
+    factor = MILLIMETRES[(found[3] or unit).lower()]
+    return _checked(Sheet(float(found[1]) * factor, float(found[2]) * factor, unit=unit), text)
+
+
+def parse_page(name: str, width: int, height: int, margin: float = MARGIN, unit: str = "mm") -> Sheet:
+    """A sheet of a standard format, on its side for a picture that is wider than high.
+
+    Args:
+        name: of the format.
+        width: of the picture.
+        height: of the picture.
+        margin: kept free on each side [mm].
+        unit: in which the file says its size.
+
+    Raises:
+        UsageError: there is no such format, or no room between the margins.
+    """
+    check_unit(unit)
+    if name.lower() not in PAGES:
+        raise UsageError(f"page must be one of {', '.join(PAGES)}, not {name!r}")
+    short, long = PAGES[name.lower()]
+    sides = (long, short) if width > height else (short, long)
+    return _checked(Sheet(*sides, margin, unit), f"{name} with margins of {margin:g} mm")
+
+
+def check_unit(unit: str) -> None:
+    """Whether files can say their size in ``unit``.
+
+    Raises:
+        UsageError: they cannot.
+    """
+    if unit not in MILLIMETRES:
+        raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {unit!r}")
+
+
+def _checked(sheet: Sheet, name: str) -> Sheet:
+    for side in (sheet.width, sheet.height):
+        if not 0 < side <= LARGEST or sheet.margin < 0 or side <= 2 * sheet.margin:
+            raise UsageError(f"size {name} leaves no room, or has a side beyond {LARGEST:g} mm")
+    return sheet
+
+
+def in_units(text: str, unit: str, dpi: float = 96.0) -> str:
+    """A file written here with its own size in ``unit``, at ``dpi`` pixels an inch.
+
+    Raises:
+        UsageError: files cannot say their size in ``unit``.
+    """
+    check_unit(unit)
+    found = OUR_HEAD.match(text)
+    assert found
+    width, height = (float(found[i]) * 25.4 / dpi for i in (1, 2))
+    return _with_size(text, Sheet(width, height, unit=unit), (0, 0, float(found[3]), float(found[4])))
+
+
+def on_sheet(text: str, sheet: Sheet) -> str:
+    """A file written here, as large as the sheet allows and in its middle. Paths stay as they are: the view
+    box, in whole units, is what the sheet covers.
+    """
+    found = OUR_HEAD.match(text)
+    assert found
+    width, height = float(found[3]), float(found[4])
+    units = max(width / (sheet.width - 2 * sheet.margin), height / (sheet.height - 2 * sheet.margin))
+    across, down = math.ceil(sheet.width * units), math.ceil(sheet.height * units)
+    left, top = round((width - across) / 2), round((height - down) / 2)
+    return _with_size(text, sheet, (left, top, across, down))
+
+
+def _with_size(text: str, sheet: Sheet, view: tuple[float, float, float, float]) -> str:
+    """The file with another size and view box."""
+    width, height = (
+        number(side / MILLIMETRES[sheet.unit], DECIMALS) + sheet.unit for side in (sheet.width, sheet.height)
+    )
+    box = " ".join(number(value, DECIMALS) for value in view)
+    head = re.sub(r'width="[^"]*" height="[^"]*" viewBox="[^"]*"', f'width="{width}" height="{height}" viewBox="{box}"', text.split(">", 1)[0], count=1)
+    return head + text[len(text.split(">", 1)[0]) :]
