@@ -18,7 +18,7 @@ from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.svg.page import Sheet, on_sheet
 from warpsplat.svg.write import write_svg
 from warpsplat.trace.ink import Ink, find_ink
-from warpsplat.trace.lines import trace_ink
+from warpsplat.trace.lines import rejoined, trace_ink
 from warpsplat.trace.tour import toured
 
 STEPS = 80
@@ -75,12 +75,15 @@ def vectorize_lines(
         inked(ink, traced),
         settings,
         backend,
-        scene=replace(traced, layer=np.zeros_like(pens), canvas=replace(traced.canvas, background=_paper(ink))),
+        scene=replace(
+            traced, layer=np.zeros_like(pens), canvas=replace(traced.canvas, background=_paper(ink))
+        ),
         seconds=training_seconds(settings, target, started),
         report=report,
         stop=stop,
     )
-    scene = toured(replace(made.scene, layer=pens, colors=traced.colors, canvas=traced.canvas))
+    scene = replace(made.scene, layer=pens, colors=traced.colors, canvas=traced.canvas)
+    scene = toured(rejoined(traced, scene))
     text = write_svg(
         scene,
         per_pixel=made.per_pixel,
@@ -90,7 +93,9 @@ def vectorize_lines(
     svg = on_sheet(text, sheet) if sheet else text
     if write:
         write(svg)
-    score = score_svg(text, target, own=True, eyes=has_time_for_eyes(settings, target) and not made.interrupted)
+    score = score_svg(
+        text, target, own=True, eyes=has_time_for_eyes(settings, target) and not made.interrupted
+    )
     seconds = time.monotonic() - started
     return Result(
         svg=svg,
@@ -133,11 +138,7 @@ def inked(ink: Ink, traced: Scene) -> FloatArray:
     """The picture that strokes of these pens would make if they were right: even paper and even ink, so that
     nothing pulls at them but where the ink is. Shape (height, width, 3).
     """
-    color = traced.colors
-    if len(np.unique(traced.layer)) > 1:
-        color = _nearest_colors(traced, ink)
-    else:
-        color = color[:1]
+    color = _nearest_colors(traced, ink) if traced.layer.max() > 0 else traced.colors[:1]
     paper = _paper(ink)
     return np.asarray(paper + ink.cover[..., None] * (color - paper), np.float32)
 
@@ -148,18 +149,12 @@ def _nearest_colors(traced: Scene, ink: Ink) -> FloatArray:
     """
     pens = np.unique(traced.colors, axis=0)
     paper = _paper(ink)
-    away = [
-        ((ink.shown - paper - ink.cover[..., None] * (pen - paper)) ** 2).sum(axis=2) for pen in pens
-    ]
+    away = [((ink.shown - paper - ink.cover[..., None] * (pen - paper)) ** 2).sum(axis=2) for pen in pens]
     return np.asarray(pens[np.argmin(away, axis=0)], np.float32)
 
 
 def pen_names(scene: Scene) -> list[str]:
     """Names of the groups of the pens."""
     shown: IndexArray = np.unique(scene.layer, return_index=True)[1]
-    return [f"pen-{number}-{color[1:]}" for number, color in enumerate(_hex(scene.colors[shown]), 1)]
-
-
-def _hex(colors: FloatArray) -> list[str]:
-    """``#rrggbb`` of colours, in full."""
-    return ["#" + "".join(f"{round(255 * float(c)):02x}" for c in color) for color in colors]
+    colors = np.round(255 * scene.colors[shown]).astype(np.uint8)
+    return [f"pen-{number}-{color.tobytes().hex()}" for number, color in enumerate(colors, 1)]

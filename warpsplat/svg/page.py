@@ -131,5 +131,10 @@ def _with_size(text: str, sheet: Sheet, view: tuple[float, float, float, float])
         number(side / MILLIMETRES[sheet.unit], DECIMALS) + sheet.unit for side in (sheet.width, sheet.height)
     )
     box = " ".join(number(value, DECIMALS) for value in view)
-    head = re.sub(r'width="[^"]*" height="[^"]*" viewBox="[^"]*"', f'width="{width}" height="{height}" viewBox="{box}"', text.split(">", 1)[0], count=1)
+    head = re.sub(
+        r'width="[^"]*" height="[^"]*" viewBox="[^"]*"',
+        f'width="{width}" height="{height}" viewBox="{box}"',
+        text.split(">", 1)[0],
+        count=1,
+    )
     return head + text[len(text.split(">", 1)[0]) :]

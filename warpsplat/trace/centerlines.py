@@ -167,7 +167,9 @@ def _line(graph: Graph, chain: Chain, radii: Floats) -> tuple[Floats, Floats, bo
             radius = float(np.median(width)) / 2
             start, end = _ahead(points, start, radius), _ahead(points[::-1], end, radius)
         points = np.concatenate([start[None], points, end[None]])
-        width = np.pad(width, 1, mode="edge") if len(width) else np.full(2, 2 * float(graph.radii[nodes[0][0]]))
+        width = (
+            np.pad(width, 1, mode="edge") if len(width) else np.full(2, 2 * float(graph.radii[nodes[0][0]]))
+        )
     if len(points) < 2:
         return None
     return _smoothed(points, width, closed)
@@ -196,7 +198,10 @@ def _goes_round(graph: Graph, chain: Chain) -> bool:
     if len(graph.at[node]) <= 2:
         return True
     radius = float(graph.radii[node])
-    one, other = _way(graph.edges[first], int(first_back), radius), _way(graph.edges[last], int(not last_back), radius)
+    one, other = (
+        _way(graph.edges[first], int(first_back), radius),
+        _way(graph.edges[last], int(not last_back), radius),
+    )
     return bool(np.degrees(np.arccos(np.clip(-(one @ other), -1, 1))) <= STRAIGHT)
 
 
@@ -204,7 +209,10 @@ def _undrawn(graph: Graph, edge: Edge) -> Floats:
     """The points of an edge that no junction draws aside."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(edge.points, axis=0).T))])
     total = along[-1]
-    shares = (DRAWN if len(graph.at[node]) > 2 else FORKED if len(graph.at[node]) == 1 else 0.0 for node in edge.nodes)
+    shares = (
+        DRAWN if len(graph.at[node]) > 2 else FORKED if len(graph.at[node]) == 1 else 0.0
+        for node in edge.nodes
+    )
     before, after = (share * float(graph.radii[node]) for share, node in zip(shares, edge.nodes, strict=True))
     if before + after > 0.8 * total:
         scale = 0.8 * total / max(before + after, 1e-9)
@@ -234,6 +242,8 @@ def _smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Flo
     if closed:
         padded = np.concatenate([even[-reach:], even, even[:reach]])
     else:  # mirrored in the ends, which so stay where they are
-        padded = np.concatenate([2 * even[0] - even[reach:0:-1], even, 2 * even[-1] - even[-2 : -reach - 2 : -1]])
+        padded = np.concatenate(
+            [2 * even[0] - even[reach:0:-1], even, 2 * even[-1] - even[-2 : -reach - 2 : -1]]
+        )
     smooth = np.stack([np.convolve(padded[:, axis], kernel, "valid") for axis in (0, 1)], axis=1)
     return smooth, wide, closed

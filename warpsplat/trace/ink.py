@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from warpsplat.scene import FloatArray
-from warpsplat.trace.grids import Bools, Floats
+from warpsplat.trace.grids import Bools
 
 BROAD = 0.05
 """Width from which on what is dark is paper of another colour, over the longer side of the picture."""
@@ -27,6 +27,9 @@ NOISE = 5.0
 
 SEED = 0.35
 """Contrast that a line must reach somewhere, over that of strong ink."""
+
+TEXTURED_SEED, TEXTURED_SPECK = 0.45, 4.0
+"""SEED and SPECK of a picture that is coloured in: crayons leave a texture."""
 
 NEAR = 9
 """Side of the window in which ink is compared with the strongest beside it [px]."""
@@ -67,21 +70,28 @@ def find_ink(image: FloatArray) -> Ink:
     """
     shown, is_clear = _shown(image)
     paper = np.asarray(np.median(shown.reshape(-1, 3)[:: max(1, shown.size // 300_000)], axis=0), np.float32)
-    contrast = _contrast(shown, is_dark=bool(paper.mean() < 0.4))
+    light = 1 - shown if paper.mean() < 0.4 else shown
+    small = _reduced(light)
+    is_textured = _is_colored_in(small)
+    contrast = _contrast(light, small, in_all=is_textured)
     noise = _noise(contrast)
     if noise > 0.01:
-        contrast = cv2.GaussianBlur(contrast, (0, 0), 0.8)
+        contrast = np.asarray(cv2.GaussianBlur(contrast, (0, 0), 0.8), np.float32)
         noise *= 0.5
     floor = max(FAINTEST, NOISE * noise)
     dark = contrast[contrast > floor]
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
-    seed = max(floor, SEED * strong)
+    seed = max(floor, (TEXTURED_SEED if is_textured else SEED) * strong)
     near = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(near, seed), floor)
-    mask = _held(mask, contrast > seed)
-    full = cv2.blur(cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8)), (NEAR, NEAR))
+    mask = _held(mask, contrast > seed, TEXTURED_SPECK if is_textured else SPECK)
+    full = cv2.blur(
+        cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8)), (NEAR, NEAR)
+    )
     around = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    cover = np.where(around, np.clip((contrast - 0.5 * floor) / np.maximum(full - 0.5 * floor, seed), 0, 1), 0)
+    cover = np.where(
+        around, np.clip((contrast - 0.5 * floor) / np.maximum(full - 0.5 * floor, seed), 0, 1), 0
+    )
     return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper)
 
 
@@ -96,24 +106,27 @@ def _shown(image: FloatArray) -> tuple[FloatArray, bool]:
     return np.asarray(image[..., :3] + (1 - opacity) * behind, np.float32), is_clear
 
 
-def _contrast(shown: FloatArray, *, is_dark: bool) -> FloatArray:
-    """How much darker than the paper around it each pixel is in the channel that shows it most; on dark
-    paper, how much lighter.
-    """
-    light = 1 - shown if is_dark else shown
+def _reduced(light: FloatArray) -> FloatArray:
+    """The picture at the size that its paper is looked for in."""
     height, width = light.shape[:2]
     factor = max(1, round(max(height, width) / REDUCED))
     size = (max(1, width // factor), max(1, height // factor))
-    small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
-    broad = max(LEAST_BROAD, BROAD * max(height, width)) / factor
+    return np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArray:
+    """How much darker than the paper around it each pixel is, in the channel that shows it most or, if
+    ``in_all``, in each: what is coloured in has a texture that shows in some; its outlines show in all.
+    """
+    height, width = light.shape[:2]
+    broad = max(LEAST_BROAD, BROAD * max(height, width)) * small.shape[1] / width
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(broad / 2) + 1,) * 2)
     paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, kernel, borderType=cv2.BORDER_REPLICATE)
     # The edge of what is coloured broadly is no line, although the reduced picture blurs it.
     paper = cv2.erode(paper, np.ones((3, 3), np.uint8))
     paper = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR)
     contrast = np.clip(paper - light, 0, 1)
-    # What is coloured in has a texture that shows in some channel; its outlines show in all.
-    return np.asarray(contrast.min(axis=2) if _is_colored_in(small) else contrast.max(axis=2), np.float32)
+    return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
 
 def _is_colored_in(small: FloatArray) -> bool:
@@ -130,22 +143,17 @@ def _noise(contrast: FloatArray) -> float:
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
-def _held(mask: Bools, seeds: Bools) -> Bools:
+def _held(mask: Bools, seeds: Bools, speck: float) -> Bools:
     """The parts of ``mask`` that are no specks and have a seed, without pinholes."""
     edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
     width = 2 * mask.sum() / max(1, edge.sum())
-    least = max(SMALLEST, SPECK * width**2)
+    least = max(SMALLEST, speck * width**2)
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     held = stats[:, cv2.CC_STAT_AREA] >= least
     held &= np.bincount(parts[seeds], minlength=len(stats)) > 0
     held[0] = False
     inked = held[parts]
     _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)
-    pinholes = stats[:, cv2.CC_STAT_AREA] < 0.5 * least
+    pinholes = stats[:, cv2.CC_STAT_AREA] < max(SMALLEST, 0.5 * SPECK * width**2)
     pinholes[0] = False
     return np.asarray(inked | pinholes[parts], np.bool_)
-
-
-def inked_picture(cover: Floats, color: FloatArray, paper: FloatArray) -> FloatArray:
-    """The paper with ink of one colour on it, shape (height, width, 3)."""
-    return np.asarray(paper + cover[..., None] * (color - paper), np.float32)

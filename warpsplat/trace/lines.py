@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,30 @@ def trace_ink(ink: Ink) -> TracedLines:
     fitted = fit_runs([_run(stroke) for stroke in strokes], TOLERANCE)
     height, width = ink.mask.shape
     return TracedLines(_scene(Canvas(width, height, ink.paper), strokes, fitted, drawing.pens), ink)
+
+
+def rejoined(before: Scene, after: Scene) -> Scene:
+    """``after``, its strokes' ends where they met ``before``: at the mean of where they are now.
+
+    Args:
+        before: strokes.
+        after: the same with other points.
+    """
+    ends = np.stack([before.first[:-1], before.first[1:] - 1], axis=1)
+    inner = np.stack([ends[:, 0] + 1, ends[:, 1] - 1], axis=1)
+    open_ended = before.closed[np.searchsorted(before.starts, before.first[1:]) - 1] == 0
+    ends, inner = ends[open_ended].reshape(-1), inner[open_ended].reshape(-1)
+    if not len(ends):
+        return after
+    _, names = np.unique(before.points[ends], axis=0, return_inverse=True)
+    names = names.reshape(-1)
+    count = np.bincount(names)
+    points = after.points.copy()
+    means = np.stack([np.bincount(names, points[ends, axis]) / count for axis in (0, 1)], axis=1)
+    shift = (means[names] - points[ends]).astype(np.float32)
+    points[ends] += shift
+    np.add.at(points, inner, shift)
+    return replace(after, points=points)
 
 
 def _strokes(line: Line) -> list[_Stroke]:

@@ -42,7 +42,11 @@ def measured(points: Floats, widths: Floats, closed: bool, cover: Floats) -> tup
     for sign in (1, -1):
         places = (points[:, None] + sign * steps[None, :, None] * normals[:, None]).astype(np.float32) - 0.5
         seen = cv2.remap(
-            cover.astype(np.float32), places[..., 0], places[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+            cover.astype(np.float32),
+            places[..., 0],
+            places[..., 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
         )
         seen = np.where(np.logical_and.accumulate(seen > EDGE, axis=1), seen, 0)
         sides.append(STEP * (seen.sum(axis=1) - 0.5 * seen[:, 0]))

@@ -76,7 +76,9 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
     owner = np.linalg.norm(places[:, None] - centers[None], axis=2).argmin(axis=1)
     order = np.argsort(-np.bincount(owner, weights, len(centers)), kind="stable")
     owner = np.argsort(order)[owner]
-    pens = np.stack([_weighted_median(colors[owner == pen], weights[owner == pen]) for pen in range(len(order))])
+    pens = np.stack(
+        [_weighted_median(colors[owner == pen], weights[owner == pen]) for pen in range(len(order))]
+    )
     return pens.astype(np.float32), owner
 
 

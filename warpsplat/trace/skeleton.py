@@ -118,7 +118,7 @@ def _traced(thin: Bools, radii: Floats) -> Graph:
         )
         for path, a, b in walks
     ]
-    own = []
+    own: list[int] = []
     for ring in rings:
         edges.append(Edge(places[[*ring, ring[0]]], (len(centers) + len(own),) * 2))
         own.append(ring[0])

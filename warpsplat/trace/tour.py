@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from warpsplat.scene import IndexArray, Scene
+from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.scene.scene import ranges
 from warpsplat.trace.grids import Bools, Floats, Ints
 
-LOOK_AHEAD = 60
+LOOK_AHEAD = 1500
 """Strokes of the tour among which a part of it may be turned round."""
 
-TURNS = 4
-"""Times that the tour is gone through for such parts."""
+MANY = 1500
+"""Strokes from which on a tour is improved once, by turning parts alone."""
+
+TURNS = 8
+"""Times that a tour is gone through at the most."""
 
 
 def pen_up(scene: Scene) -> float:
@@ -46,7 +51,7 @@ def toured(scene: Scene) -> Scene:
         backwards += turned.tolist()
         if len(tour):
             here = starts[order[-1]] if backwards[-1] else ends[order[-1]]
-    return _turned(scene.take(np.array(order, np.intp)), np.array(backwards, np.bool_))
+    return _rings_begun(_turned(scene.take(np.array(order, np.intp)), np.array(backwards, np.bool_)))
 
 
 def _ends(scene: Scene) -> tuple[Floats, Floats]:
@@ -81,37 +86,62 @@ def _lifted(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> float:
 
 
 def _improved(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> tuple[Ints, Bools]:
-    """Parts of a tour turned round where that shortens it (2-opt, the parts up to LOOK_AHEAD long)."""
-    count = len(tour)
+    """Parts of a tour turned round (2-opt), and single strokes moved (Or-opt), where that shortens it."""
     tour, turned = tour.copy(), turned.copy()
+    for _ in range(TURNS if len(tour) <= MANY else 1):
+        before = _lifted(starts, ends, tour, turned)
+        _turn_parts(starts, ends, tour, turned)
+        if len(tour) <= MANY:
+            tour, turned = _with_moves(starts, ends, tour, turned)
+        if _lifted(starts, ends, tour, turned) > before - 1e-6:
+            break
+    return tour, turned
+
+
+def _turn_parts(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> None:
+    """Each part of up to LOOK_AHEAD strokes turned round, in place, where that shortens the tour."""
+    count = len(tour)
     entries = np.where(turned[:, None], ends[tour], starts[tour])
     exits = np.where(turned[:, None], starts[tour], ends[tour])
-    for _ in range(TURNS):
-        is_shorter = False
-        for low in range(1, count):
-            high = np.arange(low, min(low + LOOK_AHEAD, count))
-            before = exits[low - 1]
-            now = np.hypot(*(entries[low] - before)) + np.zeros(len(high))
-            then = np.hypot(*(exits[high] - before).T)
-            inner = high < count - 1
-            following = np.minimum(high + 1, count - 1)
-            now += inner * np.hypot(*(entries[following] - exits[high]).T)
-            then += inner * np.hypot(*(entries[following] - entries[low]).T)
-            best = int((then - now).argmin())
-            if then[best] - now[best] < -1e-6:
-                part = slice(low, int(high[best]) + 1)
-                tour[part], turned[part] = tour[part][::-1].copy(), ~turned[part][::-1]
-                entries[part], exits[part] = exits[part][::-1].copy(), entries[part][::-1].copy()
-                is_shorter = True
-        if not is_shorter:
-            break
+    for low in range(1, count):
+        high = np.arange(low, min(low + LOOK_AHEAD, count))
+        before = exits[low - 1]
+        now = np.hypot(*(entries[low] - before)) + np.zeros(len(high))
+        then = np.hypot(*(exits[high] - before).T)
+        inner = high < count - 1
+        following = np.minimum(high + 1, count - 1)
+        now += inner * np.hypot(*(entries[following] - exits[high]).T)
+        then += inner * np.hypot(*(entries[following] - entries[low]).T)
+        best = int((then - now).argmin())
+        if then[best] - now[best] < -1e-6:
+            part = slice(low, int(high[best]) + 1)
+            tour[part], turned[part] = tour[part][::-1].copy(), ~turned[part][::-1]
+            entries[part], exits[part] = exits[part][::-1].copy(), entries[part][::-1].copy()
+
+
+def _with_moves(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> tuple[Ints, Bools]:
+    """Each stroke but the first in the place of the tour where it costs least way."""
+    for stroke in range(len(tour)):
+        at = int(np.flatnonzero(tour == stroke)[0])
+        if at == 0:
+            continue
+        rest, rest_turned = np.delete(tour, at), np.delete(turned, at)
+        entries = np.where(rest_turned[:, None], ends[rest], starts[rest])
+        exits = np.where(rest_turned[:, None], starts[rest], ends[rest])
+        between = np.append(np.hypot(*(entries[1:] - exits[:-1]).T), 0.0)
+        costs = []
+        for entry, leave in ((starts[stroke], ends[stroke]), (ends[stroke], starts[stroke])):
+            onwards = np.append(np.hypot(*(entries[1:] - leave).T), 0.0)
+            costs.append(np.hypot(*(exits - entry).T) + onwards - between)
+        is_end, place = divmod(int(np.argmin(costs)), len(rest))
+        if costs[is_end][place] < costs[int(turned[at])][at - 1] - 1e-6:
+            tour = np.insert(rest, place + 1, stroke)
+            turned = np.insert(rest_turned, place + 1, bool(is_end))
     return tour, turned
 
 
 def _turned(scene: Scene, backwards: Bools) -> Scene:
     """Strokes of one contour with their points in reverse."""
-    from dataclasses import replace
-
     one = np.diff(np.searchsorted(scene.starts, scene.first)) == 1
     ring = scene.closed[np.searchsorted(scene.starts, scene.first[:-1])] == 1
     index: IndexArray = ranges(scene.first[:-1], scene.point_counts())
@@ -119,3 +149,20 @@ def _turned(scene: Scene, backwards: Bools) -> Scene:
         low, high = scene.first[shape : shape + 2]
         index[low:high] = index[low:high][::-1]
     return replace(scene, points=scene.points[index])
+
+
+def _rings_begun(scene: Scene) -> Scene:
+    """Rings drawn from where the pen comes by: rings of cubics, from one of the points on them."""
+    starts, ends = _ends(scene)
+    points = scene.points.copy()
+    ring = scene.closed[np.searchsorted(scene.starts, scene.first[:-1])] == 1
+    one = np.diff(np.searchsorted(scene.starts, scene.first)) == 1
+    for shape in np.flatnonzero(ring & one & (scene.basis == Basis.CUBIC)).tolist():
+        own = scene.points_of(shape)
+        near = [ends[shape - 1]] if shape else []
+        near += [starts[shape + 1]] if shape + 1 < len(scene) else []
+        away = np.sum([np.hypot(*(own[::3] - place).T) for place in near], axis=0)
+        begin = 3 * int(np.argmin(away)) if near else 0
+        points[scene.first[shape] : scene.first[shape + 1]] = np.roll(own, -begin, axis=0)
+        starts[shape] = ends[shape] = own[begin]
+    return replace(scene, points=points)
