@@ -58,11 +58,12 @@ def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corne
         if reach < 1.2:
             continue
         turn = _turns(points, along, closed, here, reach)
-        beside = 0.5 * (
-            np.abs(_turns(points, along, closed, here - reach, reach))
-            + np.abs(_turns(points, along, closed, here + reach, reach))
+        way = np.sign(turn)
+        # The other way, the next corner of a stair turns.
+        beside = sum(
+            np.maximum(way * _turns(points, along, closed, here + off, reach), 0) for off in (-reach, reach)
         )
-        excess = np.abs(turn) - beside
+        excess = np.abs(turn) - 0.5 * beside
         if not closed:
             excess[(here < reach * 0.6) | (here > total - reach * 0.6)] = 0
         strength = np.maximum(strength, excess / least)
