@@ -124,12 +124,12 @@ class Constraints:
             ties.join_where(_equal(points, a, b), a, b)
         joints = _smooth_joints(drawing, line_start, line_end, ties)
         turned = np.full((count, 2), NONE, np.int32)
-        for number, (_, before, after, free) in enumerate(joints):
-            if free == AFTER:
-                turned[before, 0] = number
-            elif free == BEFORE:
-                turned[after, 1] = number
-        leaders = {k for _, j, k, free in joints for k in ([j] * (free & BEFORE) + [k] * (free // AFTER))}
+        for number, (_, begin, end, side) in enumerate(joints):
+            if side == AFTER:
+                turned[begin, 0] = number
+            elif side == BEFORE:
+                turned[end, 1] = number
+        leaders = {handle for joint in joints for handle in _handles(*joint[1:])}
         laid = set(np.concatenate([on[straight] + 1, on[straight] + 2]).tolist())
         point, before, after, free = np.asarray(joints, np.int32).reshape(-1, 4).T
         first, member, pinned = ties.groups(leaders, laid, _on_border(points, canvas))
@@ -169,7 +169,7 @@ def _smooth_joints(
     joints = []
     for p in on[drawing.joints[on] == Joint.SMOOTH].tolist():
         free = BEFORE * (line_start[p] == NONE) + AFTER * (line_end[p] == NONE)
-        handles = [previous[p] + 2] * bool(free & BEFORE) + [p + 1] * bool(free & AFTER)
+        handles = _handles(previous[p] + 2, p + 1, free)
         keys = {int(places[handle]) for handle in handles}
         if not handles or keys & bound:
             continue
@@ -183,6 +183,11 @@ def _smooth_joints(
         else:
             joints.append((p, before, after, free))
     return joints
+
+
+def _handles(before: int, after: int, free: int) -> list[int]:
+    """Those of a smooth joint that are no lines."""
+    return [before] * bool(free & BEFORE) + [after] * bool(free & AFTER)
 
 
 class _Ties:
