@@ -22,6 +22,7 @@ from warpsplat.render.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.svg.data import PathData, integers, spline_data
 from warpsplat.svg.numbers import hex_colors, number
+from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
@@ -71,13 +72,11 @@ def steps_of(data: str, command: str) -> np.ndarray:
 def test_rounding_does_not_add_up(basis: Basis) -> None:
     """A thousand steps of 0.4 units: the end is at 400, not at 0."""
     points = np.stack([0.4 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
+    points[:, 1] = np.arange(1000) % 3  # no lines
     data = PathData(Scene.uniform(Kind.STROKE, Canvas(400, 1, None), points[None], basis), 1).of(0)
-    if basis == Basis.CUBIC:
-        # Each cubic is relative to the end of the one before.
-        ends = steps_of(data, "c")[2::3]
-    else:
-        ends = np.concatenate([steps_of(data.split("t")[0], "q")[1:], steps_of(data, "t")])
-    assert ends[:, 0].sum() == pytest.approx(400, abs=1)
+    (drawn,) = cubics(data, keep_dots=True)
+    assert ("l" not in data and "c" in data) if basis == Basis.CUBIC else "t" in data
+    assert drawn.points[-1, 0] == pytest.approx(400, abs=1)
 
 
 @pytest.mark.parametrize("kind", list(Kind))
@@ -103,7 +102,7 @@ def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -
     paths = re.findall(r' d="([^"]*)"', text)
     assert len(paths) == (scene.kind == kind).sum()
     for data in paths:
-        assert re.fullmatch(r"M-?\d+[ -]\d+([cqt](-?\d+[ ]?)+)+", data), data
+        assert re.fullmatch(r"[Mm]-?\d+([ -]\d+)+([cqstlhvCSLHV](-?\d+[ ]?)+)*", data), data
         assert "  " not in data and " -" not in data
     assert all(len(x) <= 3 for x in re.findall(r'-opacity="([^"]*)"', text))
     assert all(re.fullmatch(r"\d*(\.\d)?", x) for x in re.findall(r'stroke-width="([^"]*)"', text))
@@ -113,17 +112,18 @@ def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -
 
 
 def without_sharing(text: str) -> str:
-    """The file with each opacity at its path."""
+    """The file with each opacity and colour at its path."""
     root = ElementTree.fromstring(text)
-    for group in root.findall(f"{{{NAMESPACE}}}g"):
-        for index, child in reversed(list(enumerate(group))):
-            if child.tag.endswith("}g"):
-                (said,) = child.attrib
+    for parent in (root, *root.findall(f"{{{NAMESPACE}}}g")):
+        for index, child in reversed(list(enumerate(parent))):
+            if child.tag.endswith("}g") and "stroke-linecap" not in child.attrib:
                 for path in child:
-                    path.set(said, child.attrib[said])
-                group[index : index + 1] = list(child)
+                    path.attrib.update(child.attrib)
+                parent[index : index + 1] = list(child)
     ElementTree.register_namespace("", NAMESPACE)
-    return ElementTree.tostring(root, encoding="unicode").replace(" />", "/>") + "\n"
+    head, mark, _ = text.partition("-->")
+    body = ElementTree.tostring(root, encoding="unicode").replace(" />", "/>").partition(">")[2]
+    return head + mark + body + "\n"
 
 
 @pytest.mark.parametrize("run", range(1, 8))

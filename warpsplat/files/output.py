@@ -24,8 +24,8 @@ from pathlib import Path
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.inputs import STANDARD
 
-SVG_MARK = b"<metadata>warpsplat "
-"""In the head of every SVG written here (``svg.write_svg``)."""
+SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
+"""In the head of every SVG written here (``svg.write_svg``), now and by earlier versions."""
 
 PNG_SOFTWARE = "warpsplat"
 """Text of the ``Software`` chunk of every PNG written here."""
@@ -139,7 +139,23 @@ def may_replace(path: Path) -> bool:
             head = file.read(HEAD)
     except FileNotFoundError:
         return True
-    return not head or SVG_MARK in head or b"tEXtSoftware\0" + PNG_SOFTWARE.encode() in head
+    head = unpacked(head)
+    marks = (*SVG_MARKS, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
+    return not head or any(mark in head for mark in marks)
+
+
+def unpacked(head: bytes) -> bytes:
+    """What the beginning of a file says, gzipped or not."""
+    if head[:2] != GZIP:
+        return head
+    try:
+        return zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(head)
+    except zlib.error:
+        return head
+
+
+GZIP = b"\x1f\x8b"
+"""How gzipped files begin."""
 
 
 def mark_png(png: bytes) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import time
 from collections.abc import Callable
@@ -79,8 +80,12 @@ class Result:
 def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:
     """Names a result: the same program version, settings and bytes of image and mask give the same key."""
     masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
-    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source)
-    return digest.hexdigest()[:24]
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
+    return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
+
+
+KEY_BYTES = 6
+"""Of a key: it is compared with the one that a file would have, so that chance hits one in 2^48."""
 
 
 def vectorize(
@@ -296,7 +301,7 @@ def vectorize_file(
         target,
         settings,
         backend,
-        metadata=f"key={job_key(settings, source, mask)}",
+        metadata=job_key(settings, source, mask),
         importance=None if mask is None else load_importance(mask, width, height, mask_name),
         report=report,
         stop=stop,
