@@ -37,7 +37,7 @@ def command(
 
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
-    check_output(output, svg, ending=".png", overwrite=overwrite)
+    check_output(output, svg, endings=(".png",), overwrite=overwrite)
     text = read_svg_text(svg)
     try:
         size = svg_size(inspect_svg(text).root)

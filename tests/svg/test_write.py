@@ -28,6 +28,7 @@ from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
     NAMESPACE,
+    minified,
     read_metadata,
     resized,
     rounded,
@@ -261,3 +262,59 @@ def test_viewers_agree(kind: Kind, basis: Basis) -> None:
     other = cairosvg.svg2png(bytestring=text.encode())
     difference = np.abs(on_white(render_svg(text)) - on_white(Image.open(io.BytesIO(other))))
     assert difference.mean() < 0.01 * 255
+
+
+def test_titles() -> None:
+    title = 'A <b> & "c" \x00\x0b\ud800 ä'
+    text = write_svg(random_scene(Kind.FILL, count=2), title=title)
+    root = ElementTree.fromstring(text)
+    assert root[0].tag == f"{{{NAMESPACE}}}title"
+    assert root[0].text == 'A <b> & "c"  ä'
+    assert "title" not in write_svg(random_scene(Kind.FILL, count=2))
+    back, _ = load_scene(text, 40, 36, "a.svg")
+    assert len(back) == 2
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_minified(kind: Kind) -> None:
+    """It looks the same, and says nothing that shows nothing."""
+    text = write_svg(random_scene(kind, count=3), metadata="abcdefgh", title="t")
+    small = minified(text)
+    assert len(text) - len(small) == len("<!--warpsplat abcdefgh-->\n\n")
+    assert "\n" not in small and "<!--" not in small
+    np.testing.assert_array_equal(on_white(render_svg(small)), on_white(render_svg(text)))
+    assert minified(small) == small
+
+
+def test_black_need_not_be_said() -> None:
+    """Of a fill it is what holds; of a stroke it is not."""
+    for kind in Kind:
+        scene = random_scene(kind, count=3)
+        colors = scene.colors.copy()
+        colors[1] = 0
+        scene = replace(scene, colors=colors)
+        text = write_svg(scene)
+        assert ("#000" in text) == (kind == Kind.STROKE)
+        back, _ = load_scene(text, 40, 36, "a.svg")
+        np.testing.assert_allclose(back.colors, rounded(scene, 100).colors, atol=1e-6)
+
+
+def test_neighbours_of_one_colour_share_a_group() -> None:
+    """Of a colour and line, and of both at once."""
+    for kind in Kind:
+        scene = random_scene(kind, count=6)
+        scene = replace(
+            scene,
+            colors=np.repeat(scene.colors[:2], 3, axis=0),
+            widths=np.full(6, scene.widths[0]),
+            opacities=np.ones(6, np.float32),
+        )
+        text = write_svg(scene, per_pixel=5)
+        name = {Kind.FILL: "fill", Kind.STROKE: "stroke"}[kind]
+        assert text.count(f' {name}="#') == 2 + (kind == Kind.FILL)  # and the background's
+        assert text.count("stroke-width") == (2 if kind == Kind.STROKE else 0)
+        back, _ = load_scene(text, 40, 36, "a.svg")
+        held = rounded(scene, 5)
+        np.testing.assert_allclose(back.colors, held.colors, atol=1e-6)
+        np.testing.assert_allclose(back.widths, held.widths, atol=1e-5)
+        assert write_svg(back, per_pixel=5) == text

@@ -15,7 +15,7 @@ from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
-from warpsplat.svg.write import write_svg
+from warpsplat.svg.write import minified, write_svg
 
 
 def refine(
@@ -61,7 +61,8 @@ def refine(
     )
     seconds = training_seconds(settings, target, started)
     made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
-    svg = write_svg(made.scene, per_pixel=made.per_pixel, background=has_background)
+    svg = write_svg(made.scene, per_pixel=made.per_pixel, background=has_background, title=settings.title)
+    svg = minified(svg) if settings.minify else svg
     eyes = has_time_for_eyes(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=True, eyes=eyes)
     better = score.psnr > before.psnr

@@ -17,7 +17,7 @@ from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
-from warpsplat.files.output import write_result
+from warpsplat.files.output import write_svg_text
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
@@ -31,6 +31,7 @@ from warpsplat.render.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
+from warpsplat.svg.write import minified
 
 
 @dataclass(frozen=True)
@@ -176,13 +177,18 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
-    svg = export(scene, settings, per_pixel, metadata)
+
+    def made() -> str:
+        text = export(scene, settings, per_pixel, metadata)
+        return minified(text) if settings.minify else text
+
+    svg = made()
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = areas(scene) * scene.opacities
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene, settings, per_pixel, metadata)
+        svg = made()
     return svg, scene
 
 
@@ -273,6 +279,7 @@ def vectorize_file(
     *,
     name: str | None = None,
     importance: Path | None = None,
+    keyed: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
@@ -285,6 +292,7 @@ def vectorize_file(
         backend: where to compute.
         name: how messages call the image; default: the file's name.
         importance: file of a mask, see ``load_importance``.
+        keyed: whether the file names the job that made it (``job_key``), for batches to go on from.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
 
@@ -301,9 +309,9 @@ def vectorize_file(
         target,
         settings,
         backend,
-        metadata=job_key(settings, source, mask),
+        metadata=job_key(settings, source, mask) if keyed else "",
         importance=None if mask is None else load_importance(mask, width, height, mask_name),
         report=report,
         stop=stop,
-        write=lambda svg: write_result(output, svg.encode()),
+        write=lambda svg: write_svg_text(output, svg),
     )
