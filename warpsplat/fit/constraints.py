@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from itertools import pairwise
@@ -132,7 +131,7 @@ class Constraints:
         leaders = {handle for joint in joints for handle in _handles(*joint[1:])}
         laid = set(np.concatenate([on[straight] + 1, on[straight] + 2]).tolist())
         point, before, after, free = np.asarray(joints, np.int32).reshape(-1, 4).T
-        first, member, pinned = ties.groups(leaders, laid, _on_border(points, canvas))
+        first, member, pinned = ties.groups(leaders, set(on.tolist()), laid, _on_border(points, canvas))
         return Constraints(line_end, line_start, point, before, after, free, turned, first, member, pinned)
 
     @property
@@ -215,23 +214,23 @@ class _Ties:
             self.join_where(np.ones(2, np.bool_), first.setdefault(int(same[point]), point), point)
 
     def groups(
-        self, leaders: Iterable[int], laid: set[int], border: npt.NDArray[np.bool_]
+        self, leaders: set[int], on: set[int], laid: set[int], border: npt.NDArray[np.bool_]
     ) -> tuple[Ints, Ints, Ints]:
         """First members, members and pins of the ties: those of several coordinates, and of pinned ones.
 
         Args:
-            leaders: points that come first in their ties.
+            leaders: points that come first in their ties ...
+            on: ... and after these, those on the outlines.
             laid: points that are in none.
             border: coordinates that are pinned, with their ties, shape (point, 2).
         """
-        leading = set(leaders)
         members: dict[int, list[int]] = {}
         for i in range(len(self._parent)):
             if i // 2 not in laid:
                 members.setdefault(self.root(i), []).append(i)
         pinned = border.reshape(-1)
         kept = [m for m in members.values() if len(m) > 1 or pinned[m].any()]
-        ordered = [sorted(m, key=lambda i: i // 2 not in leading) for m in kept]
+        ordered = [sorted(m, key=lambda i: (i // 2 not in leaders, i // 2 not in on)) for m in kept]
         first = np.cumsum([0, *map(len, ordered)]).astype(np.int32)
         flat = np.array([i for m in ordered for i in m], np.int32)
         return first, flat, np.array([pinned[m].any() for m in ordered], np.int32)
@@ -240,8 +239,13 @@ class _Ties:
 class Keeper:
     """The conditions of a drawing on a device."""
 
-    def __init__(self, constraints: Constraints, parameters: Parameters) -> None:
-        """``parameters``: of the drawing's scene."""
+    def __init__(
+        self,
+        constraints: Constraints,
+        parameters: Parameters,
+        held: npt.NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Of the drawing whose scene ``parameters`` are; ``held``: points that stay, shape (point,)."""
         device = parameters.backend.device
         self._parameters = parameters
         self._joints, self._ties = len(constraints.joint_point), len(constraints.tie_pinned)
@@ -250,7 +254,7 @@ class Keeper:
             for f in fields(constraints)
         }
         self._arrays["joint_turn"] = parameters.backend.array(wp.vec2, self._joints)
-        parameters.hold("points", constraints.laid)
+        parameters.hold("points", constraints.laid if held is None else constraints.laid | held)
 
     def record_project(self, program: Program) -> None:
         """Record what brings the points back to where they may be."""

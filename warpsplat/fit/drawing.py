@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.fit.constraints import Constraints, Drawing, Ints, Keeper
 from warpsplat.fit.loop import Progress
@@ -63,6 +64,7 @@ def refine_drawing(
     backend: Backend,
     how: Refinement | None = None,
     *,
+    held: npt.NDArray[np.bool_] | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Scene:
@@ -76,6 +78,7 @@ def refine_drawing(
         same: see ``Drawing``, shape (point,).
         backend: where to compute.
         how: rates and steps.
+        held: points that stay where they are, shape (point,).
         report: called every few steps.
         stop: asked after every step; once true, the best so far is taken.
 
@@ -90,7 +93,7 @@ def refine_drawing(
     drawing = Drawing(opaque, joints, same)
     if not len(scene):
         return opaque
-    step = start(target, drawing, backend, how)
+    step = start(target, drawing, backend, how, held)
     best, least = _look(step)
     for done in range(1, how.steps + 1):
         step.advance()
@@ -109,10 +112,16 @@ def refine_drawing(
     return best
 
 
-def start(target: FloatArray, drawing: Drawing, backend: Backend, how: Refinement) -> Step:
-    """A step for ``drawing``, whose points are brought to where they may be."""
+def start(
+    target: FloatArray,
+    drawing: Drawing,
+    backend: Backend,
+    how: Refinement,
+    held: npt.NDArray[np.bool_] | None = None,
+) -> Step:
+    """A step for ``drawing``, whose points are brought to where they may be; ``held`` ones stay there."""
     state = FitState.start(drawing.scene, backend, np.random.default_rng(0))
-    keeper = Keeper(Constraints.of(drawing), state.parameters)
+    keeper = Keeper(Constraints.of(drawing), state.parameters, held)
     keeper.project()
     state.keeper = keeper
     every = np.ones(len(drawing.scene), np.bool_)
