@@ -98,7 +98,8 @@ def run_file(
         number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
         if settings.simplify and pursued:
             number = "no more than needed"
-        say(f"{source}: {number} {PLURALS[settings.kind]} on {backend.device}", err=True)
+        plural = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
+        say(f"{source}: {number} {plural} on {backend.device}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         result = vectorize_file(

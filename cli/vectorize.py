@@ -33,11 +33,18 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
     if values["renderer"] == "gaussian":
         psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
+    levels = ", ".join(_level(level) for level in values["levels"][:-1])
+    note += f"; the first {levels}" if levels else ""
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
         f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
         f"{values['seconds']:.1f} s{note}"
     )
+
+
+def _level(level: dict[str, Any]) -> str:
+    """What a layered file shows up to the end of a level."""
+    return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")
 
 
 @click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from warpsplat.files.output import write_svg_text
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
+from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, solid_color
@@ -30,8 +31,18 @@ from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
+from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.write import minified
+
+
+@dataclass(frozen=True)
+class LevelScore:
+    """What a layered file shows without the layers above a level."""
+
+    shapes: int
+    psnr: float | None
+    """As a viewer shows it [dB]; None where it is the image itself."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +71,8 @@ class Result:
     """Of soft Gaussians' own render."""
     missed: tuple[str, ...] = ()
     """Goals that were not reached, each as a sentence."""
+    levels: tuple[LevelScore, ...] = ()
+    """Of a layered file, of each level's picture."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
@@ -70,11 +83,12 @@ class Result:
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
-            "curves": len(self.scene),
+            "curves": len(self.scene) - len(self.scene.pictures),
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
             "missed": list(self.missed),
+            "levels": [asdict(level) for level in self.levels],
         }
 
 
@@ -119,10 +133,13 @@ def vectorize(
     """
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
-    if scene is None and (settings.target_psnr or settings.max_bytes):
+    pursued = scene is None and (settings.target_psnr or settings.max_bytes)
+    if pursued:
         made = pursue(
             target, settings, backend, importance=importance, seconds=seconds, report=report, stop=stop
         )
+    elif scene is None and settings.levels:
+        made = fit_layered(target, settings, backend, importance=importance, report=report, stop=stop)
     else:
         if settings.simplify and scene is None:
             settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
@@ -136,8 +153,9 @@ def vectorize(
             report=report,
             stop=stop,
         )
-        if settings.renderer != "gaussian":  # which reach beyond the outlines that this order goes by
-            made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
+    if not pursued and settings.renderer != "gaussian":
+        # Soft Gaussians reach beyond the outlines that this order goes by.
+        made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     if target.shape[2] == 4 and not made.interrupted:
         clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
@@ -164,6 +182,7 @@ def vectorize(
         renderer=settings.renderer,
         render_ssim=render_ssim,
         missed=missed_goals(settings, score, seconds),
+        levels=_level_scores(scene, settings, made.per_pixel, target) if score and settings.levels else (),
     )
 
 
@@ -237,6 +256,18 @@ def _score(
         return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
     except Stopped:
         return None
+
+
+def _level_scores(
+    scene: Scene, settings: Settings, per_pixel: float, target: FloatArray
+) -> tuple[LevelScore, ...]:
+    """Of the files that the first layers alone make."""
+    found = []
+    for end in (*level_ends(scene), len(scene)):
+        text = export(scene.take(np.arange(end)), settings, per_pixel)
+        score = score_svg(text, target, own=True, eyes=False)
+        found.append(LevelScore(end, score.as_dict()["psnr"]))
+    return tuple(found)
 
 
 TAIL_SECONDS = 0.3

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Rule, Scene
+from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
 from warpsplat.svg.nest import Path, nested
 from warpsplat.svg.numbers import hex_colors, number
@@ -124,11 +125,14 @@ def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
 
 STROKE_FIRST = ' paint-order="stroke"'
 
+LEVEL_ID = "level-"
+"""What the name of a layer's group begins with; the number of shapes up to its end follows."""
 
-def _colors(scene: Scene, per_pixel: float) -> list[str]:
-    """The paint of each shape."""
+
+def _colors(scene: Scene, ramps: Mapping[int, str]) -> list[str]:
+    """The paint of each shape; ``ramps``: identifiers of gradients."""
     colors = hex_colors(scene.colors)
-    for shape, name in gradients(scene, per_pixel)[1].items():
+    for shape, name in ramps.items():
         colors[shape] = f"url(#{name})"
     return colors
 
@@ -144,7 +148,7 @@ def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
-    colors, opacities = _colors(scene, per_pixel), _opacities(scene, 1.0)
+    colors, opacities = _colors(scene, gradients(scene, per_pixel)[1]), _opacities(scene, 1.0)
     data = PathData(scene, per_pixel)
     paths = (
         _path(scene, i, data.of(i), colors[i], opacities[i], per_pixel, "", in_group=True)
@@ -153,25 +157,49 @@ def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     return np.array([len(str(path)) for path in paths], np.int64)
 
 
-def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
-    """Strokes that are neighbours share a group, and neighbours that say the same of themselves where that is
-    shorter. Twins are one path.
+def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
+    """The markup of a picture, in the file's units."""
+    across, down = (
+        per_pixel * side / own
+        for side, own in zip((scene.canvas.width, scene.canvas.height), picture.size, strict=True)
+    )
+    return f'<g transform="scale({across:.9g} {down:.9g})">{picture.markup}</g>'
+
+
+def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float) -> Iterator[str]:
+    """Layers, where there are several, are groups that say how many shapes they complete. In them strokes
+    that are neighbours share a group, and neighbours that say the same of themselves where that is shorter.
+    Twins are one path, pictures what they are.
     """
-    colors, opacities = _colors(scene, per_pixel), _opacities(scene, opacity_scale)
+    colors, opacities = _colors(scene, ramps), _opacities(scene, opacity_scale)
     data = PathData(scene, per_pixel)
     has_twin = np.append(scene.twin[1:], 0).tolist()
     strokes = (scene.kind == Kind.STROKE).tolist()
     rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
     both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
-    for in_group, shapes in itertools.groupby(
-        np.flatnonzero(scene.twin == 0).tolist(), lambda i: strokes[i] and not has_twin[i]
+    pictures = (scene.paint == Paint.PICTURE).tolist()
+    ends = level_ends(scene)
+    layer = np.searchsorted(ends, np.arange(len(scene)), "right").tolist()
+    names = [f"{LEVEL_ID}{end}" for end in (*ends, len(scene))]
+    last = None
+    for (level, is_picture, in_group), shapes in itertools.groupby(
+        np.flatnonzero(scene.twin == 0).tolist(),
+        lambda i: (layer[i], pictures[i], strokes[i] and not has_twin[i]),
     ):
+        if ends and level != last:
+            yield ("" if last is None else "</g>") + f'<g id="{names[level]}">'
+            last = level
+        if is_picture:
+            yield from (_picture(scene.pictures[scene.picture[i]], scene, per_pixel) for i in shapes)
+            continue
         paths = [
             _path(scene, i, data.of(i), colors[i], both[i], per_pixel, rest[i], in_group=in_group)
             for i in shapes
         ]
         group = (f"<g {STROKE_ATTRIBUTES}>", "</g>") if in_group else ("", "")
         yield from (group[0], *nested(paths), group[1])
+    if last is not None:
+        yield "</g>"
 
 
 def write_svg(
@@ -202,9 +230,9 @@ def write_svg(
     if background and canvas.background is not None:
         fill = hex_colors(canvas.background[None])[0]
         behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>'
-    elements, _ = gradients(scene, per_pixel)
+    elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
-    shapes = "".join(_groups(scene, per_pixel, opacity_scale))
+    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale))
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
         f'viewBox="0 0 {width} {height}">{MARK}{" " if metadata else ""}{metadata}-->\n'
