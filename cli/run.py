@@ -85,12 +85,13 @@ def run_file(
     *,
     data: bytes,
     importance: Path | None = None,
+    keyed: bool = False,
     verbose: int = 0,
     quiet: bool = False,
 ) -> Result:
     """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask.
+    ``importance``: file of a mask. ``keyed``: see ``vectorize_file``.
     """
     pursued = settings.target_psnr or settings.max_bytes
     if verbose:
@@ -108,6 +109,7 @@ def run_file(
             backend,
             name=input_name(source),
             importance=importance,
+            keyed=keyed,
             report=report,
             stop=interrupt,
         )

@@ -163,6 +163,10 @@ class Settings:
     background: str = "auto"
     """``auto``: that of the image, transparent where it has opacity; ``none``: transparent in any case; or a
     colour, ``#rrggbb``, that shows through as well."""
+    title: str = ""
+    """Of the picture, in the file; empty: none."""
+    minify: bool = False
+    """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None
     """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
     (``fit.rounding``)."""
@@ -218,8 +222,10 @@ class Settings:
         for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
             if not isinstance(value, kind):
                 raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
-        flags = (("through-scales", self.through_scales), ("viewer", self.viewer), ("mixed", self.mixed))
-        for name, given in flags:
+        if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
+            raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
+        switches = ("through_scales", "viewer", "mixed", "minify")
+        for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")
         self._check_levels()
@@ -259,6 +265,9 @@ class Settings:
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
+
+MAX_TITLE = 1000
+"""Characters: a title is a line."""
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 

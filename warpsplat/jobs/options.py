@@ -71,6 +71,8 @@ OPTIONS = (
         _defaults.background,
         "COLOR",
     ),
+    Option("title", str, "Title of the picture, in the file.", metavar="TEXT"),
+    Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
 

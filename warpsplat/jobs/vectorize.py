@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import time
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
-from warpsplat.files.output import write_result
+from warpsplat.files.output import write_svg_text
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
@@ -32,6 +33,7 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
+from warpsplat.svg.write import minified
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,12 @@ class Result:
 def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:
     """Names a result: the same program version, settings and bytes of image and mask give the same key."""
     masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
-    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source)
-    return digest.hexdigest()[:24]
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
+    return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
+
+
+KEY_BYTES = 6
+"""Of a key: it is compared with the one that a file would have, so that chance hits one in 2^48."""
 
 
 def vectorize(
@@ -190,13 +196,18 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
-    svg = export(scene, settings, per_pixel, metadata)
+
+    def made() -> str:
+        text = export(scene, settings, per_pixel, metadata)
+        return minified(text) if settings.minify else text
+
+    svg = made()
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = areas(scene) * scene.opacities
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene, settings, per_pixel, metadata)
+        svg = made()
     return svg, scene
 
 
@@ -299,6 +310,7 @@ def vectorize_file(
     *,
     name: str | None = None,
     importance: Path | None = None,
+    keyed: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
@@ -311,6 +323,7 @@ def vectorize_file(
         backend: where to compute.
         name: how messages call the image; default: the file's name.
         importance: file of a mask, see ``load_importance``.
+        keyed: whether the file names the job that made it (``job_key``), for batches to go on from.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
 
@@ -327,9 +340,9 @@ def vectorize_file(
         target,
         settings,
         backend,
-        metadata=f"key={job_key(settings, source, mask)}",
+        metadata=job_key(settings, source, mask) if keyed else "",
         importance=None if mask is None else load_importance(mask, width, height, mask_name),
         report=report,
         stop=stop,
-        write=lambda svg: write_result(output, svg.encode()),
+        write=lambda svg: write_svg_text(output, svg),
     )
