@@ -25,10 +25,16 @@ def star(x: float, y: float, outer: float, inner: float, tips: int = 5) -> str:
 LOGO = (
     '<rect x="5" y="5" width="86" height="86" rx="20" fill="#2457a8"/>'
     f'<polygon points="{star(46, 42, 30, 12)}" fill="#ffd23f"/>'
-    '<circle cx="68" cy="70" r="13" fill="#ee4266"/>'
+    '<circle cx="75" cy="73" r="9" fill="#ee4266"/>'
     '<rect x="18" y="68" width="28" height="11" fill="#ffffff"/>'
 )
 """Four regions on a transparent canvas."""
+
+
+def draw_exactly(body: str, width: int = 96, height: int = 96) -> FloatArray:
+    """An opaque drawing with the mean of 8x8 places a pixel: viewers take fewer."""
+    fine = draw(f'<g transform="scale(8)">{body}</g>', 8 * width, 8 * height)
+    return np.asarray(fine.reshape(height, 8, width, 8, 3).mean(axis=(1, 3)), np.float32)
 
 
 def draw(body: str, width: int = 96, height: int = 96, *, hard: bool = False, jpeg: int = 0) -> FloatArray:

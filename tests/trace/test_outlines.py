@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.trace.drawings import draw, ground, levels
+from tests.trace.drawings import draw, draw_exactly, ground, levels
 from warpsplat.trace.grids import NOBODY
 from warpsplat.trace.order import find_tree
 from warpsplat.trace.outlines import crack_offsets, places
@@ -54,14 +54,14 @@ def test_each_crack_ends_where_the_next_begins() -> None:
 
 @pytest.mark.parametrize("dark", [True, False])
 def test_a_diagonal_line_is_connected(dark: bool) -> None:
-    """Of two diagonals that cross, the one that the picture shows goes on."""
-    painted = np.zeros((6, 6), np.int32)
-    painted[np.arange(6), np.arange(6)] = 1
-    image = np.repeat(np.where(painted, 0.0, 200.0)[..., None], 4, axis=2).astype(np.float32)
-    if not dark:  # its pixels are unlike, the others are all the same
-        image[np.arange(0, 6, 2), np.arange(0, 6, 2)] = 180
+    """Of two colours that cross on a diagonal, the one that there is less of goes on."""
+    painted = np.zeros((12, 12), np.int32)
+    painted[np.arange(12), np.arange(12)] = 1
+    image = np.repeat(np.where((painted == 1) == dark, 0, 200)[..., None], 4, axis=2).astype(np.float32)
     labels = components(painted, image)
-    assert (len(np.unique(labels[painted == 1])) == 1) == dark
+    assert len(np.unique(labels[painted == 1])) == 1
+    loops = find_loops(labels, image)
+    assert sorted(loops.region[~loops.is_hole].tolist()) == [0, 1, 2]
 
 
 SLOPES = [0.0, 0.1, -0.3, 0.7, 1.0, 1.4, -3.0]
@@ -69,9 +69,9 @@ SLOPES = [0.0, 0.1, -0.3, 0.7, 1.0, 1.4, -3.0]
 
 @pytest.mark.parametrize("slope", SLOPES)
 def test_straight_edges_are_exact(slope: float) -> None:
-    """To what 8 bits and the viewer's own antialiasing tell."""
     low, high = (48.3 + slope * (x - 48) for x in (-200, 296))
-    image = levels(draw(ground("#102030") + f'<path d="M-200 {low}L296 {high}V900H-200Z" fill="#f0c090"/>'))
+    body = ground("#102030") + f'<path d="M-200 {low}L296 {high}V900H-200Z" fill="#f0c090"/>'
+    image = levels(draw_exactly(body))
     found = find_regions(image)
     assert len(found.paint) == 2
     loops = find_loops(found.labels, image)

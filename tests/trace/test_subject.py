@@ -10,7 +10,13 @@ from warpsplat.scene import FloatArray
 from warpsplat.trace.subject import guess_subject
 
 LINES = ground("#fff") + (
-    '<g stroke="#111" fill="none"><path d="M8 20L88 60"/><path d="M8 60C40 0 60 100 90 20" stroke-width="2"/></g>'
+    '<g stroke="#111" fill="none"><path d="M8 20L88 60"/>'
+    '<path d="M8 60C40 0 60 100 90 20" stroke-width="2"/></g>'
+)
+LARGE = f'<g transform="scale(2)">{LOGO}</g>'
+BARS = (
+    ground("#264653", 192, 192) + '<rect x="20" y="20" width="60" height="150" fill="#2a9d8f"/>'
+    '<circle cx="130" cy="90" r="40" fill="#e9c46a"/>'
 )
 RAMP = (
     '<defs><linearGradient id="a"><stop stop-color="#f80"/><stop offset="1" stop-color="#80f"/>'
@@ -32,8 +38,8 @@ def dithered(side: int = 96) -> FloatArray:
 
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
-    "hard": (draw(LOGO, hard=True), "drawing"),
-    "jpeg": (draw(ground("#ddd") + LOGO, jpeg=60), "drawing"),
+    "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
+    "jpeg": (draw(BARS, 192, 192, jpeg=60), "drawing"),
     "ramp": (draw(ground("#eee") + RAMP), "drawing"),
     "one colour": (np.ones((64, 64, 3), np.float32), "drawing"),
     "lines": (draw(LINES), "line"),
