@@ -62,6 +62,9 @@ UNSEEN = 120.0
 [levels].
 """
 
+UNSEEN_EACH = 40.0
+"""The same for each pixel of a speck [levels]."""
+
 MOST_THIN = 4000
 """Thin parts that are looked at; a picture with more is no drawing."""
 
@@ -314,8 +317,10 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
         large = np.where(doubtful, NOBODY, painted).astype(np.int32)
         result = explain(image, large, pure, rows, columns, _slack(noise), reach)
         seen = np.maximum(result.residual - (MIXED + noise), 0)
-        energy = np.bincount(regions[rows, columns], seen, len(small))
-        gone = energy[regions[rows, columns]] <= UNSEEN
+        owner = regions[rows, columns]
+        energy = np.bincount(owner, seen, len(small))
+        pixels = np.bincount(owner, minlength=len(small))
+        gone = (energy <= np.maximum(UNSEEN, UNSEEN_EACH * np.minimum(pixels, SPECK)))[owner]
         rows, columns = rows[gone], columns[gone]
         painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
 
