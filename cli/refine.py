@@ -12,7 +12,7 @@ from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
-from warpsplat.files.output import check_output, write_result
+from warpsplat.files.output import SVG_ENDINGS, check_output, write_svg_text
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.options import BY_NAME
 
@@ -25,6 +25,8 @@ from warpsplat.jobs.options import BY_NAME
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @flag(BY_NAME["time-budget"])
 @flag(BY_NAME["precision"])
+@flag(BY_NAME["title"])
+@flag(BY_NAME["minify"])
 @flag(BY_NAME["background"])
 @click.option(
     "--keep",
@@ -56,7 +58,7 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
-    check_output(output, svg, image, ending=".svg", overwrite=overwrite)
+    check_output(output, svg, image, endings=SVG_ENDINGS, overwrite=overwrite)
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.vectorize import summary
@@ -83,7 +85,7 @@ def command(
             stop=interrupt,
         )
         result, before = refined.result, refined.before
-        write_result(output, result.svg.encode())
+        write_svg_text(output, result.svg)
     if refined.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {refined.kept}", err=True)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}

@@ -42,7 +42,7 @@ def command(
             "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of "
             "each Gaussian; vectorize --renderer gaussian reports the figures of its own render"
         )
-    check_output(output, svg, ending=".png", overwrite=overwrite)
+    check_output(output, svg, endings=(".png",), overwrite=overwrite)
     text = read_svg_text(svg)
     try:
         size = svg_size(inspect_svg(text).root)

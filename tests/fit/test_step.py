@@ -8,9 +8,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from tests.fit.drawings import seam
 from tests.fit.pictures import picture
 from tests.kernels.modules import kernel_modules, kernels_of
 from tests.scenes import mixed_scene, picture_scene, with_gradients
+from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases
@@ -96,6 +98,9 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     step = step_for(target, make_settings(iterations=50), device, threads=1, scene=scene)
     assert step._graph is not None
     launched |= {launch.name for program in step.programs for launch in program.launches}
+    tied = start(np.ones((32, 48, 3), np.float32), seam(), Backend.on(device, 1), Refinement())
+    assert tied._graph is not None
+    launched |= {launch.name for program in tied.programs for launch in program.launches}
     layered = mixed_scene(64, 48)
     layered = replace(layered, layer=np.minimum(np.arange(len(layered)), 1).astype(np.int32))
     step = step_for(picture(), make_settings(iterations=50), device, threads=1, scene=layered)

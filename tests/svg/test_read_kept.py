@@ -140,7 +140,7 @@ def test_markup_is_untouched(tmp_path: Path) -> None:
     assert written.count(own) == 2
     for name in ("f", "g0", "layer"):
         assert written.count(f' id="{name}"') == 1, name
-    assert 'fill="url(#gg0)"/></g>' in written
+        assert 'fill="url(#gg0)"/>' in written
     assert psnr(shows(text), shows(written)) > 40
 
 

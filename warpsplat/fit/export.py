@@ -17,7 +17,9 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
     if settings.renderer == "gaussian":
         scene = as_paths(scene, settings.softness)
     plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
-    return write_svg(scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau)
+    return write_svg(
+        scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau, title=settings.title
+    )
 
 
 def show(text: str, scene: Scene) -> Image.Image:

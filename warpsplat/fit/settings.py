@@ -18,6 +18,7 @@ from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
+Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Renderer = Literal["exact", "splat", "gaussian"]
 
 
@@ -111,6 +112,8 @@ class Density:
 class Settings:
     """All that decides the result, besides the image."""
 
+    subject: Subject = "auto"
+    """What the image shows: ``photo`` is fitted, the others are traced (``jobs.subjects``)."""
     kind: Kind = Kind.FILL
     """Of new shapes."""
     mixed: bool = False
@@ -163,6 +166,16 @@ class Settings:
     background: str = "auto"
     """``auto``: that of the image, transparent where it has opacity; ``none``: transparent in any case; or a
     colour, ``#rrggbb``, that shows through as well."""
+    title: str = ""
+    """Of the picture, in the file; empty: none."""
+    size: str = ""
+    """How large a sheet the picture fills, as ``200x150mm``; empty: its own size."""
+    page: str = ""
+    """Format of the sheet in whose middle the picture lies, as ``a4``; empty: none."""
+    units: str = ""
+    """In which the file says its size; empty: pixels, millimetres of a sheet."""
+    minify: bool = False
+    """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None
     """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
     (``fit.rounding``)."""
@@ -218,12 +231,18 @@ class Settings:
         for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
             if not isinstance(value, kind):
                 raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
-        flags = (("through-scales", self.through_scales), ("viewer", self.viewer), ("mixed", self.mixed))
-        for name, given in flags:
+        if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
+            raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
+        switches = ("through_scales", "viewer", "mixed", "minify")
+        for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")
         self._check_levels()
+        fitted = self.fitted_options()
+        if self.subject not in {"auto", "photo"} and fitted:
+            raise UsageError(f"subject {self.subject} and {fitted[0]} do not go together")
         choices = (
+            ("subject", self.subject, get_args(Subject)),
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
         )
@@ -236,6 +255,18 @@ class Settings:
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
+
+    def fitted_options(self) -> list[str]:
+        """Options that say something of fitted shapes only, as they are given."""
+        given = {
+            "open": self.kind == Kind.STROKE,
+            "mixed": self.mixed,
+            "levels": bool(self.levels),
+            f"renderer {self.renderer}": self.renderer != "exact",
+            "target-psnr": self.target_psnr is not None,
+            "max-bytes": self.max_bytes is not None,
+        }
+        return [name for name, is_given in given.items() if is_given]
 
     def _check_levels(self) -> None:
         levels = self.levels
@@ -259,6 +290,9 @@ class Settings:
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
+
+MAX_TITLE = 1000
+"""Characters: a title is a line."""
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from warpsplat.fit.constraints import Keeper
 from warpsplat.render.backend import Backend
 from warpsplat.render.parameters import Parameters
 from warpsplat.scene import Scene
@@ -26,6 +27,8 @@ class FitState:
     """Steps done."""
     per_pixel: float = GRIDS[-1]
     """Units of the file's view box a pixel."""
+    keeper: Keeper | None = None
+    """What outlines keep, where they have conditions."""
     base: int = 0
     """Shapes of earlier levels (``fit.layered``), which keep their number: the first ones."""
 

@@ -112,7 +112,12 @@ class Step:
         for record_shapes in losses.SHAPE_LOSSES:
             record_shapes(update, parameters, self.settings)
         units = Units.of(self.settings, parameters.canvas)
+        keeper = self.state.keeper
+        if keeper:
+            keeper.record_adjoint(update)
         record_adam(update, parameters, self.state.clock, self.settings, units)
+        if keeper:
+            keeper.record_project(update)
         self.programs: tuple[Program, ...] = (
             self.renderer.forward_program,
             measure,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, make_settings
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, Subject, make_settings
 from warpsplat.scene import Kind
 
 _defaults = Settings()
@@ -46,6 +46,13 @@ OPTIONS = (
         f"{_defaults.curves}; fewer for a simple image",
         "N",
     ),
+    Option(
+        "subject",
+        str,
+        "What the image shows: photo is fitted by shapes, the others are traced.",
+        _defaults.subject,
+        choices=get_args(Subject),
+    ),
     Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
     Option("open", bool, "Strokes.", kind=Kind.STROKE),
     Option("mixed", bool, "Fills, and strokes where they remove more error."),
@@ -71,6 +78,11 @@ OPTIONS = (
         _defaults.background,
         "COLOR",
     ),
+    Option("title", str, "Title of the picture, in the file.", metavar="TEXT"),
+    Option("size", str, "Size that the picture fills, for plotters: 200x150mm.", metavar="WxH"),
+    Option("page", str, "Sheet that it fills but for margins: a3, a4, a5, letter.", metavar="NAME"),
+    Option("units", str, "Units of the file's size: mm, cm, in, pt, px.", "px", metavar="UNIT"),
+    Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
 

@@ -20,7 +20,7 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import KeptScene, load_kept
 from warpsplat.svg.viewer import on_white, render_svg
-from warpsplat.svg.write import write_svg
+from warpsplat.svg.write import minified, write_svg
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,8 @@ def refine(
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
         refined = clear_empty(refined, target, settings, backend, made.per_pixel)
-    svg = write_svg(refined, per_pixel=made.per_pixel, background=has_background)
+    svg = write_svg(refined, per_pixel=made.per_pixel, background=has_background, title=settings.title)
+    svg = minified(svg) if settings.minify else svg
     eyes = has_time_for_eyes(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr

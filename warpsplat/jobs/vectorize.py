@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import time
 from collections.abc import Callable
@@ -16,15 +17,16 @@ from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
-from warpsplat.files.output import write_result
+from warpsplat.files.output import write_svg_text
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.settings import Renderer, Settings, solid_color
+from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.step import model_for
+from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
@@ -32,6 +34,8 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
+from warpsplat.svg.page import placed
+from warpsplat.svg.write import minified
 
 
 @dataclass(frozen=True)
@@ -71,12 +75,18 @@ class Result:
     """Goals that were not reached, each as a sentence."""
     levels: tuple[LevelScore, ...] = ()
     """Of a layered file, of each level's picture."""
+    subject: Subject = "photo"
+    """What the image was taken for ..."""
+    why: str = ""
+    """... and why; empty where it was given."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
             **(self.score.as_dict() if self.score else figures),
+            "subject": self.subject,
+            "why": self.why,
             "renderer": self.renderer,
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
@@ -93,8 +103,12 @@ class Result:
 def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:
     """Names a result: the same program version, settings and bytes of image and mask give the same key."""
     masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
-    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source)
-    return digest.hexdigest()[:24]
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
+    return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
+
+
+KEY_BYTES = 6
+"""Of a key: it is compared with the one that a file would have, so that chance hits one in 2^48."""
 
 
 def vectorize(
@@ -114,7 +128,7 @@ def vectorize(
     Args:
         target: the image, sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape
             (height, width, 4), it makes a file without a background.
-        settings: all that decides the result.
+        settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
         scene: curves to start from; without, new ones.
@@ -127,11 +141,14 @@ def vectorize(
     """
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
+    traced = scene is None and settings.subject not in {"auto", "photo"}
     pursued = scene is None and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
             target, settings, backend, importance=importance, seconds=seconds, report=report, stop=stop
         )
+    elif traced:
+        made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop)
     elif scene is None and settings.levels:
         made = fit_layered(target, settings, backend, importance=importance, report=report, stop=stop)
     else:
@@ -147,10 +164,10 @@ def vectorize(
             report=report,
             stop=stop,
         )
-    if not pursued and settings.renderer != "gaussian":
+    if not pursued and not traced and settings.renderer != "gaussian":
         # Soft Gaussians reach beyond the outlines that this order goes by.
         made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
-    if target.shape[2] == 4 and not made.interrupted:
+    if target.shape[2] == 4 and not traced and not made.interrupted:
         clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
     # A file that was cut short must not pass for a finished one.
@@ -190,13 +207,18 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
-    svg = export(scene, settings, per_pixel, metadata)
+
+    def made() -> str:
+        text = export(scene, settings, per_pixel, metadata)
+        return minified(text) if settings.minify else text
+
+    svg = made()
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = areas(scene) * scene.opacities
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene, settings, per_pixel, metadata)
+        svg = made()
     return svg, scene
 
 
@@ -299,6 +321,7 @@ def vectorize_file(
     *,
     name: str | None = None,
     importance: Path | None = None,
+    keyed: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
@@ -311,6 +334,7 @@ def vectorize_file(
         backend: where to compute.
         name: how messages call the image; default: the file's name.
         importance: file of a mask, see ``load_importance``.
+        keyed: whether the file names the job that made it (``job_key``), for batches to go on from.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
 
@@ -323,13 +347,19 @@ def vectorize_file(
     target = load_target(source, name, settings.background)
     mask, mask_name = (read_input(importance), input_name(importance)) if importance else (None, "")
     height, width = target.shape[:2]
-    return vectorize(
+    chosen, why = decided(target, settings)
+
+    def on_paper(svg: str) -> str:
+        return placed(svg, settings.size, settings.page, settings.units)
+
+    result = vectorize(
         target,
-        settings,
+        chosen,
         backend,
-        metadata=f"key={job_key(settings, source, mask)}",
+        metadata=job_key(settings, source, mask) if keyed else "",
         importance=None if mask is None else load_importance(mask, width, height, mask_name),
         report=report,
         stop=stop,
-        write=lambda svg: write_result(output, svg.encode()),
+        write=lambda svg: write_svg_text(output, on_paper(svg)),
     )
+    return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why)

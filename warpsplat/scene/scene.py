@@ -117,6 +117,8 @@ class Scene:
     """Row of ``pictures`` of each shape, or NO_PICTURE, shape (shape,)."""
     pictures: tuple[Picture, ...] = ()
     """What is shown between other shapes and stays as it is."""
+    layer_names: tuple[str, ...] = ()
+    """Names of the groups by their number; none: levels."""
     dashes: tuple[tuple[float, ...], ...] = ()
     """Patterns of dashes [canvas units]: where in the pattern a stroke begins, then dashes and gaps in turn,
     as many of these as of those."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from warpsplat.errors import UsageError
 from warpsplat.svg.numbers import number
-from warpsplat.svg.write import OUR_HEAD
+from warpsplat.svg.write import NAMESPACE
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
 """Of a unit of CSS."""
@@ -21,6 +21,11 @@ MARGIN = 10.0
 
 LARGEST = 10_000.0
 """Of a side [mm]."""
+
+HEAD = re.compile(
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)"'
+)
+"""How a file written here begins: its size in pixels, and that in units of its view box."""
 
 NUMBER = r"(\d+(?:\.\d+)?)"
 SIZE = re.compile(rf"{NUMBER}\s*[x×]\s*{NUMBER}\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
@@ -99,6 +104,29 @@ def _checked(sheet: Sheet, name: str) -> Sheet:
     return sheet
 
 
+def placed(text: str, size: str, page: str, unit: str) -> str:
+    """A file written here as large as options ask for.
+
+    Args:
+        text: the file.
+        size: as ``parse_size`` takes it; empty: none.
+        page: as ``parse_page`` takes it; empty: none.
+        unit: in which the file says its size; empty: pixels, or millimetres of a size or page.
+
+    Raises:
+        UsageError: one of them is not understood, or both a size and a page are given.
+    """
+    if size and page:
+        raise UsageError("size and page do not go together")
+    found = HEAD.match(text)
+    assert found
+    if size:
+        return on_sheet(text, parse_size(size, unit or "mm"))
+    if page:
+        return on_sheet(text, parse_page(page, int(found[1]), int(found[2]), unit=unit or "mm"))
+    return in_units(text, unit) if unit else text
+
+
 def in_units(text: str, unit: str, dpi: float = 96.0) -> str:
     """A file written here with its own size in ``unit``, at ``dpi`` pixels an inch.
 
@@ -106,7 +134,7 @@ def in_units(text: str, unit: str, dpi: float = 96.0) -> str:
         UsageError: files cannot say their size in ``unit``.
     """
     check_unit(unit)
-    found = OUR_HEAD.match(text)
+    found = HEAD.match(text)
     assert found
     width, height = (float(found[i]) * 25.4 / dpi for i in (1, 2))
     return _with_size(text, Sheet(width, height, unit=unit), (0, 0, float(found[3]), float(found[4])))
@@ -116,7 +144,7 @@ def on_sheet(text: str, sheet: Sheet) -> str:
     """A file written here, as large as the sheet allows and in its middle. Paths stay as they are: the view
     box, in whole units, is what the sheet covers.
     """
-    found = OUR_HEAD.match(text)
+    found = HEAD.match(text)
     assert found
     width, height = float(found[3]), float(found[4])
     units = max(width / (sheet.width - 2 * sheet.margin), height / (sheet.height - 2 * sheet.margin))
@@ -131,10 +159,6 @@ def _with_size(text: str, sheet: Sheet, view: tuple[float, float, float, float])
         number(side / MILLIMETRES[sheet.unit], DECIMALS) + sheet.unit for side in (sheet.width, sheet.height)
     )
     box = " ".join(number(value, DECIMALS) for value in view)
-    head = re.sub(
-        r'width="[^"]*" height="[^"]*" viewBox="[^"]*"',
-        f'width="{width}" height="{height}" viewBox="{box}"',
-        text.split(">", 1)[0],
-        count=1,
-    )
-    return head + text[len(text.split(">", 1)[0]) :]
+    found = HEAD.match(text)
+    assert found
+    return f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{box}"{text[found.end() :]}'

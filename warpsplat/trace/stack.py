@@ -34,6 +34,9 @@ MARGIN = 0.7
 DOT = 8
 """Cracks of the largest loop that is a dot, whose shape cannot be told."""
 
+STRAIGHT = 0.05
+"""How far the joint of two lines may be from their common straight way [px]."""
+
 STILL = 0.02
 """Offset below which a crack is where the pixels say [px]."""
 
@@ -340,4 +343,29 @@ def assembled(outline: Outline, fitted: list[Pieces]) -> Pieces | None:
         if np.hypot(*(goal - last)) > 1e-3:
             cubics.append(straight(last, goal))
             lines.append(True)
-    return Pieces(np.asarray(cubics), np.asarray(lines, np.bool_))
+    return _joined(np.asarray(cubics), lines)
+
+
+def _joined(cubics: Floats, lines: list[bool]) -> Pieces:
+    """Lines that go on in the same direction are one."""
+    kept: list[Floats] = []
+    straight_kept: list[bool] = []
+    for cubic, line in zip(cubics, lines, strict=True):
+        if line and kept and straight_kept[-1] and _goes_on(kept[-1], cubic):
+            kept[-1] = straight(kept[-1][0], cubic[3])
+        else:
+            kept.append(cubic)
+            straight_kept.append(line)
+    if len(kept) > 2 and straight_kept[0] and straight_kept[-1] and _goes_on(kept[-1], kept[0]):
+        kept[0] = straight(kept.pop()[0], kept[0][3])
+        straight_kept.pop()
+    return Pieces(np.asarray(kept), np.asarray(straight_kept, np.bool_))
+
+
+def _goes_on(one: Floats, other: Floats) -> bool:
+    """Whether the joint of two lines is on the straight way from the first's start to the second's end."""
+    way, here = other[3] - one[0], one[3] - one[0]
+    size = float(np.hypot(*way))
+    if size < 1e-6 or here @ way < 0 or (other[3] - one[3]) @ way < 0:
+        return False
+    return bool(abs(here[0] * way[1] - here[1] * way[0]) <= STRAIGHT * size)

@@ -103,11 +103,12 @@ def _turn_parts(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> None
     count = len(tour)
     entries = np.where(turned[:, None], ends[tour], starts[tour])
     exits = np.where(turned[:, None], starts[tour], ends[tour])
-    for low in range(1, count):
+    for low in range(count):
         high = np.arange(low, min(low + LOOK_AHEAD, count))
-        before = exits[low - 1]
-        now = np.hypot(*(entries[low] - before)) + np.zeros(len(high))
-        then = np.hypot(*(exits[high] - before).T)
+        now, then = np.zeros(len(high)), np.zeros(len(high))
+        if low:
+            now += np.hypot(*(entries[low] - exits[low - 1]))
+            then += np.hypot(*(exits[high] - exits[low - 1]).T)
         inner = high < count - 1
         following = np.minimum(high + 1, count - 1)
         now += inner * np.hypot(*(entries[following] - exits[high]).T)

@@ -1,0 +1,86 @@
+"""Line art in, strokes out."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.trace.line_art import CROSS, TEE, drawn, grown, shown
+from warpsplat.errors import ImageError
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.vectorize import Result, vectorize, vectorize_file
+from warpsplat.render.backend import Backend
+
+
+def lines_of(image: np.ndarray, device: str) -> Result:
+    return vectorize(image, make_settings(subject="line"), Backend.on(device))
+
+
+def on_clear(image: np.ndarray) -> np.ndarray:
+    """Black ink of a picture on nothing, premultiplied."""
+    cover = 1 - image[..., :1]
+    return np.concatenate([np.zeros_like(image), cover], axis=2)
+
+
+@pytest.mark.parametrize("paths", [CROSS, TEE, '<circle cx="48" cy="36" r="20"/>'])
+def test_the_strokes_are_the_ink(paths: str, device: str) -> None:
+    image = drawn(paths)
+    ink = 1 - image[..., 0]
+    result = lines_of(on_clear(image), device)
+    painted = shown(result.svg)
+    assert "<rect" not in result.svg
+    assert 'fill="#' not in result.svg
+    assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
+    assert np.clip(painted - ink, 0, None).sum() < 0.05 * painted.sum()
+    assert result.score
+    assert result.score.psnr > 26
+
+
+def test_jpeg_and_grey_paper(device: str) -> None:
+    image = drawn(TEE, ground="#ccc")
+    ok, data = cv2.imencode(".jpg", (255 * image).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 60])
+    assert ok
+    noisy = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.float32) / 255
+    result = lines_of(noisy, device)
+    assert len(result.scene) == 2
+    assert re.search(r'<rect [^>]*fill="#(c[a-f0-9])\1\1"|<rect [^>]*fill="#ccc"', result.svg)
+
+
+def test_pens_are_groups_that_say_their_colour(device: str) -> None:
+    image = drawn('<path d="M10 20H86"/><path d="M10 36H86"/><path d="M10 52H60" stroke="#cc0000"/>')
+    result = lines_of(image, device)
+    assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
+    assert result.scene.layer.tolist() == [0, 0, 1]
+    assert result.svg.count("<path") == 3
+
+
+def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> None:
+    image = (255 * drawn(CROSS)[..., ::-1]).astype(np.uint8)
+    ok, data = cv2.imencode(".png", image)
+    assert ok
+    for minify in (False, True):
+        results = [
+            vectorize_file(
+                data.tobytes(),
+                tmp_path / f"{len(page)}.svg",
+                make_settings(subject="line", page=page, minify=minify),
+                Backend.on(device),
+                name="a.png",
+            )
+            for page in ("", "a4")
+        ]
+        text = (tmp_path / "2.svg").read_text()
+        assert text == results[1].svg
+        assert 'width="297mm" height="210mm"' in text
+        assert results[0].score
+        assert results[1].score
+        assert results[0].score.psnr == results[1].score.psnr
+
+
+def test_paper_without_ink_is_refused(device: str) -> None:
+    with pytest.raises(ImageError, match="no lines"):
+        lines_of(np.ones((40, 50, 3), np.float32), device)
