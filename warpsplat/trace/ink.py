@@ -37,6 +37,9 @@ NEAR = 9
 BESIDE = 31
 """Side of the window that knows what full ink is [px]."""
 
+FULL = 0.7
+"""Contrast of full ink over that of strong ink, at the least."""
+
 TINT, PAINTED = 0.05, 0.05
 """How far a channel of an area differs from the paper more than the others do, if it is coloured in, and the
 share of such areas from which on lines must be dark."""
@@ -85,13 +88,11 @@ def find_ink(image: FloatArray) -> Ink:
     near = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(near, seed), floor)
     mask = _held(mask, contrast > seed, TEXTURED_SPECK if is_textured else SPECK)
-    full = cv2.blur(
-        cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8)), (NEAR, NEAR)
-    )
+    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8))
+    # What is lighter than ink elsewhere is thinner than a pixel, to some extent.
+    full = np.maximum(cv2.blur(full, (NEAR, NEAR)), FULL * strong)
     around = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    cover = np.where(
-        around, np.clip((contrast - 0.5 * floor) / np.maximum(full - 0.5 * floor, seed), 0, 1), 0
-    )
+    cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
     return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper)
 
 

@@ -58,26 +58,25 @@ def trace_ink(ink: Ink) -> TracedLines:
 
 
 def rejoined(before: Scene, after: Scene) -> Scene:
-    """``after``, its strokes' ends where they met ``before``: at the mean of where they are now.
+    """``after``, with the ends where strokes met ``before`` as they were then, handles included.
+
+    Where a line's width changes, the caps of the broader part pull its end back and bend it.
 
     Args:
         before: strokes.
         after: the same with other points.
     """
     ends = np.stack([before.first[:-1], before.first[1:] - 1], axis=1)
-    inner = np.stack([ends[:, 0] + 1, ends[:, 1] - 1], axis=1)
-    open_ended = before.closed[np.searchsorted(before.starts, before.first[1:]) - 1] == 0
-    ends, inner = ends[open_ended].reshape(-1), inner[open_ended].reshape(-1)
+    handles = np.stack([ends[:, 0] + 1, ends[:, 1] - 1], axis=1)
+    is_open = before.closed[np.searchsorted(before.starts, before.first[1:]) - 1] == 0
+    ends, handles = ends[is_open].reshape(-1), handles[is_open].reshape(-1)
     if not len(ends):
         return after
-    _, names = np.unique(before.points[ends], axis=0, return_inverse=True)
-    names = names.reshape(-1)
-    count = np.bincount(names)
+    _, names, count = np.unique(before.points[ends], axis=0, return_inverse=True, return_counts=True)
+    shared = count[names.reshape(-1)] > 1
     points = after.points.copy()
-    means = np.stack([np.bincount(names, points[ends, axis]) / count for axis in (0, 1)], axis=1)
-    shift = (means[names] - points[ends]).astype(np.float32)
-    points[ends] += shift
-    np.add.at(points, inner, shift)
+    still = np.concatenate([ends[shared], handles[shared]])
+    points[still] = before.points[still]
     return replace(after, points=points)
 
 

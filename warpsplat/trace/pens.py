@@ -18,7 +18,7 @@ SELDOM = 0.015
 MOST = 8
 """Pens."""
 
-STEP = 0.16
+STEP = 0.12
 """Deviation of the logarithm of a line's width from which on it is drawn in steps."""
 
 SHORTEST = 3.0
