@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.trace.line_art import CROSS, TEE, drawn
-from warpsplat.scene import Kind
+from tests.trace.line_art import CROSS, TEE, drawn, shown
+from warpsplat.scene import Canvas, Kind, Scene
+from warpsplat.svg.write import write_svg
 from warpsplat.trace.centerlines import Line, find_lines
 from warpsplat.trace.ink import find_ink
-from warpsplat.trace.lines import trace_lines
+from warpsplat.trace.lines import rejoined, trace_lines
 from warpsplat.trace.pens import find_pens, width_steps
 from warpsplat.trace.skeleton import find_graph
 
@@ -100,6 +103,27 @@ def test_corners_are_kept() -> None:
     for place in ((20, 12), (70, 12), (70, 56), (20, 56)):
         assert np.hypot(*(corners - place).T).min() < 1.2
     assert len(corners) <= 6
+
+
+def test_an_area_is_filled_by_rings_of_the_pen() -> None:
+    lines = '<path d="M4 5H92"/><path d="M4 67H92"/><path d="M60 12V62"/>'
+    image = drawn(lines + '<circle cx="28" cy="36" r="20" fill="#000" stroke="none"/>')
+    scene = trace_lines(image)
+    assert scene.widths.max() < 5
+    painted = shown(write_svg(replace(scene, canvas=replace(scene.canvas, background=None)))) > 0.5
+    assert painted[image[..., 0] < 0.5].mean() > 0.95
+    assert (image[..., 0] < 0.5)[painted].mean() > 0.95
+
+
+def test_ends_that_met_stay_where_they_met() -> None:
+    """The parts of a line whose width changes."""
+    points = np.array([[[8, 30], [20, 30], [35, 34], [48, 36]], [[48, 36], [60, 38], [75, 40], [88, 40]]])
+    before = Scene.uniform(Kind.STROKE, Canvas(96, 72, None), points.astype(np.float32))
+    moved = before.points + np.random.default_rng(0).normal(0, 0.5, (8, 2)).astype(np.float32)
+    after = rejoined(before, replace(before, points=moved))
+    kept = [False, False, True, True, True, True, False, False]
+    assert (after.points == before.points).all(axis=1).tolist() == kept
+    assert (after.points == moved).all(axis=1).tolist() == [not was for was in kept]
 
 
 def test_no_ink_no_strokes() -> None:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from warpsplat.scene import FloatArray
+from warpsplat.trace.blobs import hollowed
 from warpsplat.trace.grids import Floats, Ints
 from warpsplat.trace.ink import Ink
 from warpsplat.trace.measure import measured
@@ -57,13 +58,15 @@ class Drawing:
 
 def find_lines(ink: Ink) -> Drawing:
     """Centre lines of ``ink``, through junctions where they go straight on."""
+    whole = ink
+    ink, rings, width = hollowed(whole)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
     mask = ink.mask if fine == 1 else _enlarged(ink, fine)
     graph, radii = find_graph(mask)
     if len(graph.edges) > MOST:
         longest = np.argsort([-edge.length() for edge in graph.edges], kind="stable")[:MOST]
         graph = Graph([graph.edges[i] for i in np.sort(longest)], graph.places, graph.radii)
-    colors, weights = line_colors([edge.points / fine for edge in graph.edges], ink)
+    colors, weights = line_colors([*(edge.points / fine for edge in graph.edges), *rings], whole)
     pens, owner = find_pens(colors, weights)
     lines = []
     for chain in _chains(graph, owner):
@@ -72,6 +75,9 @@ def find_lines(ink: Ink) -> Drawing:
             points, widths, closed = line
             points, widths = measured(points / fine, widths / fine, closed, ink.cover)
             lines.append(Line(points, widths, closed, int(owner[chain[0][0]])))
+    for ring, pen in zip(rings, owner[len(graph.edges) :].tolist(), strict=True):
+        points, widths, closed = _smoothed(ring, np.full(len(ring), width), closed=True)
+        lines.append(Line(points, widths, closed, pen))
     return Drawing(lines, pens)
 
 

@@ -28,14 +28,19 @@ NOISE = 5.0
 SEED = 0.35
 """Contrast that a line must reach somewhere, over that of strong ink."""
 
-TEXTURED_SEED, TEXTURED_SPECK = 0.45, 4.0
-"""SEED and SPECK of a picture that is coloured in: crayons leave a texture."""
+TEXTURED_SEED, TEXTURED_SPECK, TEXTURED_SHARE = 0.45, 4.0, 0.6
+"""SEED and SPECK of a picture that is coloured in, where crayons leave a texture, and the share of a piece of
+ink that has the contrast of a seed.
+"""
 
 NEAR = 9
 """Side of the window in which ink is compared with the strongest beside it [px]."""
 
 BESIDE = 31
 """Side of the window that knows what full ink is [px]."""
+
+SOLID = 0.9
+"""Contrast with the picture's paper from which on what is broad is ink, over that of lines."""
 
 FULL = 0.7
 """Contrast of full ink over that of strong ink, at the least."""
@@ -84,15 +89,18 @@ def find_ink(image: FloatArray) -> Ink:
     floor = max(FAINTEST, NOISE * noise)
     dark = contrast[contrast > floor]
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
+    contrast = _with_solid(contrast, light, strong, in_all=is_textured)
     seed = max(floor, (TEXTURED_SEED if is_textured else SEED) * strong)
     near = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(near, seed), floor)
-    mask = _held(mask, contrast > seed, TEXTURED_SPECK if is_textured else SPECK)
+    speck, share = (TEXTURED_SPECK, TEXTURED_SHARE) if is_textured else (SPECK, 0.0)
+    mask = _held(mask, contrast > seed, speck, share)
     full = cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8))
     # What is lighter than ink elsewhere is thinner than a pixel, to some extent.
     full = np.maximum(cv2.blur(full, (NEAR, NEAR)), FULL * strong)
     around = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
+    cover[cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0] = 1
     return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper)
 
 
@@ -130,6 +138,20 @@ def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArr
     return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
 
+def _with_solid(contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool) -> FloatArray:
+    """The contrast with the whole picture's paper where that is as strong as lines have it: what is broad and
+    as dark as ink is no paper.
+    """
+    paper = np.median(light.reshape(-1, 3)[:: max(1, light.size // 300_000)], axis=0)
+    away = np.clip(paper - light, 0, 1)
+    whole = away.min(axis=2) if in_all else away.max(axis=2)
+    lines = contrast > 0.5 * strong
+    if not lines.any():
+        return contrast
+    solid = whole > SOLID * float(np.median(whole[lines]))
+    return np.asarray(np.where(solid, np.maximum(contrast, whole), contrast), np.float32)
+
+
 def _is_colored_in(small: FloatArray) -> bool:
     """Whether areas of the picture, not only lines, have a colour of their own."""
     areas = cv2.medianBlur((255 * np.clip(small, 0, 1)).astype(np.uint8), 15) / np.float32(255)
@@ -144,14 +166,14 @@ def _noise(contrast: FloatArray) -> float:
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
-def _held(mask: Bools, seeds: Bools, speck: float) -> Bools:
-    """The parts of ``mask`` that are no specks and have a seed, without pinholes."""
+def _held(mask: Bools, seeds: Bools, speck: float, share: float) -> Bools:
+    """The parts of ``mask`` that are no specks and more than a ``share`` seeds, without pinholes."""
     edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
     width = 2 * mask.sum() / max(1, edge.sum())
     least = max(SMALLEST, speck * width**2)
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     held = stats[:, cv2.CC_STAT_AREA] >= least
-    held &= np.bincount(parts[seeds], minlength=len(stats)) > 0
+    held &= np.bincount(parts[seeds], minlength=len(stats)) > share * stats[:, cv2.CC_STAT_AREA]
     held[0] = False
     inked = held[parts]
     _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)

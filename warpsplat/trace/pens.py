@@ -72,7 +72,7 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
             np.average(places[owner == pen], axis=0, weights=weights[owner == pen])
             for pen in np.flatnonzero(kept)
         ]
-        centers = np.array(means)
+        centers = _apart(np.array(means), used[kept])
     owner = np.linalg.norm(places[:, None] - centers[None], axis=2).argmin(axis=1)
     order = np.argsort(-np.bincount(owner, weights, len(centers)), kind="stable")
     owner = np.argsort(order)[owner]
@@ -80,6 +80,15 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
         [_weighted_median(colors[owner == pen], weights[owner == pen]) for pen in range(len(order))]
     )
     return pens.astype(np.float32), owner
+
+
+def _apart(centers: Floats, used: Floats) -> Floats:
+    """The centres that no more used one is alike, in their order."""
+    held: list[int] = []
+    for pen in np.argsort(-used, kind="stable").tolist():
+        if not held or np.linalg.norm(centers[held] - centers[pen], axis=1).min() > ALIKE:
+            held.append(pen)
+    return centers[sorted(held)]
 
 
 def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
