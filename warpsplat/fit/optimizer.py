@@ -34,6 +34,8 @@ def record_adam(
     """
     if parameters.has_twins:
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
+    if parameters.has_circles:
+        program.launch(adam.tie_circles, parameters.shape_count, parameters.arrays)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,

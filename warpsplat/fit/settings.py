@@ -18,6 +18,7 @@ from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Renderer = Literal["exact", "splat", "gaussian"]
+Painting = Literal["flat", "linear", "radial", "auto"]
 
 
 FRACTION = (0.0, 1.0)
@@ -132,6 +133,8 @@ class Settings:
     renderer: Renderer = "exact"
     """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
     look like the paths, or the paper's own soft ones."""
+    paint: Painting = "flat"
+    """Of each shape: a colour, a gradient of one kind, or a gradient where it is worth its bytes."""
     softness: float = 0.6
     """Standard deviation that soft Gaussians have at least [px of the canvas]."""
     gaussian_density: float = 0.5
@@ -217,6 +220,7 @@ class Settings:
         choices = (
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
+            ("paint", self.paint, get_args(Painting)),
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
@@ -325,6 +329,9 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         preset = replace(preset, **(GAUSSIAN if given["renderer"] == "gaussian" else {}))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
+    if given.get("paint", "flat") != "flat":
+        # They have bytes for what colours and frames can say as well.
+        preset = replace(preset, rates={**preset.rates, "stop_opacities": 0.0, "stop_offsets": 0.0})
     if "rates" in given:
         given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
     if isinstance(given.get("density"), Mapping):
@@ -338,6 +345,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     settings = replace(preset, **given)
     if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
         raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
+    if settings.renderer == "gaussian" and settings.paint != "flat":
+        raise UsageError("renderer gaussian needs the paint flat")
     return settings
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, make_settings
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Painting, Renderer, Settings, make_settings
 from warpsplat.scene import Kind
 
 _defaults = Settings()
@@ -55,6 +55,13 @@ OPTIONS = (
         "Model of coverage: the file's, or Gaussians that look like it, or the paper's soft ones.",
         _defaults.renderer,
         choices=get_args(Renderer),
+    ),
+    Option(
+        "paint",
+        str,
+        "A colour for each shape, a gradient for each, or whichever is worth its bytes.",
+        _defaults.paint,
+        choices=get_args(Painting),
     ),
     Option("iterations", int, "Steps; overrides the effort's number.", metavar="N"),
     Option("target-psnr", float, "Smallest file that has this.", metavar="DB"),
