@@ -111,6 +111,7 @@ def command(
             backend,
             data=data,
             importance=job.importance,
+            keyed=True,
             quiet=quiet,
             verbose=verbose,
         )

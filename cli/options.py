@@ -64,6 +64,8 @@ def flag(option: Option) -> Callable[[Function], Function]:
         return click.option(
             f"--{option.name}", "kind", flag_value=option.kind, type=click.UNPROCESSED, help=shown
         )
+    if option.type is bool:
+        return click.option(f"--{option.name}", is_flag=True, default=None, help=shown)
     kind = click.Choice(option.choices) if option.choices else option.type
     return click.option(f"--{option.name}", type=kind, metavar=option.metavar or None, help=shown)
 

@@ -11,8 +11,8 @@ import click
 from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
-from warpsplat.files.inputs import STANDARD, input_name
-from warpsplat.files.output import check_output, write_result
+from warpsplat.files.inputs import STANDARD, input_name, read_input
+from warpsplat.files.output import SVG_ENDINGS, check_output, write_svg_text
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.options import BY_NAME
 
@@ -25,6 +25,14 @@ from warpsplat.jobs.options import BY_NAME
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @flag(BY_NAME["time-budget"])
 @flag(BY_NAME["precision"])
+@flag(BY_NAME["title"])
+@flag(BY_NAME["minify"])
+@flag(BY_NAME["background"])
+@click.option(
+    "--keep",
+    is_flag=True,
+    help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
+)
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
@@ -37,6 +45,7 @@ def command(
     verbose: int,
     quiet: bool,
     as_json: bool,
+    keep: bool,
     **given: Any,
 ) -> None:
     """Improve SVG (ours, VTracer's ...) against IMAGE by gradient descent.
@@ -49,32 +58,39 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
-    check_output(output, svg, image, ending=".svg", overwrite=overwrite)
+    check_output(output, svg, image, endings=SVG_ENDINGS, overwrite=overwrite)
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.vectorize import summary
-    from warpsplat.files.image import load_image
     from warpsplat.jobs.refine import refine
+    from warpsplat.jobs.vectorize import load_target
     from warpsplat.render.backend import Backend
     from warpsplat.render.device import choose_device, start_warp
     from warpsplat.svg.inspect import read_svg_text
 
-    text, target = read_svg_text(svg), load_image(image)
+    text = read_svg_text(svg)
+    target = load_target(read_input(image), input_name(image), settings.background)
     start_warp()
     backend = Backend.on(choose_device(device), threads)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as report:
-        result, before = refine(
+        refined = refine(
             text,
             target,
             settings,
             backend,
             name=input_name(svg),
+            keep=keep,
             report=report,
             stop=interrupt,
         )
-        write_result(output, result.svg.encode())
+        result, before = refined.result, refined.before
+        write_svg_text(output, result.svg)
+    if refined.kept and not quiet:
+        say(f"warpsplat: {input_name(svg)}: kept as it is: {refined.kept}", err=True)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
+    if keep:
+        values["kept"] = refined.kept
     if as_json:
         say(json.dumps(values), err=output == STANDARD)
     elif not quiet:

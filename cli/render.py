@@ -17,7 +17,7 @@ from warpsplat.errors import ImageError, UsageError
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
 @click.option(
     "--renderer",
-    type=click.Choice(["viewer", "exact", "splat"]),
+    type=click.Choice(["viewer", "exact", "splat", "gaussian"]),
     default="viewer",
     show_default=True,
     help="viewer: resvg. exact, splat: those that curves are fitted with, for SVGs of paths.",
@@ -37,7 +37,12 @@ def command(
 
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
-    check_output(output, svg, ending=".png", overwrite=overwrite)
+    if renderer == "gaussian":
+        raise UsageError(
+            "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of "
+            "each Gaussian; vectorize --renderer gaussian reports the figures of its own render"
+        )
+    check_output(output, svg, endings=(".png",), overwrite=overwrite)
     text = read_svg_text(svg)
     try:
         size = svg_size(inspect_svg(text).root)

@@ -85,19 +85,21 @@ def run_file(
     *,
     data: bytes,
     importance: Path | None = None,
+    keyed: bool = False,
     verbose: int = 0,
     quiet: bool = False,
 ) -> Result:
     """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask.
+    ``importance``: file of a mask. ``keyed``: see ``vectorize_file``.
     """
     pursued = settings.target_psnr or settings.max_bytes
     if verbose:
         number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
         if settings.simplify and pursued:
             number = "no more than needed"
-        say(f"{source}: {number} {PLURALS[settings.kind]} on {backend.device}", err=True)
+        plural = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
+        say(f"{source}: {number} {plural} on {backend.device}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         result = vectorize_file(
@@ -107,6 +109,7 @@ def run_file(
             backend,
             name=input_name(source),
             importance=importance,
+            keyed=keyed,
             report=report,
             stop=interrupt,
         )

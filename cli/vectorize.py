@@ -33,11 +33,18 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
     if values["renderer"] == "gaussian":
         psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
+    levels = ", ".join(_level(level) for level in values["levels"][:-1])
+    note += f"; the first {levels}" if levels else ""
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
         f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
         f"{values['seconds']:.1f} s{note}"
     )
+
+
+def _level(level: dict[str, Any]) -> str:
+    """What a layered file shows up to the end of a level."""
+    return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")
 
 
 @click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
@@ -52,6 +59,9 @@ def summary(output: Path, values: dict[str, Any]) -> str:
 @quality_options
 @importance_option
 @run_options
+@click.option(
+    "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
     image: Path,
@@ -62,6 +72,7 @@ def command(
     threads: int | None,
     verbose: int,
     quiet: bool,
+    as_uri: bool,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -73,16 +84,18 @@ def command(
     """
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
-    from warpsplat.files.output import check_output
+    from warpsplat.files.output import SVG_ENDINGS, check_output
 
     if output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
+    if as_uri and output == STANDARD:
+        raise UsageError("the standard output takes one thing: -o - or --data-uri")
     if image == importance == STANDARD:
         raise UsageError("only one of image and mask can come from the standard input")
     data = read_input(image)
     output = output or Path(image.name).with_suffix(".svg")
     inputs = (image,) if importance is None else (image, importance)
-    check_output(output, *inputs, ending=".svg", overwrite=overwrite)
+    check_output(output, *inputs, endings=SVG_ENDINGS, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
     from warpsplat.render.backend import Backend
     from warpsplat.render.device import choose_device, start_warp
@@ -98,9 +111,14 @@ def command(
         verbose=verbose,
         quiet=quiet,
     )
+    if as_uri:
+        from warpsplat.svg.uri import data_uri
+
+        say(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
+    aside = as_uri or output == STANDARD
     if as_json:
-        say(json.dumps(values), err=output == STANDARD)
+        say(json.dumps(values), err=aside)
     elif not quiet:
-        say(summary(output, values), err=output == STANDARD)
+        say(summary(output, values), err=aside)
     leave(result)

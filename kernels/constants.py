@@ -32,6 +32,7 @@ BEVEL = 2
 FLAT = 0
 LINEAR = 1
 RADIAL = 2
+PICTURE = 3
 """Paints of shapes."""
 
 PAD = 0

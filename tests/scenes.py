@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Rule, Scene
+from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import starts_of
@@ -204,16 +204,32 @@ def points_by_shape(scene: Scene) -> FloatArray:
     return group.points.copy()
 
 
+RING_STEPS = {SPLINE: 1, CUBIC: 3}
+"""Points from one at which a ring may start to the next."""
+
+
 def started_alike(scene: Scene, like: Scene) -> Scene:
-    """``scene`` with its rings of splines rolled to start where those of ``like`` do: what a file says of a
-    ring is not where it starts.
+    """``scene`` with its rings rolled to start where those of ``like`` do: what a file says of a ring is not
+    where it starts.
     """
     points = scene.points.copy()
-    for i in np.flatnonzero((scene.basis == SPLINE) & (scene.kind == Kind.FILL)):
+    for i in np.flatnonzero(scene.kind == Kind.FILL):
         ring, other = scene.points_of(i), like.points_of(i)
-        rolled = [np.roll(ring, shift, axis=0) for shift in range(len(ring))]
+        rolled = [np.roll(ring, shift, axis=0) for shift in range(0, len(ring), RING_STEPS[scene.basis[i]])]
         points[scene.first[i] : scene.first[i + 1]] = min(rolled, key=lambda r: np.abs(r - other).sum())
     return replace(scene, points=points)
+
+
+def picture_scene(canvas: Canvas, picture: Picture) -> Scene:
+    """A picture on all of a canvas."""
+    return replace(
+        disc(500, canvas.width, canvas.width / 2),
+        canvas=canvas,
+        opacities=np.ones(1, np.float32),
+        paint=np.array([Paint.PICTURE], np.int32),
+        picture=np.zeros(1, np.int32),
+        pictures=(picture,),
+    )
 
 
 def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> Scene:

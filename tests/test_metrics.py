@@ -147,7 +147,7 @@ def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) 
     in_strips = strips.draw(text, 371, 357)
     assert np.abs(in_strips.astype(int) - whole).mean() < 0.01
     # Another program's units need not be pixels: its files are drawn in one piece.
-    foreign = text.replace("<metadata>warpsplat", "<metadata>another")
+    foreign = text.replace("<!--warpsplat", "<!--another")
     np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
 
 

@@ -15,8 +15,8 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FLAT = wp.constant(constants.FLAT)
 LINEAR = wp.constant(constants.LINEAR)
+RADIAL = wp.constant(constants.RADIAL)
 PAD = wp.constant(constants.PAD)
 REPEAT = wp.constant(constants.REPEAT)
 TILE = wp.constant(constants.TILE)
@@ -26,6 +26,14 @@ TINY = wp.constant(1.0e-12)
 
 frame: Any = wp.types.vector(length=6, dtype=wp.float32)
 """Origin, first axis, second axis."""
+
+
+@wp.func
+def is_gradient(paint: wp.int32) -> wp.bool:
+    """Whether that is what is here."""
+    if paint == LINEAR:
+        return True
+    return paint == RADIAL
 
 
 @wp.func
@@ -165,14 +173,14 @@ def gradient_forward(
     # Out:
     paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] colour and opacity, by column
 ):
-    """One thread a slot and lane; slots of flat shapes, of ramps and such as are not seen are left out."""
+    """One thread a slot and lane; slots of other paints, of ramps and such as are not seen are left out."""
     i, lane = wp.tid()
     slot = offset + i
     shape = slot_shape[slot]
     if shape < 0:
         return
     state = slot_state[slot]
-    if paint[shape] == FLAT or state & COVERED == 0 or state & HIDDEN != 0:
+    if not is_gradient(paint[shape]) or state & COVERED == 0 or state & HIDDEN != 0:
         return
     if is_ramp(spread[shape], focus[shape], stop_offsets, stop_first[shape], stop_first[shape + 1]):
         return
@@ -220,7 +228,7 @@ def gradient_backward(
     taken as a constant.
     """
     shape = offset + wp.tid()
-    if paint[shape] == FLAT:
+    if not is_gradient(paint[shape]):
         return
     first = stop_first[shape]
     last = stop_first[shape + 1]

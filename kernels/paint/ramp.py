@@ -7,12 +7,18 @@ space go by constant steps, and the share of the second stop is a clamped linear
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint.gradient import frame, is_ramp, pixel_place, to_unit, to_unit_adjoint
+from warpsplat.kernels.paint.gradient import (
+    frame,
+    is_gradient,
+    is_ramp,
+    pixel_place,
+    to_unit,
+    to_unit_adjoint,
+)
 from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FLAT = wp.constant(constants.FLAT)
 LINEAR = wp.constant(constants.LINEAR)
 TILE = wp.constant(constants.TILE)
 COVERED = wp.constant(constants.COVERED)
@@ -74,7 +80,7 @@ def ramp_forward(
     if shape < 0:
         return
     state = slot_state[slot]
-    if paint[shape] == FLAT or state & COVERED == 0 or state & HIDDEN != 0:
+    if not is_gradient(paint[shape]) or state & COVERED == 0 or state & HIDDEN != 0:
         return
     first = stop_first[shape]
     if not is_ramp(spread[shape], focus[shape], stop_offsets, first, stop_first[shape + 1]):
@@ -130,7 +136,7 @@ def ramp_backward(
     """One thread a shape sums its visible slots in a fixed order: the same bits on every run."""
     shape = offset + wp.tid()
     first = stop_first[shape]
-    if paint[shape] == FLAT or not is_ramp(
+    if not is_gradient(paint[shape]) or not is_ramp(
         spread[shape], focus[shape], stop_offsets, first, stop_first[shape + 1]
     ):
         return
@@ -161,10 +167,11 @@ def ramp_backward(
     u_by_v = zero
     v_by_u = zero
     v_by_v = zero
+    columns = int(TILE)  # a loop that is not unrolled, which takes long to compile
     for slot in range(slot_first[shape], slot_last[shape]):
         state = slot_state[slot]
         if state & COVERED != 0 and state & HIDDEN == 0:
-            for x in range(TILE):
+            for x in range(columns):
                 top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
                 u = column(top[0]) + down[0] * row
                 v = column(top[1]) + down[1] * row

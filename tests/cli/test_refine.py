@@ -39,6 +39,46 @@ def test_outputs_and_standard_streams(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "a.svg"]
 
 
+KEPT = '<filter id="f"><feOffset dx="1"/></filter><path d="M5 5h20v9z" filter="url(#f)"/>'
+
+
+def test_what_is_kept_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
+    svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20z" fill="red"/>{KEPT}</svg>')
+    Image.new("RGB", (40, 30), "grey").save(image)
+    arguments = ("refine", svg, image, "-o", output, "--iterations", "5", "--device", "cpu")
+    assert run(*arguments) == 3
+    assert "filter" in one_line(capsys.readouterr().err)
+    assert run(*arguments, "--keep", "--json") == 0
+    captured = capsys.readouterr()
+    values = json.loads(captured.out)
+    assert values["psnr"] > values["psnr_before"]
+    assert values["kept"] == "<path> (filter)"
+    assert one_line(captured.err).endswith("a.svg: kept as it is: <path> (filter)")
+    assert KEPT.partition("</filter>")[2] in output.read_text()
+    assert run(*arguments, "--keep", "-q") == 0
+    assert capsys.readouterr().err == ""
+    svg.write_text(f'{HEAD}width="40" height="30">{KEPT}</svg>')
+    assert run(*arguments, "--keep") == 3
+    assert "no path that can be refined: <path> (filter)" in one_line(capsys.readouterr().err)
+
+
+def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As ``vectorize`` takes them, with the same ``--background``."""
+    svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
+    svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20h-30z" fill="red"/></svg>')
+    picture = Image.new("RGBA", (40, 30))
+    picture.paste((200, 40, 0, 255), (4, 4, 30, 24))
+    picture.save(image)
+    arguments = ("refine", svg, image, "-o", output, "--iterations", "30", "--device", "cpu", "--json")
+    for background, has_one in (("auto", False), ("#ffee00", True)):
+        assert run(*arguments, "--background", background, "--overwrite") == 0
+        values = json.loads(capsys.readouterr().out)
+        assert values["psnr"] > values["psnr_before"]
+        assert ("<rect" in output.read_text()) == has_one
+    assert run(*arguments, "--background", "yellow") == 2
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
     svg.write_text(HEAD + FOREIGN["shapes"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import re
@@ -13,7 +14,9 @@ from PIL import Image
 from tests.cli.helpers import QUICK, one_line, run, shell
 from tests.files.samples import bad_files
 from warpsplat.metrics import psnr
+from warpsplat.svg.uri import data_uri
 from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import minified
 
 
 @pytest.mark.parametrize("kind", ["--closed", "--open"])
@@ -91,7 +94,7 @@ def test_a_file_of_others_is_replaced_with_overwrite_only(
     assert run("vectorize", image, *QUICK) == 0
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.txt", "a", "a.svgz"])
+@pytest.mark.parametrize("name", ["a.png", "a.txt", "a", "a.gz"])
 def test_an_output_is_what_its_name_says(image: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert run("vectorize", image, "-o", image.parent / name, *QUICK) == 2
     assert ".svg" in one_line(capsys.readouterr().err)
@@ -130,14 +133,14 @@ def test_importance(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
             Image.new("L", (30, 20), mask).save(tmp_path / "mask.png")
             given = ["--importance", tmp_path / "mask.png"]
         assert run("vectorize", image, "-o", output, "-q", *QUICK, *given) == 0
-        files[name] = output.read_text().split("</metadata>")[1]
+        files[name] = output.read_text().split("-->")[1]
     assert files["plain"] == files["white"] == files["black"], "one grey weighs nothing more"
     half = Image.new("L", (30, 20), "white")
     half.paste("black", (0, 0, 15, 20))
     half.save(tmp_path / "mask.png")
     output = tmp_path / "half.svg"
     assert run("vectorize", image, "-o", output, "-q", *QUICK, "--importance", tmp_path / "mask.png") == 0
-    assert output.read_text().split("</metadata>")[1] != files["plain"]
+    assert output.read_text().split("-->")[1] != files["plain"]
     half.resize((20, 30)).save(tmp_path / "mask.png")
     assert run("vectorize", image, "-o", output, "-q", *QUICK, "--importance", tmp_path / "mask.png") == 3
     assert "mask.png: 20x30 pixels; a mask must have the proportions of its 60x40 image" in one_line(
@@ -145,3 +148,32 @@ def test_importance(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     )
     assert run("vectorize", "-", "-o", output, "--importance", "-") == 2
     assert "image and mask" in one_line(capsys.readouterr().err)
+
+
+def test_gzipped_files(image: Path, tmp_path: Path) -> None:
+    """The same text, packed; known as ours, so that it is replaced."""
+    plain, packed = tmp_path / "a.svg", tmp_path / "a.svgz"
+    for output in (plain, packed, packed):
+        assert run("vectorize", image, "-o", output, "-q", *QUICK) == 0
+    assert gzip.decompress(packed.read_bytes()) == plain.read_bytes()
+
+
+def test_title_and_minify(image: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.svg"
+    given = ("-o", output, "-q", *QUICK, "--title", "Tom & Jerry")
+    assert run("vectorize", image, *given) == 0
+    text = output.read_text()
+    assert "<title>Tom &amp; Jerry</title>" in text
+    assert run("vectorize", image, *given, "--minify") == 0
+    assert output.read_text() == minified(text)
+    assert run("vectorize", image, *given, "--minify") == 2, "nothing says that it is ours"
+    assert run("vectorize", image, *given, "--minify", "--overwrite") == 0
+
+
+def test_data_uri(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "a.svg"
+    assert run("vectorize", image, "-o", output, *QUICK, "--data-uri") == 0
+    shown = capsys.readouterr()
+    assert shown.out.strip() == data_uri(output.read_text())
+    assert "dB" in shown.err
+    assert run("vectorize", image, "-o", "-", *QUICK, "--data-uri") == 2

@@ -15,7 +15,7 @@ from PIL import Image
 from tests.scenes import random_scene
 from warpsplat.errors import OutputError, UsageError
 from warpsplat.files import output as files
-from warpsplat.files.output import check_output, mark_png, write_atomically
+from warpsplat.files.output import SVG_ENDINGS, check_output, mark_png, write_atomically
 from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
 
@@ -138,8 +138,9 @@ def test_names_that_cannot_be_files(tmp_path: Path) -> None:
         with pytest.raises(UsageError, match="cannot be written"):
             check_output(tmp_path / name)
     with pytest.raises(UsageError, match=r"type \.svg"):
-        check_output(tmp_path / "a.png", ending=".svg")
-    check_output(tmp_path / "a.SVG", ending=".svg")
+        check_output(tmp_path / "a.png", endings=SVG_ENDINGS)
+    check_output(tmp_path / "a.SVG", endings=SVG_ENDINGS)
+    check_output(tmp_path / "a.svgz", endings=SVG_ENDINGS)
 
 
 def test_what_may_be_replaced(tmp_path: Path) -> None:

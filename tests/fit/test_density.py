@@ -116,7 +116,8 @@ def test_a_candidate_is_the_deepest_pixel_of_its_component() -> None:
         for label in range(1, count):
             row, column = np.argwhere((labels == label) & (depth == depth[labels == label].max()))[-1]
             wanted.append((column + 0.5, row + 0.5, depth[row, column], error[labels == label].sum()))
-    centres, radii, masses = density._candidates(error)
+    found = density._candidates(error, mixed=False)
+    centres, radii, masses = found.centres, found.radii, found.masses
     assert len(wanted) > 20
     np.testing.assert_array_equal(
         np.column_stack([centres, radii]), np.array(wanted)[:, :3].astype(np.float32)

@@ -8,9 +8,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from tests.fit.drawings import seam
 from tests.fit.pictures import picture
 from tests.kernels.modules import kernel_modules, kernels_of
-from tests.scenes import mixed_scene, with_gradients
+from tests.scenes import mixed_scene, picture_scene, with_gradients
+from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases
@@ -23,7 +25,7 @@ from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import Capacity
 from warpsplat.render.tiles import from_tiles
-from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Scene
+from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Picture, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.viewer import on_white, render_svg
 
@@ -90,8 +92,18 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     twins = scene.take(np.array([stroke, stroke]))
     scene = scene.append(replace(twins, twin=np.array([0, 1], np.int32)))
     scene = replace(scene, cap=np.full(len(scene), Cap.BUTT, np.int32), canvas=Canvas(64, 48, None))
+    kept = Picture("<g/>", (64, 48), (9, 9), np.full((20, 20, 4), 0.5, np.float32))
+    scene = scene.append(picture_scene(scene.canvas, kept))
     target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)
     step = step_for(target, make_settings(iterations=50), device, threads=1, scene=scene)
+    assert step._graph is not None
+    launched |= {launch.name for program in step.programs for launch in program.launches}
+    tied = start(np.ones((32, 48, 3), np.float32), seam(), Backend.on(device, 1), Refinement())
+    assert tied._graph is not None
+    launched |= {launch.name for program in tied.programs for launch in program.launches}
+    layered = mixed_scene(64, 48)
+    layered = replace(layered, layer=np.minimum(np.arange(len(layered)), 1).astype(np.int32))
+    step = step_for(picture(), make_settings(iterations=50), device, threads=1, scene=layered)
     assert step._graph is not None
     launched |= {launch.name for program in step.programs for launch in program.launches}
     every = {kernel.key for module in kernel_modules() for kernel in kernels_of(module)}

@@ -85,7 +85,8 @@ def _image_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
 
 
 def _svg_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    refine = ("refine", name, GOOD_IMAGE, "-o", "out.svg", "--iterations", "1", "--device", "cpu")
+    keep = rng.choice(((), ("--keep",)))
+    refine = ("refine", name, GOOD_IMAGE, "-o", "out.svg", "--iterations", "1", "--device", "cpu", *keep)
     given, stdin = ("-", name) if rng.random() < 0.05 else (name, "")
     all_of_them = (
         Command(("render", given, "-o", "out.png"), (INPUT,), "out.png", stdin),

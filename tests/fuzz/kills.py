@@ -126,7 +126,7 @@ def kill_once(
     if rng.random() < 0.5:
         for name, data in whole[command].items():
             # An older version's, so that a batch makes it anew.
-            (folder / name).write_bytes(data.replace(b"key=", b"key=0"))
+            (folder / name).write_bytes(data.replace(b"<!--warpsplat ", b"<!--warpsplat 0"))
     before = results(folder)
     moment = rng.uniform(0, span[command] + (COMPILING if cold else 0))
     process = start(folder, command, cache)

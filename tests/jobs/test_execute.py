@@ -47,7 +47,7 @@ def test_a_stopped_result_is_made_again(folder: Path) -> None:
     job = load_jobs(path)[0]
     assert job.done(job.image.read_bytes())
     svg = job.output.read_text()
-    job.output.write_text(svg[: svg.index("key=")] + "stopped" + svg[svg.index("</metadata>") :])
+    job.output.write_text(svg[: svg.index("<!--")] + "<!--warpsplat stopped" + svg[svg.index("-->") :])
     assert not job.done(job.image.read_bytes())
 
 

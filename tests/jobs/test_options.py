@@ -41,4 +41,4 @@ def test_a_default_is_what_a_run_takes(option: Option) -> None:
         value = getattr(settings, option.setting)
         assert ("auto" if value is None else str(value)) == option.default.partition(";")[0]
     else:
-        assert option.name == "quality" or option.setting in Settings.__dataclass_fields__
+        assert option.name in {"quality", "layered"} or option.setting in Settings.__dataclass_fields__

@@ -251,7 +251,7 @@ def test_a_result_that_was_cut_short_is_not_done(folder: Path, size: int) -> Non
     job = load_jobs(write(folder, "jobs: [{images: in/a.png, curves: 9, iterations: 3, device: cpu}]"))[0]
     data = job.image.read_bytes()
     key = job_key(job.settings, data)
-    whole = write_svg(random_scene(Kind.FILL, count=9, width=32, height=24), metadata=f"key={key}").encode()
+    whole = write_svg(random_scene(Kind.FILL, count=9, width=32, height=24), metadata=key).encode()
     job.output.write_bytes(whole)
     assert job.done(data)
     assert not job.done(data + b" "), "another image"

@@ -55,6 +55,14 @@ def test_a_fill_without_two_chains_is_refused(device: str) -> None:
         renderer_for(random_scene(FILL, beziers=3), device, model=SPLAT)
 
 
+def test_a_fill_of_several_contours_is_refused(device: str) -> None:
+    """Though all of its points would make two chains."""
+    scene = random_scene(Kind.FILL, 1, beziers=4)
+    scene = replace(scene, starts=np.array([0, 6, 12], np.int32), closed=np.ones(2, np.int32))
+    with pytest.raises(ValueError, match="shape 0 has several contours"):
+        renderer_for(scene, device, model=SPLAT)
+
+
 def test_splines_are_refused(device: str) -> None:
     cubics, spline = random_scene(FILL), random_scene(STROKE, count=1, basis=Basis.SPLINE)
     with pytest.raises(ValueError, match="shape 4 is a spline, not cubics"):

@@ -22,11 +22,13 @@ from warpsplat.render.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.svg.data import PathData, integers, spline_data
 from warpsplat.svg.numbers import hex_colors, number
+from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
     NAMESPACE,
+    minified,
     read_metadata,
     resized,
     rounded,
@@ -71,13 +73,11 @@ def steps_of(data: str, command: str) -> np.ndarray:
 def test_rounding_does_not_add_up(basis: Basis) -> None:
     """A thousand steps of 0.4 units: the end is at 400, not at 0."""
     points = np.stack([0.4 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
+    points[:, 1] = np.arange(1000) % 3  # no lines
     data = PathData(Scene.uniform(Kind.STROKE, Canvas(400, 1, None), points[None], basis), 1).of(0)
-    if basis == Basis.CUBIC:
-        # Each cubic is relative to the end of the one before.
-        ends = steps_of(data, "c")[2::3]
-    else:
-        ends = np.concatenate([steps_of(data.split("t")[0], "q")[1:], steps_of(data, "t")])
-    assert ends[:, 0].sum() == pytest.approx(400, abs=1)
+    (drawn,) = cubics(data, keep_dots=True)
+    assert ("l" not in data and "c" in data) if basis == Basis.CUBIC else "t" in data
+    assert drawn.points[-1, 0] == pytest.approx(400, abs=1)
 
 
 @pytest.mark.parametrize("kind", list(Kind))
@@ -103,7 +103,7 @@ def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -
     paths = re.findall(r' d="([^"]*)"', text)
     assert len(paths) == (scene.kind == kind).sum()
     for data in paths:
-        assert re.fullmatch(r"M-?\d+[ -]\d+([cqt](-?\d+[ ]?)+)+", data), data
+        assert re.fullmatch(r"[Mm]-?\d+([ -]\d+)+([cqstlhvCSLHV](-?\d+[ ]?)+)*", data), data
         assert "  " not in data and " -" not in data
     assert all(len(x) <= 3 for x in re.findall(r'-opacity="([^"]*)"', text))
     assert all(re.fullmatch(r"\d*(\.\d)?", x) for x in re.findall(r'stroke-width="([^"]*)"', text))
@@ -113,17 +113,18 @@ def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -
 
 
 def without_sharing(text: str) -> str:
-    """The file with each opacity at its path."""
+    """The file with each opacity and colour at its path."""
     root = ElementTree.fromstring(text)
-    for group in root.findall(f"{{{NAMESPACE}}}g"):
-        for index, child in reversed(list(enumerate(group))):
-            if child.tag.endswith("}g"):
-                (said,) = child.attrib
+    for parent in (root, *root.findall(f"{{{NAMESPACE}}}g")):
+        for index, child in reversed(list(enumerate(parent))):
+            if child.tag.endswith("}g") and "stroke-linecap" not in child.attrib:
                 for path in child:
-                    path.set(said, child.attrib[said])
-                group[index : index + 1] = list(child)
+                    path.attrib.update(child.attrib)
+                parent[index : index + 1] = list(child)
     ElementTree.register_namespace("", NAMESPACE)
-    return ElementTree.tostring(root, encoding="unicode").replace(" />", "/>") + "\n"
+    head, mark, _ = text.partition("-->")
+    body = ElementTree.tostring(root, encoding="unicode").replace(" />", "/>").partition(">")[2]
+    return head + mark + body + "\n"
 
 
 @pytest.mark.parametrize("run", range(1, 8))
@@ -261,3 +262,59 @@ def test_viewers_agree(kind: Kind, basis: Basis) -> None:
     other = cairosvg.svg2png(bytestring=text.encode())
     difference = np.abs(on_white(render_svg(text)) - on_white(Image.open(io.BytesIO(other))))
     assert difference.mean() < 0.01 * 255
+
+
+def test_titles() -> None:
+    title = 'A <b> & "c" \x00\x0b\ud800 ä'
+    text = write_svg(random_scene(Kind.FILL, count=2), title=title)
+    root = ElementTree.fromstring(text)
+    assert root[0].tag == f"{{{NAMESPACE}}}title"
+    assert root[0].text == 'A <b> & "c"  ä'
+    assert "title" not in write_svg(random_scene(Kind.FILL, count=2))
+    back, _ = load_scene(text, 40, 36, "a.svg")
+    assert len(back) == 2
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_minified(kind: Kind) -> None:
+    """It looks the same, and says nothing that shows nothing."""
+    text = write_svg(random_scene(kind, count=3), metadata="abcdefgh", title="t")
+    small = minified(text)
+    assert len(text) - len(small) == len("<!--warpsplat abcdefgh-->\n\n")
+    assert "\n" not in small and "<!--" not in small
+    np.testing.assert_array_equal(on_white(render_svg(small)), on_white(render_svg(text)))
+    assert minified(small) == small
+
+
+def test_black_need_not_be_said() -> None:
+    """Of a fill it is what holds; of a stroke it is not."""
+    for kind in Kind:
+        scene = random_scene(kind, count=3)
+        colors = scene.colors.copy()
+        colors[1] = 0
+        scene = replace(scene, colors=colors)
+        text = write_svg(scene)
+        assert ("#000" in text) == (kind == Kind.STROKE)
+        back, _ = load_scene(text, 40, 36, "a.svg")
+        np.testing.assert_allclose(back.colors, rounded(scene, 100).colors, atol=1e-6)
+
+
+def test_neighbours_of_one_colour_share_a_group() -> None:
+    """Of a colour and line, and of both at once."""
+    for kind in Kind:
+        scene = random_scene(kind, count=6)
+        scene = replace(
+            scene,
+            colors=np.repeat(scene.colors[:2], 3, axis=0),
+            widths=np.full(6, scene.widths[0]),
+            opacities=np.ones(6, np.float32),
+        )
+        text = write_svg(scene, per_pixel=5)
+        name = {Kind.FILL: "fill", Kind.STROKE: "stroke"}[kind]
+        assert text.count(f' {name}="#') == 2 + (kind == Kind.FILL)  # and the background's
+        assert text.count("stroke-width") == (2 if kind == Kind.STROKE else 0)
+        back, _ = load_scene(text, 40, 36, "a.svg")
+        held = rounded(scene, 5)
+        np.testing.assert_allclose(back.colors, held.colors, atol=1e-6)
+        np.testing.assert_allclose(back.widths, held.widths, atol=1e-5)
+        assert write_svg(back, per_pixel=5) == text

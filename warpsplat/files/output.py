@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import gzip
 import hashlib
 import os
 import platform
@@ -24,8 +25,8 @@ from pathlib import Path
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.inputs import STANDARD
 
-SVG_MARK = b"<metadata>warpsplat "
-"""In the head of every SVG written here (``svg.write_svg``)."""
+SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
+"""In the head of every SVG written here (``svg.write_svg``), now and by earlier versions."""
 
 PNG_SOFTWARE = "warpsplat"
 """Text of the ``Software`` chunk of every PNG written here."""
@@ -40,13 +41,17 @@ _unfinished: set[str] = set()
 """Temporary files of this process."""
 
 
-def check_output(path: Path, *sources: Path, ending: str | None = None, overwrite: bool = True) -> None:
+SVG_ENDINGS = (".svg", ".svgz")
+"""Of names of SVG files; the second kind is gzipped."""
+
+
+def check_output(path: Path, *sources: Path, endings: tuple[str, ...] = (), overwrite: bool = True) -> None:
     """Find out before the work whether ``path`` can be written, or ``-``, the standard output.
 
     Args:
         path: the result.
         sources: files that it must not replace.
-        ending: what the name must end with, ``.svg``; any if None.
+        endings: one of which the name must have, as ``.svg``; any if there are none.
         overwrite: whether a file that warpsplat did not write may be replaced.
 
     Raises:
@@ -57,8 +62,8 @@ def check_output(path: Path, *sources: Path, ending: str | None = None, overwrit
         return
     try:
         _check_output(path, sources)
-        if ending and path.suffix.lower() != ending:
-            raise UsageError(f"{path}: the result is a file of type {ending}; give it a name that says so")
+        if endings and path.suffix.lower() not in endings:
+            raise UsageError(f"{path}: the result is a file of type {endings[0]}, and its name has to say so")
         if not overwrite and not may_replace(path):
             raise UsageError(f"{path}: exists and was not written by warpsplat; --overwrite replaces it")
     except (OSError, ValueError) as error:
@@ -139,7 +144,23 @@ def may_replace(path: Path) -> bool:
             head = file.read(HEAD)
     except FileNotFoundError:
         return True
-    return not head or SVG_MARK in head or b"tEXtSoftware\0" + PNG_SOFTWARE.encode() in head
+    head = unpacked(head)
+    marks = (*SVG_MARKS, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
+    return not head or any(mark in head for mark in marks)
+
+
+def unpacked(head: bytes) -> bytes:
+    """What the beginning of a file says, gzipped or not."""
+    if head[:2] != GZIP:
+        return head
+    try:
+        return zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(head)
+    except zlib.error:
+        return head
+
+
+GZIP = b"\x1f\x8b"
+"""How gzipped files begin."""
 
 
 def mark_png(png: bytes) -> bytes:
@@ -151,6 +172,12 @@ def mark_png(png: bytes) -> bytes:
 
 PNG_HEADER = 33
 """Length of a PNG's signature and header chunk [bytes]."""
+
+
+def write_svg_text(path: Path, text: str) -> None:
+    """Write an SVG, gzipped where the name of ``path`` says so, see ``write_result``."""
+    data = text.encode()
+    write_result(path, gzip.compress(data, mtime=0) if path.suffix.lower() == SVG_ENDINGS[1] else data)
 
 
 def write_result(path: Path, data: bytes) -> None:

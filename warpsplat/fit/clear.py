@@ -11,13 +11,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.fit.export import export
+from warpsplat.fit.export import export, show
 from warpsplat.fit.settings import Settings
 from warpsplat.render.backend import Backend, Viewport
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.renderer import Renderer
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.svg.viewer import render_own
 from warpsplat.svg.write import rounded
 
 ROUNDS = 40
@@ -49,6 +48,9 @@ def clear_empty(
         per_pixel: units of the file's view box a pixel.
     """
     empty = target[..., 3] == 0
+    for picture in scene.pictures:  # which shows what it shows
+        (top, left), (height, width) = picture.corner, picture.pixels.shape[:2]
+        empty[top : top + height, left : left + width] &= picture.pixels[..., 3] == 0
     best, least = scene, -1
     for number in range(ROUNDS):
         held = rounded(scene, per_pixel)
@@ -65,7 +67,7 @@ def clear_empty(
 def _spill(
     scene: Scene, empty: npt.NDArray[np.bool_], settings: Settings, per_pixel: float
 ) -> npt.NDArray[np.bool_]:
-    shown = np.asarray(render_own(export(scene, settings, per_pixel)).convert("RGBA"))
+    shown = np.asarray(show(export(scene, settings, per_pixel), scene).convert("RGBA"))
     return empty & (shown[..., 3] > 0)
 
 

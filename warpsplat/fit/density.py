@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares, straight
-from warpsplat.fit.place import pixel_of, place, shape_angles
+from warpsplat.fit.place import pixel_of, place, place_strokes, shape_angles
 from warpsplat.fit.schedule import opacity_threshold
 from warpsplat.fit.settings import Density, Settings
+from warpsplat.fit.streaks import Streaks
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas, bounds
 
@@ -76,14 +81,39 @@ def least_seen(doomed: BoolArray, count: int, seen: FloatArray) -> IndexArray:
     return np.asarray(rank[: max(count, int(doomed.sum()))])
 
 
-def _candidates(error: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Components of the error map's level sets: (centres [n, 2], radii [n], error inside [n]), in pixels.
+@dataclass(frozen=True)
+class _Candidates:
+    """Places for new shapes."""
+
+    centres: FloatArray
+    """[px], shape (candidate, 2)."""
+    radii: FloatArray
+    """Of a fill, a circle [px]."""
+    masses: FloatArray
+    """The error that a shape covers."""
+    angles: FloatArray
+    """Of a stroke [rad]."""
+    lengths: FloatArray
+    """Of a stroke [px]; 0 for a fill."""
+    widths: FloatArray
+    """Of a stroke [px]."""
+
+    @staticmethod
+    def joined(parts: Sequence[_Candidates]) -> _Candidates:
+        """All of them."""
+        return _Candidates(
+            *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(_Candidates))
+        )
+
+
+def _candidates(error: FloatArray, *, mixed: bool) -> _Candidates:
+    """Components of the error map's level sets.
 
     A component is stood for by its largest inscribed circle: a new shape there covers error only, however
-    branched the component is.
+    branched the component is. Or, if shapes may be ``mixed``, by a stroke, where that covers more of it.
     """
     top = max(float(np.quantile(error, 0.995)), 1e-12)
-    centres, radii, masses = [], [], []
+    found = []
     for level in range(1, ERROR_LEVELS):
         inside = error >= top * level / ERROR_LEVELS
         mask = inside.view(np.uint8)
@@ -101,10 +131,18 @@ def _candidates(error: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         size = np.bincount(label, minlength=number)[1:]
         mass = np.bincount(label, weights=error.ravel()[pixel], minlength=number)[1:]
         radius = depth[row, column]
-        centres.append(np.stack([column + 0.5, row + 0.5], axis=1))
-        radii.append(radius)
-        masses.append(mass * np.minimum(1.0, np.pi * radius**2 / size))
-    return tuple(np.concatenate(x).astype(np.float32) for x in (centres, radii, masses))  # type: ignore[return-value]
+        share = np.minimum(1.0, np.pi * radius**2 / size)
+        centre = np.stack([column + 0.5, row + 0.5], axis=1)
+        lines: list[npt.NDArray[Any]] = [np.zeros(len(radius))] * 3
+        if mixed:
+            streaks = Streaks.of(*np.divmod(pixel, error.shape[1]), label, number)
+            long = streaks.stand_for(share)
+            share = np.where(long, streaks.shares, share)
+            centre = np.where(long[:, None], streaks.centres, centre)
+            lines = [streaks.angles, np.where(long, streaks.lengths, 0.0), streaks.widths]
+        arrays = (centre, radius, mass * share, *lines)
+        found.append(_Candidates(*(np.asarray(array, np.float32) for array in arrays)))
+    return _Candidates.joined(found)
 
 
 def densify(
@@ -125,17 +163,19 @@ def densify(
     total = squares(image - target)
     weighted = total if weights is None else weights * total
     error = np.asarray(cv2.GaussianBlur(weighted, (0, 0), 1.0), np.float32)
-    centres, radii, masses = _candidates(error)
+    found = _candidates(error, mixed=settings.mixed)
     chosen: list[int] = []
     taken = np.zeros(error.shape, np.uint8)
-    for i in np.argsort(-masses, kind="stable"):
+    for i in np.argsort(-found.masses, kind="stable"):
         if len(chosen) == count:
             break
-        x, y = int(centres[i, 0]), int(centres[i, 1])
+        x, y = int(found.centres[i, 0]), int(found.centres[i, 1])
         if not taken[y, x]:
             chosen.append(int(i))
-            cv2.circle(taken, (x, y), max(1, round(float(radii[i]))), 1, -1)
-    places, sizes = centres[chosen], np.maximum(NEW_RADIUS * radii[chosen], 1.5)
+            _take(taken, found, int(i))
+    places, sizes = found.centres[chosen], np.maximum(NEW_RADIUS * found.radii[chosen], 1.5)
+    lengths = np.zeros(count, np.float32)
+    lengths[: len(chosen)] = found.lengths[chosen]
     missing = count - len(chosen)
     if missing > 0:
         weight = error.ravel().astype(np.float64) + 1e-12
@@ -146,4 +186,31 @@ def densify(
     column, row = pixel_of(places, target)
     tones = straight(np.asarray(cv2.GaussianBlur(target, (0, 0), 1.0)[row, column], np.float32))
     angles = shape_angles(settings, target, places, 2.0)
-    return place(settings, scene.canvas, places * unit, np.pi * (sizes * unit) ** 2, angles, tones)
+    shapes = place(settings, scene.canvas, places * unit, np.pi * (sizes * unit) ** 2, angles, tones)
+    long = np.flatnonzero(lengths)
+    if not len(long):
+        return shapes
+    picked = np.array(chosen)[long]
+    strokes = place_strokes(
+        settings,
+        scene.canvas,
+        places[long] * unit,
+        lengths[long] * unit,
+        np.maximum(found.widths[picked], 1.0) * unit,
+        found.angles[picked],
+        tones[long],
+    )
+    order = np.arange(count)
+    order[long] = count + np.arange(len(long))
+    return shapes.append(strokes).take(order)
+
+
+def _take(taken: npt.NDArray[np.uint8], found: _Candidates, i: int) -> None:
+    """Mark what the shape of a candidate covers."""
+    x, y = int(found.centres[i, 0]), int(found.centres[i, 1])
+    if not found.lengths[i]:
+        cv2.circle(taken, (x, y), max(1, round(float(found.radii[i]))), 1, -1)
+        return
+    angle, half = float(found.angles[i]), float(found.lengths[i]) / 2
+    dx, dy = round(half * np.cos(angle)), round(half * np.sin(angle))
+    cv2.line(taken, (x - dx, y - dy), (x + dx, y + dy), 1, max(1, round(float(found.widths[i]))))

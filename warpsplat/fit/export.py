@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from PIL import Image
+
 from warpsplat.fit.as_paths import as_paths
 from warpsplat.fit.settings import Settings
 from warpsplat.kernels import constants
 from warpsplat.scene import Scene
+from warpsplat.svg.viewer import render_own, render_svg
 from warpsplat.svg.write import write_svg
 
 
@@ -14,4 +17,15 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
     if settings.renderer == "gaussian":
         scene = as_paths(scene, settings.softness)
     plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
-    return write_svg(scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau)
+    return write_svg(
+        scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau, title=settings.title
+    )
+
+
+def show(text: str, scene: Scene) -> Image.Image:
+    """The file ``text`` of a scene, as a viewer draws it; what it keeps of other files with precautions.
+
+    Raises:
+        ImageError: what it keeps cannot be drawn.
+    """
+    return render_svg(text) if scene.pictures else render_own(text)

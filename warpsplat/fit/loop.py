@@ -71,9 +71,11 @@ def fit(
     backend: Backend,
     *,
     scene: Scene | None = None,
+    below: Scene | None = None,
     begin: int = 0,
     per_pixel: float | None = None,
     thrifty: bool = False,
+    finish: bool = True,
     importance: FloatArray | None = None,
     seconds: float | None = None,
     report: Callable[[Progress], None] | None = None,
@@ -86,6 +88,8 @@ def fit(
         settings: all that decides the result.
         backend: where to compute.
         scene: shapes to start from, whose number stays; without, new ones.
+        below: shapes of earlier levels, that the settings' number of new ones are put in front of.
+        finish: whether a file is made of the result; else nothing is rounded for it.
         begin: step of the schedule to start at.
         per_pixel: units of the view box a pixel; without, they are chosen.
         thrifty: whether to choose those that are worth their bytes, rather than some that lose little.
@@ -96,8 +100,8 @@ def fit(
     """
     rng = np.random.default_rng(settings.seed)
     grows = scene is None
-    start = grid_scene(settings, image, shapes_at(settings, 0), rng) if scene is None else scene
-    state = FitState.start(start, backend, rng, begin)
+    start = below or scene or grid_scene(settings, image, shapes_at(settings, 0), rng)
+    state = FitState.start(start, backend, rng, begin, len(below) if below else 0)
     budget = Budget(seconds) if seconds is not None else None
     if budget:
         settings = budget.measure(state, settings, image)
@@ -112,7 +116,9 @@ def fit(
         entered = phase_at(settings, plan, state.step)
         if step is None or entered is not phase:
             phase = entered
+            first = step is None and below is not None
             step = Step(state, settings, Target(image, phase, weights))
+            step = operate(step, grows=True) if first else step
         step.advance()
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:
@@ -126,18 +132,20 @@ def fit(
         if done >= settings.iterations or (budget and budget.over()):
             break
         stage = stage_at(settings, done)
-        if stage is not None:
+        if stage is not None and finish:
             if not rounding:
                 state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
                 rounding = True
             hold_stage(step, stage)
-        if not settled and done >= max(opacities_at(settings), begin + 1) and settings.renderer == "exact":
+        exact = settings.renderer == "exact"
+        if finish and exact and not settled and done >= max(opacities_at(settings), begin + 1):
             hold_opacities(step)
             settled = True
         density = settings.density
         surgical = done < density.stop * settings.iterations
-        late = done >= LOOK_FROM * settings.iterations
-        if settings.viewer and finest and late and not rounding and done % LOOK_INTERVAL == 0:
+        # What is kept may show other than over what lies below.
+        late = done >= LOOK_FROM * settings.iterations or bool(start.pictures)
+        if settings.viewer and finish and finest and late and not rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
         due = density.interval > 0 and done % density.interval == 0
         if due and budget and phase is plan[0] and surgical:  # then what is due when stays as it is
@@ -147,10 +155,10 @@ def fit(
         if due and grows and settings.max_bytes and surgical:
             settings = affordable(step)
             step.configure(settings)
-        missing = grows and state.parameters.shape_count != settings.curves
+        missing = grows and state.parameters.shape_count != state.base + settings.curves
         if due and done < settings.iterations and (missing or done < density.stop * settings.iterations):
             step = operate(step, grows=grows)
-    if not rounding:
+    if finish and not rounding:
         state.per_pixel = choose_grid(step, staged=False)
     done = state.step - begin
     return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), done, interrupted)

@@ -14,7 +14,7 @@ from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import USUAL_GRID, finest
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
-from warpsplat.scene import FloatArray, Paint, Scene, Spread
+from warpsplat.scene import GRADIENTS, FloatArray, Paint, Scene, Spread
 from warpsplat.scene.scene import IntArray, starts_of
 
 GRADIENT_BYTES = 185
@@ -44,9 +44,11 @@ def choose_paints(step: Step) -> None:
     least = _price(step, survey.scene) if settings.paint == "auto" else 0.0
     least *= KEEP if state.step > settings.density.thin * settings.iterations else PROMISE
     kind, ramps = _best(settings, survey, least)
-    flat = survey.scene.paint == Paint.FLAT
-    new = flat & (ramps.gain > least) & ~_alike(ramps.colors)
-    old = ~flat & ((survey.flattening <= least) | _alike(_ends(survey.scene)))
+    # What earlier levels show stays as it is.
+    mine = np.arange(len(survey.scene)) >= state.base
+    flat, bent = survey.scene.paint == Paint.FLAT, np.isin(survey.scene.paint, GRADIENTS)
+    new = mine & flat & (ramps.gain > least) & ~_alike(ramps.colors)
+    old = mine & bent & ((survey.flattening <= least) | _alike(_ends(survey.scene)))
     scene = without_gradients(with_ramps(survey.scene, new, kind, ramps), old, survey.flat)
     if (scene.paint != survey.scene.paint).any():
         state.parameters.repaint(scene)
@@ -89,7 +91,7 @@ def _alike(colors: FloatArray) -> Bools:
 def _ends(scene: Scene) -> FloatArray:
     """Colours of the first and last stop, 0 and 0 of flat shapes; shape (shape, 2, 3)."""
     ends = np.zeros((len(scene), 2, 3), np.float32)
-    bent = np.flatnonzero(scene.paint != Paint.FLAT)
+    bent = np.flatnonzero(np.isin(scene.paint, GRADIENTS))
     ends[bent, 0] = scene.stop_colors[scene.stop_first[bent]]
     ends[bent, 1] = scene.stop_colors[scene.stop_first[bent + 1] - 1]
     return ends

@@ -21,6 +21,9 @@ COVER = 1.3
 STROKE_CUBICS = 3
 """Cubics in a new stroke (paper section 3.2, as in DiffVG)."""
 
+MIXED_POINTS = 6
+"""Points of a new stroke among fills: a bar needs few, and more of them shake."""
+
 STROKE_ASPECT = 3.0
 """Length over width of a new stroke."""
 
@@ -144,28 +147,44 @@ def place(
     colors: npt.NDArray[Any],
 ) -> Scene:
     """New shapes of the settings' kind: ``areas`` in px squared, ``angles`` (strokes) in rad."""
-    count = len(centres)
-    if settings.kind == Kind.FILL:
-        if settings.basis == Basis.CUBIC:
-            points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
-        else:
-            points = circle_splines(centres, np.sqrt(areas / np.pi), settings.spline_points)
-        widths = np.zeros(count)
-    else:
+    if settings.kind == Kind.STROKE:
         widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
-        points = stroke_outlines(
-            centres,
-            np.maximum(areas / widths, 2.0),
-            angles,
-            3 * STROKE_CUBICS + 1 if settings.basis == Basis.CUBIC else settings.spline_points,
-        )
+        return place_strokes(settings, canvas, centres, areas / widths, widths, angles, colors)
+    if settings.basis == Basis.CUBIC:
+        points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
+    else:
+        points = circle_splines(centres, np.sqrt(areas / np.pi), settings.spline_points)
+    return _opaque(Kind.FILL, settings.basis, canvas, points, np.zeros(len(centres)), colors)
+
+
+def place_strokes(
+    settings: Settings,
+    canvas: Canvas,
+    centres: Floats,
+    lengths: Floats,
+    widths: Floats,
+    angles: Floats,
+    colors: npt.NDArray[Any],
+) -> Scene:
+    """New straight strokes: ``lengths`` and ``widths`` in px, ``angles`` in rad."""
+    count = MIXED_POINTS if settings.mixed else settings.spline_points
+    if settings.basis == Basis.CUBIC:
+        count = 3 * STROKE_CUBICS + 1
+    points = stroke_outlines(centres, np.maximum(lengths, 2.0), angles, count)
+    return _opaque(Kind.STROKE, settings.basis, canvas, points, widths, colors)
+
+
+def _opaque(
+    kind: Kind, basis: Basis, canvas: Canvas, points: FloatArray, widths: Floats, colors: npt.NDArray[Any]
+) -> Scene:
+    """New shapes, all but opaque."""
     return Scene.uniform(
-        settings.kind,
+        kind,
         canvas,
         points,
-        settings.basis,
-        colors=np.asarray(colors, np.float32).reshape(count, 3),
-        opacities=np.full(count, OPACITY, np.float32),
+        basis,
+        colors=np.asarray(colors, np.float32).reshape(len(points), 3),
+        opacities=np.full(len(points), OPACITY, np.float32),
         widths=np.asarray(widths, np.float32),
     )
 

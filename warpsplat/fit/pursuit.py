@@ -27,7 +27,7 @@ from warpsplat.svg.write import path_sizes
 Report = Callable[[Progress], None]
 Stop = Callable[[], bool]
 
-METADATA = f"key={'0' * 24}"
+METADATA = "0" * 8
 """As long as that of a finished file."""
 
 LAST_STEPS = 0.2

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from warpsplat.fit.step import Step
 from warpsplat.kernels import constants
-from warpsplat.scene import FloatArray, Paint
+from warpsplat.scene import GRADIENTS, FloatArray
 from warpsplat.scene.geometry import bounds
 
 Floats = npt.NDArray[np.float64]
@@ -83,7 +83,7 @@ class Survey:
         self.scene = step.state.scene()
         self._viewport = renderer.viewport
         self._visible = renderer.visible()
-        self._gradient = self.scene.paint != Paint.FLAT
+        self._gradient = np.isin(self.scene.paint, GRADIENTS)
         lacking = step.aim.target.numpy() - renderer.film.buffers.image.numpy()
         if lacking.shape[1] == 4:  # the error is the mean of those on black and on white
             lacking = lacking[:, :3] - 0.5 * lacking[:, 3:]

@@ -14,7 +14,7 @@ from warpsplat.fit.export import export
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
-from warpsplat.scene import OPACITY_RANGE, Scene
+from warpsplat.scene import OPACITY_RANGE, Paint, Scene
 from warpsplat.svg.write import GRIDS, rounded
 
 STAGES = 3
@@ -121,6 +121,7 @@ def hold_opacities(step: Step) -> None:
     opaque = cost < OPACITY_BYTES * byte_worth(step.square_error(), size)
     tenths = np.clip(np.round(scene.opacities, 1), 0.1, OPACITY_RANGE[1])
     opacities = np.where(opaque, OPACITY_RANGE[1], tenths)
+    opacities = np.where(scene.paint == Paint.PICTURE, scene.opacities, opacities)
     parameters.assign(replace(scene, opacities=opacities.astype(np.float32)))
     parameters.hold("opacities", np.ones(len(scene), np.bool_))
 

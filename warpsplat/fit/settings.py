@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 import re
@@ -25,7 +26,7 @@ FRACTION = (0.0, 1.0)
 WEIGHT = (0.0, 1e6)
 RANGES: dict[str, tuple[float, float]] = {
     **dict.fromkeys(("coarse", "final_rate", "texture"), FRACTION),
-    **dict.fromkeys(("ssim", "xing", "bending"), WEIGHT),
+    **dict.fromkeys(("ssim", "xing", "bending", "level_weight"), WEIGHT),
     **dict.fromkeys(("fold_start", "fold_end"), (1e-6, 1e6)),
     "softness": (0.0, 100.0),
     "gaussian_density": (0.05, 20.0),
@@ -113,6 +114,8 @@ class Settings:
 
     kind: Kind = Kind.FILL
     """Of new shapes."""
+    mixed: bool = False
+    """Whether new shapes are strokes where these remove more error than fills: where it is a bar."""
     basis: Basis = Basis.SPLINE
     """Of new shapes; splats need cubics."""
     spline_points: int = 12
@@ -121,7 +124,7 @@ class Settings:
     simplify: bool = False
     """Whether an image that is simple gets fewer curves (``place.simple_curves``)."""
     iterations: int = 1000
-    coarse: float = 0.72
+    coarse: float = 0.82
     """Fraction of the iterations on a reduced image."""
     coarse_pixels: int = 100_000
     """Size of that image [pixels]; a smaller image is not reduced."""
@@ -163,6 +166,10 @@ class Settings:
     background: str = "auto"
     """``auto``: that of the image, transparent where it has opacity; ``none``: transparent in any case; or a
     colour, ``#rrggbb``, that shows through as well."""
+    title: str = ""
+    """Of the picture, in the file; empty: none."""
+    minify: bool = False
+    """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None
     """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
     (``fit.rounding``)."""
@@ -173,6 +180,10 @@ class Settings:
     """Size the run to end within this time [s], start of the program not included."""
     max_bytes: int | None = None
     """The best file that has no more [bytes]; ``curves`` as for ``target_psnr``."""
+    levels: tuple[int, ...] = ()
+    """Numbers of shapes, ascending: the first so many are a picture of their own (``fit.layered``)."""
+    level_weight: float = 0.3
+    """What the squared error of each earlier level's picture counts beside that of the whole."""
     rates: dict[str, float] = field(default_factory=default_rates)
     """Adam's learning rates at the start, by attribute; they decay along a cosine."""
     final_rate: float = 0.2
@@ -214,9 +225,13 @@ class Settings:
         for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
             if not isinstance(value, kind):
                 raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
-        for name, given in (("through-scales", self.through_scales), ("viewer", self.viewer)):
+        if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
+            raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
+        switches = ("through_scales", "viewer", "mixed", "minify")
+        for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")
+        self._check_levels()
         choices = (
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
@@ -224,15 +239,39 @@ class Settings:
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
+        if self.mixed and self.kind != Kind.FILL:
+            raise UsageError("mixed and open do not go together")
+        if self.mixed and self.renderer != "exact":
+            raise UsageError(f"mixed and the renderer {self.renderer} do not go together")
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
+
+    def _check_levels(self) -> None:
+        levels = self.levels
+        for count in levels:
+            check_whole("levels", count, 1, 100_000)
+        if any(later <= earlier for earlier, later in itertools.pairwise(levels)):
+            raise UsageError(f"levels must ascend, not {','.join(map(str, levels))}")
+        if levels and levels[-1] != self.curves:
+            raise UsageError(f"curves {self.curves} and levels, whose last is {levels[-1]}, differ")
+        goals = {
+            "target-psnr": self.target_psnr,
+            "max-bytes": self.max_bytes,
+            "time-budget": self.time_budget,
+        }
+        for name, goal in goals.items():
+            if levels and goal is not None:
+                raise UsageError(f"levels and {name} do not go together")
 
     def fingerprint(self) -> str:
         """A short hash of all that decides the result."""
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
+
+MAX_TITLE = 1000
+"""Characters: a title is a line."""
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 
@@ -279,6 +318,32 @@ def parse_bytes(value: str | int) -> int:
     return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
 
 
+LEVEL_FACTOR = 4
+"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
+
+LEAST_LEVEL = 8
+"""Shapes of the first of these levels, at the least."""
+
+
+def parse_levels(value: object) -> tuple[int, ...]:
+    """``64,256,1024`` -> numbers.
+
+    Raises:
+        UsageError: something else.
+    """
+    parts = value if isinstance(value, (list, tuple)) else str(value).split(",")
+    try:
+        return tuple(int(str(part)) for part in parts)
+    except ValueError as error:
+        raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {value!r}") from error
+
+
+def levels_of(curves: int) -> tuple[int, ...]:
+    """Up to three levels, the last with all the ``curves``."""
+    levels = [curves // LEVEL_FACTOR**2, curves // LEVEL_FACTOR, curves]
+    return tuple(count for count in levels if count >= LEAST_LEVEL or count == curves)
+
+
 PRESETS: dict[Quality, dict[str, Any]] = {
     "draft": {"iterations": 200, "coarse": 0.9, "coarse_pixels": 65_000, "fine_pixels": 400_000},
     "balanced": {},
@@ -316,6 +381,13 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         raise UsageError(f"quality must be one of {', '.join(PRESETS)}, not {quality!r}")
     known = {f.name for f in fields(Settings)}
     given = {name: value for name, value in overrides.items() if value is not None}
+    layered = given.pop("layered", False)
+    if not isinstance(layered, bool):
+        raise UsageError(f"layered must be true or false, not {layered!r}")
+    if "levels" in given or layered:
+        curves = given.get("curves", Settings.curves)
+        given["levels"] = parse_levels(given["levels"]) if "levels" in given else levels_of(curves)
+        given.setdefault("curves", given["levels"][-1])
     for name in given:
         if name not in known:
             raise UsageError(f"unknown setting {name!r}")

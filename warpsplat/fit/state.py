@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from warpsplat.fit.constraints import Keeper
 from warpsplat.render.backend import Backend
 from warpsplat.render.parameters import Parameters
 from warpsplat.scene import Scene
@@ -26,13 +27,19 @@ class FitState:
     """Steps done."""
     per_pixel: float = GRIDS[-1]
     """Units of the file's view box a pixel."""
+    keeper: Keeper | None = None
+    """What outlines keep, where they have conditions."""
+    base: int = 0
+    """Shapes of earlier levels (``fit.layered``), which keep their number: the first ones."""
 
     @staticmethod
-    def start(scene: Scene, backend: Backend, rng: np.random.Generator, step: int = 0) -> FitState:
+    def start(
+        scene: Scene, backend: Backend, rng: np.random.Generator, step: int = 0, base: int = 0
+    ) -> FitState:
         """Before the first step; ``step``: those that count as done."""
         clock = backend.array(wp.int32, 1)
         clock.fill_(step)
-        return FitState(Parameters(scene, backend), clock, rng, step)
+        return FitState(Parameters(scene, backend), clock, rng, step, base=base)
 
     def scene(self) -> Scene:
         """The current scene, on the host."""

@@ -11,6 +11,7 @@ import warp as wp
 from warpsplat.alpha import squares
 from warpsplat.fit import losses
 from warpsplat.fit.importance import weights_at
+from warpsplat.fit.levels import Level
 from warpsplat.fit.losses import Aim, LossInputs
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.schedule import Phase, fold_weight
@@ -70,8 +71,12 @@ class Step:
         *,
         capacity: Capacity | None = None,
         aim: Aim | None = None,
+        level_aim: Aim | None = None,
     ) -> None:
-        """Without ``capacity``, the need is found by rendering."""
+        """Without ``capacity``, the need is found by rendering.
+
+        ``level_aim``: what the pictures of the first levels are compared with; default: the image.
+        """
         self.state, self.settings, self.target = state, settings, target
         self.renderer = Renderer(
             state.parameters,
@@ -79,10 +84,21 @@ class Step:
             model=model_for(settings, state.step, target.slack),
             capacity=capacity,
         )
-        self.aim = aim or Aim(target.image, self.renderer.backend, target.viewport, target.weights)
+        self.aim = aim or self._aim()
         if capacity is None:
             self.renderer.forward_complete()
+        ends = state.parameters.level_ends
+        self.level_aim = level_aim or (self._aim() if ends else None)
+        self.levels = [self._level(end, self.level_aim) for end in ends if self.level_aim]
         self.record()
+
+    def _aim(self) -> Aim:
+        """At the image."""
+        return Aim(self.target.image, self.renderer.backend, self.target.viewport, self.target.weights)
+
+    def _level(self, end: int, aim: Aim) -> Level:
+        model = model_for(self.settings, self.state.step, self.target.slack)
+        return Level.of(self.state, end, self.target.viewport, model, aim)
 
     def record(self) -> None:
         """Record the launches for the arrays and settings as they are now."""
@@ -96,11 +112,17 @@ class Step:
         for record_shapes in losses.SHAPE_LOSSES:
             record_shapes(update, parameters, self.settings)
         units = Units.of(self.settings, parameters.canvas)
+        keeper = self.state.keeper
+        if keeper:
+            keeper.record_adjoint(update)
         record_adam(update, parameters, self.state.clock, self.settings, units)
+        if keeper:
+            keeper.record_project(update)
         self.programs: tuple[Program, ...] = (
             self.renderer.forward_program,
             measure,
             self.renderer.backward_program,
+            *(program for level in self.levels for program in level.programs(self.settings)),
             update,
         )
         self._graph = capture(backend.device, self.programs)
@@ -125,7 +147,8 @@ class Step:
 
     def make_room(self) -> None:
         """Where the last steps ran out of capacity, go on with larger arrays."""
-        if self.renderer.make_room():
+        grown = [each.make_room() for each in (self.renderer, *(level.renderer for level in self.levels))]
+        if any(grown):
             self.record()
 
     def render(self) -> None:
@@ -140,7 +163,14 @@ class Step:
 
     def after_surgery(self) -> Step:
         """A step for the state's new arrays, at the same size."""
-        return Step(self.state, self.settings, self.target, capacity=self.renderer.capacity, aim=self.aim)
+        return Step(
+            self.state,
+            self.settings,
+            self.target,
+            capacity=self.renderer.capacity,
+            aim=self.aim,
+            level_aim=self.level_aim,
+        )
 
     def square_error(self) -> float:
         """Mean squared error of the last render against what it is compared with. Reads the render back."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpsplat.fit.density import densify, least_seen, prune_mask
@@ -10,7 +12,7 @@ from warpsplat.fit.schedule import mean_points_at, repaints_at, shapes_at
 from warpsplat.fit.simplify import simplify
 from warpsplat.fit.split import faded, split
 from warpsplat.fit.step import Step
-from warpsplat.scene import Basis, FloatArray
+from warpsplat.scene import Basis, FloatArray, Scene
 from warpsplat.scene.geometry import areas
 
 
@@ -26,9 +28,11 @@ def operate(step: Step, *, grows: bool) -> Step:
         choose_paints(step)
     scene = state.scene()
     doomed = prune_mask(scene, settings.density, state.step / settings.iterations)
-    wanted = shapes_at(settings, state.step) if grows else len(scene)
-    replaced = 0 if wanted < len(scene) else round(settings.density.replace * len(scene))
-    gone = least_seen(doomed, max(replaced, len(scene) - wanted), seen)
+    doomed[: state.base] = False
+    wanted = state.base + shapes_at(settings, state.step) if grows else len(scene)
+    replaced = 0 if wanted < len(scene) else round(settings.density.replace * (len(scene) - state.base))
+    rank = np.where(np.arange(len(scene)) < state.base, np.inf, seen)
+    gone = least_seen(doomed, max(replaced, len(scene) - wanted), np.asarray(rank, np.float32))
     keep = np.setdiff1d(np.arange(len(scene)), gone)
     added = scene.take(np.arange(0))
     if settings.renderer == "gaussian" and wanted > len(keep):
@@ -40,14 +44,21 @@ def operate(step: Step, *, grows: bool) -> Step:
         weights = step.target.weights
         new = densify(settings, scene, step.target.image, image, missing, state.rng, weights)
         added = added.append(new)
+    if state.base:
+        added = _in_front(added, scene.take(np.arange(state.base)))
     state.parameters.rearrange(keep, added)
     if grows:
         _thin_outlines(step, seen[keep])
     if settings.order == "area":
         scene = state.scene()
-        order = np.argsort(-areas(scene), kind="stable")
+        order = np.lexsort((-areas(scene), scene.layer))
         state.parameters.rearrange(order, scene.take(np.arange(0)))
     return step.after_surgery()
+
+
+def _in_front(added: Scene, base: Scene) -> Scene:
+    """New shapes as those of the level after ``base``."""
+    return replace(added, layer=np.full(len(added), int(base.layer.max()) + 1, np.int32))
 
 
 def _thin_outlines(step: Step, seen: FloatArray) -> None:

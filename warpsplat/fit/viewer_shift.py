@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpsplat.fit.export import export
+from warpsplat.fit.export import export, show
 from warpsplat.fit.step import Step
-from warpsplat.svg.viewer import on_white, premultiplied, render_own
+from warpsplat.svg.viewer import on_white, premultiplied
 from warpsplat.svg.write import resized
 
 
@@ -19,12 +19,13 @@ def look_at_file(step: Step) -> None:
     """
     step.render()
     viewport, image = step.target.viewport, step.target.image
+    scene = step.state.scene()
     text = resized(
-        export(step.state.scene(), step.settings, step.state.per_pixel),
+        export(scene, step.settings, step.state.per_pixel),
         viewport.width,
         viewport.height,
         viewport.scale,
     )
-    picture = render_own(text)
+    picture = show(text, scene)
     shown = (on_white(picture) if image.shape[2] == 3 else premultiplied(picture)) / 255
     step.aim.at(np.asarray(image - (shown - step.renderer.read_image()), np.float32))

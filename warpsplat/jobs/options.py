@@ -48,6 +48,7 @@ OPTIONS = (
     ),
     Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
     Option("open", bool, "Strokes.", kind=Kind.STROKE),
+    Option("mixed", bool, "Fills, and strokes where they remove more error."),
     Option("quality", str, "Effort.", DEFAULT_QUALITY, choices=QUALITIES),
     Option(
         "renderer",
@@ -63,6 +64,8 @@ OPTIONS = (
         _defaults.paint,
         choices=get_args(Painting),
     ),
+    Option("layered", bool, "Groups from coarse to fine, each with those before it a picture of its own."),
+    Option("levels", str, "Shapes up to the end of each of these groups, as 64,256,1024.", metavar="N,N"),
     Option("iterations", int, "Steps; overrides the effort's number.", metavar="N"),
     Option("target-psnr", float, "Smallest file that has this.", metavar="DB"),
     Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
@@ -75,6 +78,8 @@ OPTIONS = (
         _defaults.background,
         "COLOR",
     ),
+    Option("title", str, "Title of the picture, in the file.", metavar="TEXT"),
+    Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
 

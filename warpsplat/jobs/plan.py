@@ -67,7 +67,7 @@ class Job:
                 head = file.read(HEAD).decode("utf-8", "replace")
                 file.seek(max(0, file.seek(0, os.SEEK_END) - len(TAIL)))
                 whole = file.read() == TAIL
-            return whole and read_metadata(head).endswith(f"key={job_key(self.settings, data, mask)}")
+            return whole and read_metadata(head) == job_key(self.settings, data, mask)
         except OSError:
             return False
 

@@ -4,18 +4,35 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from warpsplat.errors import ImageError
+from warpsplat.fit.clear import clear_empty
+from warpsplat.fit.export import show
 from warpsplat.fit.loop import Progress, fit
-from warpsplat.fit.settings import Density, Settings
+from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, training_seconds
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.read import load_scene
-from warpsplat.svg.viewer import on_white, render_own, render_svg
-from warpsplat.svg.write import write_svg
+from warpsplat.svg.read_kept import KeptScene, load_kept
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import minified, write_svg
+
+
+@dataclass(frozen=True)
+class Refined:
+    """What came of an SVG."""
+
+    result: Result
+    """One that is no better is the SVG unchanged."""
+    before: float
+    """PSNR of the SVG itself [dB]."""
+    kept: str
+    """What was kept as it is, for people; empty: nothing."""
 
 
 def refine(
@@ -25,31 +42,30 @@ def refine(
     backend: Backend,
     *,
     name: str,
+    keep: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
-) -> tuple[Result, float]:
+) -> Refined:
     """Improve the SVG ``text`` against ``target``; its shapes stay, none is added or removed.
 
     Args:
         text: the SVG.
-        target: sRGB in [0, 1], shape (height, width, 3).
+        target: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width,
+            4), an SVG without a background stays without one.
         settings: how long, and what file.
         backend: where to compute.
         name: how messages call the SVG.
+        keep: keep elements that the scene cannot hold as they are, in their place, instead of refusing them.
         report: called every few steps.
         stop: asked after every step; once true, the shapes as they are make the file.
 
-    Returns:
-        the result, and the PSNR of ``text`` itself [dB]. A result that is no better is ``text`` unchanged.
+    Raises:
+        ImageError: the SVG cannot be read, or held.
     """
     started = time.monotonic()
-    height, width = target.shape[:2]
-    scene, has_background = load_scene(text, width, height, name)
-    try:
-        _check_read(text, scene, has_background)
-        before = score_svg(text, target, eyes=False)
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
+    base, target, has_background = _load(text, target, settings, name, keep=keep)
+    scene = base.scene
+    before = score_svg(text, target, eyes=False)
     settings = replace(
         settings,
         curves=min(len(scene), 100_000),
@@ -61,16 +77,20 @@ def refine(
     )
     seconds = training_seconds(settings, target, started)
     made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
-    svg = write_svg(made.scene, per_pixel=made.per_pixel, background=has_background)
+    refined = made.scene
+    if target.shape[2] == 4 and not made.interrupted:
+        refined = clear_empty(refined, target, settings, backend, made.per_pixel)
+    svg = write_svg(refined, per_pixel=made.per_pixel, background=has_background, title=settings.title)
+    svg = minified(svg) if settings.minify else svg
     eyes = has_time_for_eyes(settings, target) and not made.interrupted
-    score = score_svg(svg, target, own=True, eyes=eyes)
+    score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr
     if eyes and not better:
         before = score_svg(text, target)
     seconds = time.monotonic() - started
     result = Result(
         svg=svg if better else text,
-        scene=made.scene if better else scene,
+        scene=refined if better else scene,
         score=score if better else before,
         render_psnr=made.render_psnr,
         estimated_psnr=made.estimated_psnr,
@@ -79,7 +99,37 @@ def refine(
         stopped=made.interrupted,
         missed=missed_goals(settings, score, seconds),
     )
-    return result, before.psnr
+    return Refined(result, before.psnr, base.kept)
+
+
+def _load(
+    text: str, target: FloatArray, settings: Settings, name: str, *, keep: bool
+) -> tuple[KeptScene, FloatArray, bool]:
+    """The SVG's scene, what it is to show, and whether the file has a background.
+
+    One that the SVG has lies behind a transparent image as well; ``Settings.background`` may ask for another
+    one, or for none, which makes it a shape as any other.
+    """
+    height, width = target.shape[:2]
+    apart = settings.background != "none"
+    if keep:
+        base = load_kept(text, width, height, name, background_apart=apart)
+    else:
+        base = KeptScene(*load_scene(text, width, height, name, background_apart=apart), "")
+    try:
+        _check_read(text, base.scene, base.has_background)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+    background, has_background = base.scene.canvas.background, base.has_background
+    color = solid_color(settings.background)
+    if color is not None:
+        background, has_background = color, True
+    elif target.shape[2] == 4 and not has_background:
+        background = None
+    if background is not None and target.shape[2] == 4:
+        target = np.asarray(target[..., :3] + (1 - target[..., 3:]) * background, np.float32)
+    scene = replace(base.scene, canvas=replace(base.scene.canvas, background=background))
+    return replace(base, scene=scene), target, has_background
 
 
 def _check_read(text: str, scene: Scene, has_background: bool) -> None:
@@ -89,7 +139,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
         ImageError: they differ.
     """
     given = render_svg(text, width=scene.canvas.width, height=scene.canvas.height)
-    read = render_own(write_svg(scene, background=has_background))
+    read = show(write_svg(scene, background=has_background), scene)
     if given.size != read.size:
         raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")
     alike = psnr(on_white(given), on_white(read))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,11 @@ from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.inputs import input_name, read_input
-from warpsplat.files.output import write_result
+from warpsplat.files.output import write_svg_text
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.goals import pursue
+from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, solid_color
@@ -29,7 +31,18 @@ from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
+from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
+from warpsplat.svg.write import minified
+
+
+@dataclass(frozen=True)
+class LevelScore:
+    """What a layered file shows without the layers above a level."""
+
+    shapes: int
+    psnr: float | None
+    """As a viewer shows it [dB]; None where it is the image itself."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +71,8 @@ class Result:
     """Of soft Gaussians' own render."""
     missed: tuple[str, ...] = ()
     """Goals that were not reached, each as a sentence."""
+    levels: tuple[LevelScore, ...] = ()
+    """Of a layered file, of each level's picture."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
@@ -68,19 +83,24 @@ class Result:
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
-            "curves": len(self.scene),
+            "curves": len(self.scene) - len(self.scene.pictures),
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
             "missed": list(self.missed),
+            "levels": [asdict(level) for level in self.levels],
         }
 
 
 def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:
     """Names a result: the same program version, settings and bytes of image and mask give the same key."""
     masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
-    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source)
-    return digest.hexdigest()[:24]
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
+    return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
+
+
+KEY_BYTES = 6
+"""Of a key: it is compared with the one that a file would have, so that chance hits one in 2^48."""
 
 
 def vectorize(
@@ -113,10 +133,13 @@ def vectorize(
     """
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
-    if scene is None and (settings.target_psnr or settings.max_bytes):
+    pursued = scene is None and (settings.target_psnr or settings.max_bytes)
+    if pursued:
         made = pursue(
             target, settings, backend, importance=importance, seconds=seconds, report=report, stop=stop
         )
+    elif scene is None and settings.levels:
+        made = fit_layered(target, settings, backend, importance=importance, report=report, stop=stop)
     else:
         if settings.simplify and scene is None:
             settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
@@ -130,8 +153,9 @@ def vectorize(
             report=report,
             stop=stop,
         )
-        if settings.renderer != "gaussian":  # which reach beyond the outlines that this order goes by
-            made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
+    if not pursued and settings.renderer != "gaussian":
+        # Soft Gaussians reach beyond the outlines that this order goes by.
+        made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     if target.shape[2] == 4 and not made.interrupted:
         clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
@@ -158,6 +182,7 @@ def vectorize(
         renderer=settings.renderer,
         render_ssim=render_ssim,
         missed=missed_goals(settings, score, seconds),
+        levels=_level_scores(scene, settings, made.per_pixel, target) if score and settings.levels else (),
     )
 
 
@@ -171,13 +196,18 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
-    svg = export(scene, settings, per_pixel, metadata)
+
+    def made() -> str:
+        text = export(scene, settings, per_pixel, metadata)
+        return minified(text) if settings.minify else text
+
+    svg = made()
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / len(svg.encode())
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = areas(scene) * scene.opacities
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = export(scene, settings, per_pixel, metadata)
+        svg = made()
     return svg, scene
 
 
@@ -228,6 +258,18 @@ def _score(
         return None
 
 
+def _level_scores(
+    scene: Scene, settings: Settings, per_pixel: float, target: FloatArray
+) -> tuple[LevelScore, ...]:
+    """Of the files that the first layers alone make."""
+    found = []
+    for end in (*level_ends(scene), len(scene)):
+        text = export(scene.take(np.arange(end)), settings, per_pixel)
+        score = score_svg(text, target, own=True, eyes=False)
+        found.append(LevelScore(end, score.as_dict()["psnr"]))
+    return tuple(found)
+
+
 TAIL_SECONDS = 0.3
 TAIL_PER_PIXEL = 3e-7
 """Of a time budget: what the last step, exporting and scoring take [s]."""
@@ -268,6 +310,7 @@ def vectorize_file(
     *,
     name: str | None = None,
     importance: Path | None = None,
+    keyed: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Result:
@@ -280,6 +323,7 @@ def vectorize_file(
         backend: where to compute.
         name: how messages call the image; default: the file's name.
         importance: file of a mask, see ``load_importance``.
+        keyed: whether the file names the job that made it (``job_key``), for batches to go on from.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
 
@@ -296,9 +340,9 @@ def vectorize_file(
         target,
         settings,
         backend,
-        metadata=f"key={job_key(settings, source, mask)}",
+        metadata=job_key(settings, source, mask) if keyed else "",
         importance=None if mask is None else load_importance(mask, width, height, mask_name),
         report=report,
         stop=stop,
-        write=lambda svg: write_result(output, svg.encode()),
+        write=lambda svg: write_svg_text(output, svg),
     )

@@ -48,7 +48,7 @@ class Film:
 
     def _is_plain(self, paint: Painting) -> bool:
         """Whether all is flat and opaque behind."""
-        return self.planes == 3 and not paint.has_gradients
+        return self.planes == 3 and paint.is_flat
 
     def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record lists and coverages -> ``image``."""

@@ -1,7 +1,7 @@
 """The paint stage: what a shape is coloured with.
 
 The forward half of flat colours is part of compositing, which waits for memory: ``kernels.paint.flat`` is
-inlined there. Gradients fill arrays that compositing reads, and replaces by their gradients.
+inlined there. Gradients and pictures fill arrays that compositing reads, and replaces by their gradients.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient, ramp
+from warpsplat.kernels.paint import flat, gradient, picture, ramp
 from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.bins import Bins
 from warpsplat.render.parameters import Parameters
+from warpsplat.render.pictures import picture_arrays
 from warpsplat.render.program import Program
-from warpsplat.scene import GRADIENTS
+from warpsplat.scene import GRADIENTS, Paint
 
 
 @dataclass
@@ -29,14 +30,14 @@ class PaintBuffers:
     slot_grad: wp.array = buffer(wp.vec4, "lane_slots", "lanes")
     """The same by lane, where it has not."""
     paint_columns: wp.array = buffer(column, "paint_slots", 4, constants.TILE)
-    """Colour (3) and opacity of the pixels of slots with gradients."""
+    """Colour (3) and opacity of the pixels of slots that are not flat."""
     paint_pixels: wp.array = buffer(
         wp.float32, "paint_slots", 4, constants.TILE_PIXELS, memory_of="paint_columns"
     )
 
 
 class Painting:
-    """Flat colours and gradients."""
+    """Flat colours, gradients and pictures."""
 
     def __init__(
         self, backend: Backend, parameters: Parameters, viewport: Viewport, bins: Bins, slots: int
@@ -44,6 +45,12 @@ class Painting:
         self._backend, self._parameters, self._viewport, self._bins = backend, parameters, viewport, bins
         self._slots = slots
         self.has_gradients = bool(parameters.paints & set(GRADIENTS))
+        self._pictures = (
+            picture_arrays(parameters.pictures, viewport, backend.device)
+            if Paint.PICTURE in parameters.paints
+            else None
+        )
+        self.is_flat = not (self.has_gradients or self._pictures)
         whole = backend.lanes == 1
         self.buffers = backend.allocate(
             PaintBuffers,
@@ -51,12 +58,12 @@ class Painting:
                 "column_slots": slots if whole else 1,
                 "lane_slots": 1 if whole else slots,
                 "lanes": backend.lanes,
-                "paint_slots": slots if self.has_gradients else 1,
+                "paint_slots": 1 if self.is_flat else slots,
             },
         )
 
     def forward(self, program: Program) -> None:
-        """Record frames and stops -> colours of the pixels of visible slots with gradients."""
+        """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         if self.has_gradients:
             for kernel in (ramp.ramp_forward, gradient.gradient_forward):
                 program.launch(
@@ -66,6 +73,15 @@ class Painting:
                     lane_columns=self._backend.lane_size,
                     split=True,
                 )
+        if self._pictures:
+            program.launch(
+                picture.picture_forward,
+                (self._slots, self._backend.lanes),
+                *self._sources,
+                self._pictures,
+                lane_columns=self._backend.lane_size,
+                split=True,
+            )
 
     @property
     def _sources(self) -> tuple[object, ...]:

@@ -13,9 +13,20 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.constants import NONE
 from warpsplat.kernels.paint.gradient import frame
 from warpsplat.render.backend import Backend, view
-from warpsplat.scene import ATTRIBUTES, Attribute, Basis, Canvas, FloatArray, IndexArray, Kind, Paint, Scene
+from warpsplat.scene import (
+    ATTRIBUTES,
+    Attribute,
+    Basis,
+    Canvas,
+    FloatArray,
+    IndexArray,
+    Kind,
+    Paint,
+    Picture,
+    Scene,
+)
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
-from warpsplat.scene.scene import starts_of
+from warpsplat.scene.scene import level_ends, starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
@@ -63,6 +74,7 @@ class Parameters:
             "rule": self._ints(scene.rule),
             "paint": self._ints(scene.paint),
             "spread": self._ints(scene.spread),
+            "picture": self._ints(scene.picture),
             "stop_first": self._ints(scene.stop_first),
             "point_first": self._ints(scene.first),
             "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
@@ -104,6 +116,18 @@ class Parameters:
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
 
+    def prefix(self, count: int) -> Parameters:
+        """The first ``count`` shapes: the same values, in the same memory, with gradients of their own.
+
+        It holds as long as the arrays do: until the next ``rearrange``.
+        """
+        part = Parameters(self._scene.take(np.arange(count)), self.backend)
+        for name, group in part.groups.items():
+            rows, size = group.value.shape
+            group.value = view(self.groups[name].value, wp.float32, (rows, size))
+            part.arrays[name] = view(group.value, ELEMENTS[size], (rows,))
+        return part
+
     def _upload_styles(self, scene: Scene) -> None:
         lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
         numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
@@ -134,16 +158,29 @@ class Parameters:
         return frozenset(Paint(k) for k in np.unique(self._scene.paint))
 
     @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """See ``Scene.pictures``."""
+        return self._scene.pictures
+
+    @property
+    def level_ends(self) -> tuple[int, ...]:
+        """Of the scene."""
+        return level_ends(self._scene)
+
+    @property
     def canvas(self) -> Canvas:
         """What the shapes lie on."""
         return self._scene.canvas
 
     def check_chains(self) -> None:
-        """Whether all shapes are cubics and each fill can be halved into two chains of them.
+        """Whether all shapes are cubics of one contour and each fill can be halved into two chains of them.
 
         Raises:
-            ValueError: one is a spline, or has an odd number of cubics.
+            ValueError: one is a spline, or has several contours or an odd number of cubics.
         """
+        several = np.bincount(self._scene.contour_shapes(), minlength=self.shape_count) > 1
+        if several.any():
+            raise ValueError(f"shape {int(np.flatnonzero(several)[0])} has several contours, splats have one")
         splines = self._scene.basis != Basis.CUBIC
         if splines.any():
             raise ValueError(f"shape {int(np.flatnonzero(splines)[0])} is a spline, not cubics")

@@ -19,7 +19,7 @@ from warpsplat.render.paint import Painting
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
 from warpsplat.render.tiles import from_tiles, to_tiles
-from warpsplat.scene import FloatArray, IndexArray, Paint, Scene
+from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
 from warpsplat.scene.scene import IntArray
 
 GROWTH = 1.5
@@ -176,8 +176,8 @@ class Renderer:
         tiles = self.bins.buffers.slot_tile.numpy()
         colored, colors = np.zeros(0, np.intp), np.zeros((0, 3, constants.TILE, constants.TILE), np.float32)
         if self.paint.has_gradients:
-            gradient = self.parameters.arrays["paint"].numpy()[shapes[rows]] != Paint.FLAT
-            colored = np.flatnonzero(gradient)
+            paint = self.parameters.arrays["paint"].numpy()[shapes[rows]]
+            colored = np.flatnonzero(np.isin(paint, GRADIENTS))
             colors = self.paint.buffers.paint_columns.numpy()[rows[colored], :3]
         return Visible(shapes[rows], tiles[rows], shares[rows], colored, colors)
 

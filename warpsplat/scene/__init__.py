@@ -4,6 +4,7 @@ from warpsplat.scene.attributes import (
     ATTRIBUTES,
     GRADIENTS,
     NO_DASHES,
+    NO_PICTURE,
     OPACITY_RANGE,
     TRAITS,
     Attribute,
@@ -16,12 +17,14 @@ from warpsplat.scene.attributes import (
     Spread,
     Unit,
 )
+from warpsplat.scene.picture import Picture
 from warpsplat.scene.scene import Canvas, FloatArray, IndexArray, Scene
 
 __all__ = [
     "ATTRIBUTES",
     "GRADIENTS",
     "NO_DASHES",
+    "NO_PICTURE",
     "OPACITY_RANGE",
     "TRAITS",
     "Attribute",
@@ -33,6 +36,7 @@ __all__ = [
     "Join",
     "Kind",
     "Paint",
+    "Picture",
     "Rule",
     "Scene",
     "Spread",

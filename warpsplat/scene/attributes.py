@@ -68,6 +68,8 @@ class Paint(IntEnum):
     """Stops along the first axis of the shape's frame."""
     RADIAL = constants.RADIAL
     """Stops from the frame's focus to its unit circle."""
+    PICTURE = constants.PICTURE
+    """What a viewer draws of the shape's row of ``Scene.pictures``."""
 
 
 class Spread(IntEnum):
@@ -124,6 +126,9 @@ class Trait:
 NO_DASHES = -1
 """``Scene.dash`` of a solid stroke."""
 
+NO_PICTURE = -1
+"""``Scene.picture`` of a shape with another paint."""
+
 TRAITS = (
     Trait("rule", Rule.NONZERO),
     Trait("cap", Cap.ROUND),
@@ -134,6 +139,7 @@ TRAITS = (
     Trait("layer", 0),
     Trait("paint", Paint.FLAT),
     Trait("spread", Spread.PAD),
+    Trait("picture", NO_PICTURE),
 )
 
 OPACITY_RANGE = (0.02, 0.9985)

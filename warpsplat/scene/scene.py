@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene.attributes import ATTRIBUTES, TRAITS, Attribute, Basis, Kind, Paint
+from warpsplat.scene.attributes import ATTRIBUTES, GRADIENTS, TRAITS, Attribute, Basis, Kind
+from warpsplat.scene.picture import Picture
 
 FloatArray = npt.NDArray[np.float32]
 IndexArray = npt.NDArray[np.intp]
@@ -112,6 +113,10 @@ class Scene:
     fades: FloatArray = None  # type: ignore[assignment]
     """What is added to a stroke's opacity in each of its thirds (of three cubics: in each), shape (shape, 3).
     Soft Gaussians alone know of it: a path has one opacity."""
+    picture: IntArray = None  # type: ignore[assignment]
+    """Row of ``pictures`` of each shape, or NO_PICTURE, shape (shape,)."""
+    pictures: tuple[Picture, ...] = ()
+    """What is shown between other shapes and stays as it is."""
     dashes: tuple[tuple[float, ...], ...] = ()
     """Patterns of dashes [canvas units]: where in the pattern a stroke begins, then dashes and gaps in turn,
     as many of these as of those."""
@@ -161,7 +166,7 @@ class Scene:
             name = Kind(self.kind[owner[bad]]).name.lower()
             raise ValueError(f"a {name} cannot have {counts[bad]} control points")
         stops = np.diff(self.stop_first)
-        if ((stops < 1) & (self.paint != Paint.FLAT)).any() or (stops < 0).any():
+        if ((stops < 1) & np.isin(self.paint, GRADIENTS)).any() or (stops < 0).any():
             raise ValueError("a gradient has no stops")
         alone = self.twin.astype(np.bool_) & (
             np.concatenate([[0], self.point_counts()[:-1]]) != self.point_counts()
@@ -311,6 +316,10 @@ class Scene:
             moved = np.where(other.dash >= 0, other.dash + len(self.dashes), other.dash)
             values["dash"] = np.concatenate([self.dash, moved]).astype(np.int32)
             values["dashes"] = (*self.dashes, *other.dashes)
+        if other.pictures != self.pictures:
+            moved = np.where(other.picture >= 0, other.picture + len(self.pictures), other.picture)
+            values["picture"] = np.concatenate([self.picture, moved]).astype(np.int32)
+            values["pictures"] = (*self.pictures, *other.pictures)
         return replace(
             self,
             kind=np.concatenate([self.kind, other.kind]),
@@ -338,3 +347,8 @@ def ranges(low: npt.NDArray[np.integer], counts: npt.NDArray[np.integer]) -> Ind
 def starts_of(counts: npt.NDArray[np.integer]) -> IntArray:
     """Prefix sum with a 0 in front: ``Scene.first`` of shapes with ``counts`` points."""
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+
+
+def level_ends(scene: Scene) -> tuple[int, ...]:
+    """Shapes of each layer and of those before it; not of the last, which has all."""
+    return tuple(int(i) + 1 for i in np.flatnonzero(np.diff(scene.layer)))

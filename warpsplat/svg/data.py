@@ -9,10 +9,10 @@ import itertools
 from collections.abc import Iterable
 
 import numpy as np
+import numpy.typing as npt
 
-from warpsplat.scene import Basis, Kind, Scene
-
-Pair = tuple[int, int]
+from warpsplat.scene import Basis, IndexArray, Kind, Scene
+from warpsplat.svg.commands import Pair, minus, segments_of, shortest, shortest_ring
 
 
 def integers(pairs: Iterable[Pair]) -> str:
@@ -20,9 +20,57 @@ def integers(pairs: Iterable[Pair]) -> str:
     return " ".join([f"{x} {y}" for x, y in pairs]).replace(" -", "-")
 
 
-def minus(a: Pair, b: Pair) -> Pair:
-    """The way from ``b`` to ``a``."""
-    return a[0] - b[0], a[1] - b[1]
+Floats = npt.NDArray[np.float64]
+
+NEAR_THIRD = 0.05
+"""How far handles may be from the thirds of a line, in units of the view box, for it to be one ..."""
+
+THIRD = 0.5 + 1e-9
+"""... and as they are rounded: as far as rounding takes them, which moves the outline by less."""
+
+
+def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
+    """Which cubics a file shows as straight lines, by their first points, shape (point,).
+
+    Those whose handles are its thirds; and those whose handles lie on it when they are rounded.
+
+    Args:
+        scene: whose points they are.
+        exact: the points in units of the view box, shape (point, 2).
+    """
+    found = np.zeros(len(exact), np.bool_)
+    rows = cubic_rows(scene)
+    for corners, near in ((exact[rows], NEAR_THIRD), (np.round(exact[rows]), THIRD)):
+        ways = corners[:, 1:] - corners[:, :1]
+        way = ways[:, 2:]
+        handles, thirds = ways[:, :2], np.array([[1 / 3], [2 / 3]]) * way
+        laid = (np.abs(handles - thirds) <= near).all(axis=(1, 2))
+        along, square = (handles * way).sum(axis=2), (way * way).sum(axis=2)
+        across = handles[..., 0] * way[..., 1] - handles[..., 1] * way[..., 0]
+        inside = ((across == 0) & (along >= 0) & (along <= square)).all(axis=1) & (square[:, 0] > 0)
+        found[rows[laid | inside, 0]] = True
+    return found
+
+
+def held_points(scene: Scene, exact: Floats) -> Floats:
+    """The points as a file has them: whole numbers, and handles of lines at the thirds."""
+    rows = cubic_rows(scene)
+    rows = rows[straight_cubics(scene, exact)[rows[:, 0]]]
+    made = np.round(exact)
+    a, b = made[rows[:, 0]], made[rows[:, 3]]
+    made[rows[:, 1]], made[rows[:, 2]] = (2 * a + b) / 3, (a + 2 * b) / 3
+    return made
+
+
+def cubic_rows(scene: Scene) -> IndexArray:
+    """The points of each cubic of a scene, shape (cubic, 4)."""
+    rows = []
+    for group in scene.alike():
+        if group.basis == Basis.CUBIC:
+            count = group.points.shape[1]
+            inner = (np.arange(0, count - 1, 3)[:, None] + np.arange(4)) % count
+            rows.append((scene.starts[group.contours][:, None, None] + inner).reshape(-1, 4))
+    return np.concatenate(rows).astype(np.intp) if rows else np.zeros((0, 4), np.intp)
 
 
 class PathData:
@@ -32,7 +80,9 @@ class PathData:
         spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
         # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
         unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
-        grid = np.round(scene.points.astype(np.float64) * unit).astype(np.int64).tolist()
+        exact = scene.points.astype(np.float64) * unit
+        self._straight: list[bool] = straight_cubics(scene, exact).tolist()
+        grid = np.round(exact).astype(np.int64).tolist()
         self._grid: list[Pair] = [(x, y) for x, y in grid]
         self._starts, self._closed = scene.starts.tolist(), scene.closed.tolist()
         self._contours = np.searchsorted(scene.starts, scene.first).tolist()
@@ -44,31 +94,57 @@ class PathData:
         """Of one shape: its contours one after another."""
         # Fills close by themselves, but the stroke of the same path does not. Where its pattern begins
         # matters, too.
-        is_stroked = self._strokes[shape] or self._has_twin[shape]
+        is_stroked = bool(self._strokes[shape] or self._has_twin[shape])
         texts = []
+        pen: Pair | None = None
         for contour in range(*self._contours[shape : shape + 2]):
-            points = self._grid[self._starts[contour] : self._starts[contour + 1]]
-            closed = bool(self._closed[contour])
+            rows = slice(*self._starts[contour : contour + 2])
+            points, closed = self._grid[rows], bool(self._closed[contour])
             if self._splines[shape]:
                 texts.append(spline_data(points, closed, turns=not is_stroked))
-            else:
-                texts.append(cubic_data(points, closed, keep_dots=self._strokes[shape]))
-            if closed and is_stroked:
-                texts.append("z")
+                texts.append("z" if closed and is_stroked else "")
+                continue
+            straight = self._straight[rows][: len(points) - 2 : 3]
+            keep_dots = self._strokes[shape]
+            text, pen = cubic_data(
+                points, straight, closed, is_stroked=is_stroked, keep_dots=keep_dots, pen=pen
+            )
+            texts.append(text)
         return "".join(texts)
 
 
-def cubic_data(grid: list[Pair], closed: bool, *, keep_dots: bool) -> str:
-    """``d`` of a chain of cubics; ``keep_dots``: also of those without extent."""
-    chain = [*grid, grid[0]] if closed else grid
-    steps: list[Pair] = []
-    for i in range(0, len(chain) - 1, 3):
-        cubic = [minus(point, chain[i]) for point in chain[i + 1 : i + 4]]
-        # A cubic without extent draws nothing in a fill; in a stroke it may be the dot that is all there is.
-        if keep_dots or any(x or y for x, y in cubic):
-            steps += cubic
-    text = f"M{integers(chain[:1])}"
-    return f"{text}c{integers(steps)}" if steps else f"{text}z"
+def cubic_data(
+    grid: list[Pair],
+    straight: list[bool],
+    closed: bool,
+    *,
+    is_stroked: bool,
+    keep_dots: bool,
+    pen: Pair | None,
+) -> tuple[str, Pair]:
+    """``d`` of a chain of cubics, and where the pen is then.
+
+    Args:
+        grid: its points.
+        straight: which cubics are lines.
+        closed: whether it is a ring.
+        is_stroked: whether a ring's joint is seen, and where it begins may matter.
+        keep_dots: whether to write what has no extent as well: in a fill it draws nothing, in a stroke it may
+            be the dot that is all there is.
+        pen: where it is before; None at the beginning.
+    """
+    segments = [
+        segment for segment in segments_of(grid, straight, closed) if keep_dots or segment.has_extent()
+    ]
+    if not segments:
+        return f"M{integers(grid[:1])}z", grid[0]
+    if not is_stroked:
+        return shortest_ring(pen, segments) if closed else (shortest(pen, segments), segments[-1].end)
+    if not closed:
+        return shortest(pen, segments), segments[-1].end
+    if segments[-1].handles is None and len(segments) > 1:
+        segments.pop()  # which closing draws
+    return f"{shortest(pen, segments)}z", grid[0]
 
 
 def spline_data(half: list[Pair], closed: bool, *, turns: bool = True) -> str:

@@ -38,7 +38,9 @@ class Document:
                 self._by_id.setdefault(element.attrib["id"], element)
             if name_of(element) == "style" and element.get("type", "text/css") == "text/css":
                 css.append("".join(element.itertext()))
-        self._sheet = StyleSheet("\n".join(css), KNOWN)
+        self.css = "\n".join(css)
+        """Of all style sheets."""
+        self._sheet = StyleSheet(self.css, KNOWN)
         self._styles: dict[Element, Style] = {}
 
     def linked(self, element: Element) -> Element | None:

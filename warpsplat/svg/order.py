@@ -6,6 +6,7 @@ it of all of them.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy.typing as npt
 
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import bounds
+from warpsplat.scene.scene import level_ends
 
 BLOCK = 1024
 """Shapes that are looked at together: the time grows with the square."""
@@ -24,15 +26,16 @@ MARGIN = 1.0
 def by_opacity(scene: Scene) -> IndexArray:
     """Order of the shapes in which runs of equal kind and opacity are long, shape (shape,).
 
-    Overlapping shapes keep their order. Greedy: of the shapes that nothing unpainted lies below, the kind and
-    opacity come next that make the longest run.
+    Overlapping shapes keep their order, and all their layers. Greedy: of the shapes that nothing unpainted
+    lies below, the kind and opacity come next that make the longest run.
     """
     boxes = bounds(scene)
     keys = list(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True))
     order: list[int] = []
-    for first in range(0, len(scene), BLOCK):
-        block = slice(first, first + BLOCK)
-        order += [first + i for i in _arrange(boxes[block], keys[block])]
+    for start, end in itertools.pairwise((0, *level_ends(scene), len(scene))):
+        for first in range(start, end, BLOCK):
+            block = slice(first, min(first + BLOCK, end))
+            order += [first + i for i in _arrange(boxes[block], keys[block])]
     return np.asarray(order, np.intp)
 
 

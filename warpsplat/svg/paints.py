@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import Paint, Scene, Spread
+from warpsplat.scene import GRADIENTS, Paint, Scene, Spread
 from warpsplat.svg.numbers import hex_colors, number
 
 Floats = npt.NDArray[np.float64]
@@ -26,11 +28,19 @@ def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]
     """Elements, and the identifier of each shape that has one; alike gradients are one."""
     elements: dict[str, str] = {}
     owners = {}
-    for shape in np.flatnonzero(scene.paint != Paint.FLAT).tolist():
+    prefix = unused("g", "".join(picture.markup for picture in scene.pictures))
+    for shape in np.flatnonzero(np.isin(scene.paint, GRADIENTS)).tolist():
         body = _gradient(scene, shape, per_pixel)
-        owners[shape] = elements.setdefault(body, f"g{len(elements)}")
+        owners[shape] = elements.setdefault(body, f"{prefix}{len(elements)}")
     texts = [body.replace(" ", f' id="{name}" ', 1) for body, name in elements.items()]
     return texts, owners
+
+
+def unused(prefix: str, text: str) -> str:
+    """``prefix``, longer by as many of its last letter that no name in ``text`` is it and a digit."""
+    while re.search(rf"\b{prefix}\d", text):
+        prefix += prefix[-1]
+    return prefix
 
 
 def _gradient(scene: Scene, shape: int, per_pixel: float) -> str:

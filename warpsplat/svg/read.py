@@ -13,7 +13,19 @@ from typing import NamedTuple
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.scene import NO_DASHES, Basis, Canvas, Cap, Join, Kind, Paint, Scene, Spread
+from warpsplat.scene import (
+    NO_DASHES,
+    NO_PICTURE,
+    Basis,
+    Canvas,
+    Cap,
+    Join,
+    Kind,
+    Paint,
+    Picture,
+    Scene,
+    Spread,
+)
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.gradients import Flat, Gradient
 from warpsplat.svg.paths import Points, Subpath, line
@@ -72,8 +84,10 @@ def _is_background(shape: Shape, width: int, height: int) -> bool:
     return bool(upright and (low <= 0.5).all() and (high >= np.array([width, height]) - 0.5).all())
 
 
-def load_scene(text: str, width: int, height: int, name: str) -> tuple[Scene, bool]:
-    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units.
+def load_scene(
+    text: str, width: int, height: int, name: str, *, background_apart: bool = True
+) -> tuple[Scene, bool]:
+    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units; see ``scene_of``.
 
     Returns:
         the scene, and whether the SVG itself has a background; where it has none, the scene's is white.
@@ -86,15 +100,25 @@ def load_scene(text: str, width: int, height: int, name: str) -> tuple[Scene, bo
         shapes = read_shapes(text, width, height)
         if not shapes:
             raise ImageError("draws no filled or stroked path")
-        return scene_of(shapes, width, height)
+        return scene_of(shapes, width, height, background_apart=background_apart)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
 
 
-def scene_of(shapes: list[Shape], width: int, height: int) -> tuple[Scene, bool]:
-    """Shapes as a scene, and whether the first is its background, see ``load_scene``."""
+def scene_of(
+    shapes: list[Shape], width: int, height: int, *, background_apart: bool = True
+) -> tuple[Scene, bool]:
+    """Shapes as a scene, and whether the first is its background, see ``load_scene``.
+
+    ``background_apart``: without, it is a shape as any other.
+    """
     background = np.ones(3)
-    has_background = len(shapes) > 1 and _is_background(shapes[0], width, height) and not shapes[1].is_twin
+    has_background = (
+        background_apart
+        and len(shapes) > 1
+        and _is_background(shapes[0], width, height)
+        and not shapes[1].is_twin
+    )
     if has_background:
         background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # as _is_background says
         shapes = shapes[1:]
@@ -124,7 +148,7 @@ def scene_of(shapes: list[Shape], width: int, height: int) -> tuple[Scene, bool]
             [s.paint.color if isinstance(s.paint, Flat) else (0.0, 0.0, 0.0) for s in shapes], np.float32
         ).reshape(-1, 3),
     )
-    return _with_gradients(scene, shapes), has_background
+    return _with_pictures(_with_gradients(scene, shapes), shapes), has_background
 
 
 def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:
@@ -146,4 +170,18 @@ def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:
         stop_offsets=np.array([offset for r in ramps if r for offset in r.offsets], np.float32),
         stop_colors=np.array([stop.color for stop in stops], np.float32),
         stop_opacities=np.array([stop.opacity for stop in stops], np.float32),
+    )
+
+
+def _with_pictures(scene: Scene, shapes: list[Shape]) -> Scene:
+    """The scene with what it shows of its shapes as it is."""
+    pictures = [shape.paint for shape in shapes if isinstance(shape.paint, Picture)]
+    if not pictures:
+        return scene
+    has_one = np.array([isinstance(shape.paint, Picture) for shape in shapes])
+    return replace(
+        scene,
+        paint=np.where(has_one, Paint.PICTURE, scene.paint).astype(np.int32),
+        picture=np.where(has_one, np.cumsum(has_one) - 1, NO_PICTURE).astype(np.int32),
+        pictures=tuple(pictures),
     )

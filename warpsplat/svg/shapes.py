@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.scene import Cap, Join, Rule
+from warpsplat.scene import Cap, Join, Picture, Rule
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
 from warpsplat.svg.gradients import Colouring, Flat, resolve_paint
@@ -47,7 +47,7 @@ class Shape:
     """One fill or stroke, in canvas units."""
 
     subpaths: list[Subpath]
-    paint: Colouring
+    paint: Colouring | Picture
     opacity: float
     """Besides that of the paint."""
     line: Line | None
@@ -57,6 +57,8 @@ class Shape:
     """Whether it shares its subpaths with the one before: a path that is filled and stroked."""
     is_rect: bool = False
     """Whether it is a ``rect`` element with sharp corners."""
+    element: Element | None = None
+    """That draws it and can be kept in its place; None where it cannot be."""
 
     def box(self) -> Points:
         """Least and largest coordinates, shape (2, 2)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from warpsplat.svg.geometry import (
 )
 from warpsplat.svg.gradients import Flat
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
+from warpsplat.svg.kept import Keeping, Part, shapes_of
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
 from warpsplat.svg.style import DRAWN, ROOT, Style
@@ -43,6 +45,17 @@ CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
 
 
 @dataclass(frozen=True)
+class _Unit:
+    """What is kept whole where a part of it cannot be held."""
+
+    element: Element
+    first: int
+    """Number of its first shape."""
+    depth: int
+    """Number of what else is to be done."""
+
+
+@dataclass(frozen=True)
 class _Context:
     """What an element inherits."""
 
@@ -57,12 +70,15 @@ class _Context:
     depth: int
     use_size: tuple[float | None, float | None] = (None, None)
     """What a link says of the size of a nested ``svg``."""
+    link: _Unit | None = None
+    """The outermost link that led here."""
 
 
 @dataclass(frozen=True)
 class _End:
     """Where a group ends."""
 
+    unit: _Unit
     first: int
     """Number of its first shape."""
     opacity: float = 1.0
@@ -83,10 +99,27 @@ def read_shapes(text: str, width: int, height: int, scale: float | None = None) 
         ImageError: not an SVG, of other proportions, or with something that would be lost. The message says
             what.
     """
+    parts, _ = _read(text, width, height, scale, keep=False)
+    return shapes_of(parts)
+
+
+def read_parts(text: str, width: int, height: int) -> tuple[list[Part], Document]:
+    """As ``read_shapes`` with what it refuses as elements to be kept, and the document that they are in.
+
+    Raises:
+        ImageError: not an SVG, of other proportions, or with something that its root or style sheets say.
+    """
+    return _read(text, width, height, None, keep=True)
+
+
+def _read(
+    text: str, width: int, height: int, scale: float | None, *, keep: bool
+) -> tuple[list[Part], Document]:
     facts = inspect_svg(text)
     try:
         with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
-            return _Walk(Document(text)).shapes_in(*_canvas(facts.root, width, height, scale))
+            document = Document(text)
+            return _Walk(document, keep=keep).parts_in(*_canvas(facts.root, width, height, scale)), document
     except (ImageError, MemoryError):
         raise
     except Exception as error:  # arithmetic on absurd numbers overflows in many ways
@@ -118,25 +151,38 @@ class _Walk:
     stack.
     """
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, *, keep: bool) -> None:
         self._document = document
-        self._shapes: list[Shape] = []
+        self._keep = Keeping(document) if keep else None
+        self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
         self._linked = 0
 
-    def shapes_in(self, matrix: Matrix, viewport: Viewport) -> list[Shape]:
-        """All shapes, drawn by ``matrix``."""
+    def parts_in(self, matrix: Matrix, viewport: Viewport) -> list[Part]:
+        """All shapes, drawn by ``matrix``, and what is kept."""
         self._background(matrix, viewport)
         self._todo = [(self._document.root, _Context(ROOT, matrix, viewport, ("none", "none"), (), 0))]
         while self._todo:
             item = self._todo.pop()
             if isinstance(item, _End):
-                self._end(item)
+                self._do(item.unit, self._end, item)
             else:
-                self._enter(*item)
+                element, context = item
+                unit = context.link or _Unit(element, len(self._shapes), len(self._todo))
+                self._do(unit, self._enter, element, context, unit)
         return self._shapes
 
-    def _enter(self, element: Element, context: _Context) -> None:
+    def _do(self, unit: _Unit, what: Callable[..., None], *arguments: object) -> None:
+        """Where that cannot be, keep the unit, if that can be."""
+        try:
+            what(*arguments)
+        except ImageError as error:
+            if self._keep is None or unit.element is self._document.root:
+                raise
+            del self._todo[unit.depth :]
+            self._shapes[unit.first :] = [self._keep.part(unit.element, error)]
+
+    def _enter(self, element: Element, context: _Context, unit: _Unit) -> None:
         tag = name_of(element)
         if tag not in VISITED and tag not in REFUSED:
             return
@@ -156,16 +202,17 @@ class _Walk:
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         if tag in DRAWN:
             first = len(self._shapes)
-            self._shapes += element_shapes(
-                element, self._document, Place(style, matrix, viewport, context.paints)
-            )
-            self._end(_End(first, fraction(style["opacity"]), clip))
+            shapes = element_shapes(element, self._document, Place(style, matrix, viewport, context.paints))
+            if self._keep and not context.link:
+                shapes = [replace(shape, element=element) for shape in shapes]
+            self._shapes += shapes
+            self._end(_End(unit, first, fraction(style["opacity"]), clip))
             return
-        self._todo.append(_End(len(self._shapes), fraction(style["opacity"]), clip))
+        self._todo.append(_End(unit, len(self._shapes), fraction(style["opacity"]), clip))
         if tag == "use":
-            self._link(element, inner)
+            self._link(element, inner, unit)
         elif tag == "svg" and element is not self._document.root:
-            self._nested(element, inner, element)
+            self._nested(element, inner, element, unit)
         else:
             self._children(element, inner)
 
@@ -178,7 +225,7 @@ class _Walk:
                 raise ImageError(f"links add up to more than {MAX_LINKED} elements")
         self._todo.extend((child, context) for child in reversed(element))
 
-    def _link(self, element: Element, context: _Context) -> None:
+    def _link(self, element: Element, context: _Context, unit: _Unit) -> None:
         """A ``use``."""
         if self._document.links_out(element):
             raise ImageError("uses an element of another file, not supported")
@@ -191,9 +238,10 @@ class _Walk:
         viewport = context.viewport
         x, y = (attribute(element.attrib, name, viewport) or 0.0 for name in "xy")
         fill, stroke = (_in_context(context.style[name], context.paints) for name in ("fill", "stroke"))
-        inner = replace(context, path=(*context.path, target), paints=(fill, stroke), use_size=(None, None))
+        path = (*context.path, target)
+        inner = replace(context, path=path, paints=(fill, stroke), use_size=(None, None), link=unit)
         if tag == "symbol":
-            self._nested(element, inner, target)
+            self._nested(element, inner, target, unit)
             return
         inner = replace(inner, matrix=context.matrix @ translation(x, y))
         if tag == "svg":
@@ -211,7 +259,7 @@ class _Walk:
                 return True
         return False
 
-    def _nested(self, element: Element, context: _Context, content: Element) -> None:
+    def _nested(self, element: Element, context: _Context, content: Element, unit: _Unit) -> None:
         """A new viewport: that of a nested ``svg``, which is its own content, or of a ``use`` of a symbol."""
         is_svg = element is content
         viewport = context.viewport
@@ -237,7 +285,7 @@ class _Walk:
         corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
         clip = moved(context.matrix, corners) if is_clipped and not seen else None
         opacity = 1.0 if is_svg else fraction(style["opacity"])
-        self._todo.append(_End(len(self._shapes), opacity, clip))
+        self._todo.append(_End(unit, len(self._shapes), opacity, clip))
         inner = replace(
             context,
             style=style,
@@ -253,18 +301,21 @@ class _Walk:
         Raises:
             ImageError: the shapes would show something else.
         """
-        if end.clip is None and end.opacity == 1:
+        isolates = self._keep is not None and self._keep.isolates(end.unit.element)
+        if end.clip is None and end.opacity == 1 and not isolates:
             return
-        shapes = self._shapes[end.first :]
-        if end.clip is not None:
-            shapes = clipped(shapes, end.clip)
-        if end.opacity == 0:
-            shapes = []
-        elif end.opacity < 1:
-            if overlap(shapes):
+        parts = self._shapes[end.first :]
+        if self._keep:
+            parts = self._keep.inside(parts, end.clip)
+        elif end.clip is not None:
+            parts = [*clipped(shapes_of(parts), end.clip)]
+        if end.opacity < 1:
+            shapes = shapes_of(parts)
+            if len(shapes) < len(parts) or (overlap(shapes) and end.opacity > 0):
                 raise ImageError("uses opacity of a group of shapes that overlap, not supported")
-            shapes = [replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes]
-        self._shapes[end.first :] = shapes
+            faded = (replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes)
+            parts = [*faded] if end.opacity > 0 else []
+        self._shapes[end.first :] = parts
 
     def _background(self, matrix: Matrix, viewport: Viewport) -> None:
         """What the root's ``background-color`` paints below all shapes."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +26,9 @@ from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 Pixels = npt.NDArray[np.float64]
 
 OPTIONS: dict[str, Any] = {"dpi": 96.0, "skip_system_fonts": True}
+
+TEXT = re.compile(r"<(?:[\w.-]+:)?text[\s/>]")
+"""An element that the system's fonts are loaded for; other files look the same on any system."""
 
 
 def _open(png: bytes) -> Image.Image:
@@ -74,6 +78,7 @@ def draw_png(
     seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
     memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
     options = {**OPTIONS, "width": width, "height": height, "zoom": zoom}
+    options["skip_system_fonts"] = TEXT.search(text) is None
     request = {"path": sys.path, "seconds": seconds, "memory": memory, "options": options}
     try:
         done = subprocess.run(

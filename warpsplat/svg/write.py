@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat import __version__
-from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Rule, Scene
-from warpsplat.svg.data import PathData
+from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene.scene import level_ends
+from warpsplat.svg.data import PathData, held_points
+from warpsplat.svg.nest import Path, nested
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 
@@ -54,7 +56,7 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
     shown = np.where(opacities < OPAQUE, np.round(opacities, OPACITY_DECIMALS), 1)
     return replace(
         scene,
-        points=(np.round(points * per_unit) / per_unit).astype(np.float32),
+        points=(held_points(scene, points * per_unit) / per_unit).astype(np.float32),
         colors=(np.round(colors * 255) / 255).astype(np.float32),
         opacities=shown.astype(np.float32),
         stop_offsets=np.round(scene.stop_offsets, SHARE_DECIMALS),
@@ -92,16 +94,24 @@ def _line(scene: Scene, shape: int, per_pixel: float, *, in_group: bool) -> str:
 
 
 def _path(
-    scene: Scene, shape: int, data: str, color: str, per_pixel: float, rest: str, *, in_group: bool
-) -> str:
-    """The path of one shape; ``rest``: further attributes."""
+    scene: Scene,
+    shape: int,
+    data: str,
+    color: str,
+    opacity: str,
+    per_pixel: float,
+    rest: str,
+    *,
+    in_group: bool,
+) -> Path:
+    """The path of one shape; ``rest``: further attributes, of a path that is its twin's as well."""
     kind = Kind(int(scene.kind[shape]))
-    style = f'{PAINTED[kind]}="{color}"'
+    paint = f' {PAINTED[kind]}="{color}"'
     if kind == Kind.STROKE:
-        style += _line(scene, shape, per_pixel, in_group=in_group)
-    elif scene.rule[shape] == Rule.EVENODD:
-        style += ' fill-rule="evenodd"'
-    return f'<path d="{data}" {style}{rest}/>'
+        return Path(data, (opacity, paint, _line(scene, shape, per_pixel, in_group=in_group)), rest)
+    rule = ' fill-rule="evenodd"' if scene.rule[shape] == Rule.EVENODD else ""
+    # Black is what holds where nothing is said.
+    return Path(data, (opacity, "" if color == "#000" else paint, ""), rule + rest)
 
 
 def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
@@ -115,11 +125,14 @@ def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
 
 STROKE_FIRST = ' paint-order="stroke"'
 
+LEVEL_ID = "level-"
+"""What the name of a layer's group begins with; the number of shapes up to its end follows."""
 
-def _colors(scene: Scene, per_pixel: float) -> list[str]:
-    """The paint of each shape."""
+
+def _colors(scene: Scene, ramps: Mapping[int, str]) -> list[str]:
+    """The paint of each shape; ``ramps``: identifiers of gradients."""
     colors = hex_colors(scene.colors)
-    for shape, name in gradients(scene, per_pixel)[1].items():
+    for shape, name in ramps.items():
         colors[shape] = f"url(#{name})"
     return colors
 
@@ -135,46 +148,57 @@ def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
-    colors, opacities = _colors(scene, per_pixel), _opacities(scene, 1.0)
+    colors, opacities = _colors(scene, gradients(scene, per_pixel)[1]), _opacities(scene, 1.0)
     data = PathData(scene, per_pixel)
     paths = (
-        _path(scene, i, data.of(i), colors[i], per_pixel, opacities[i], in_group=True)
+        _path(scene, i, data.of(i), colors[i], opacities[i], per_pixel, "", in_group=True)
         for i in range(len(scene))
     )
-    return np.array([len(path) for path in paths], np.int64)
+    return np.array([len(str(path)) for path in paths], np.int64)
 
 
-def _groups(scene: Scene, per_pixel: float, opacity_scale: float) -> Iterator[str]:
-    """Neighbours of one kind share a group, and what it says of them; neighbours of one opacity a group in it
-    where that is shorter. Twins are one path.
+def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
+    """The markup of a picture, in the file's units."""
+    across, down = (
+        per_pixel * side / own
+        for side, own in zip((scene.canvas.width, scene.canvas.height), picture.size, strict=True)
+    )
+    return f'<g transform="scale({across:.9g} {down:.9g})">{picture.markup}</g>'
+
+
+def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float) -> Iterator[str]:
+    """Layers, where there are several, are groups that say how many shapes they complete. In them strokes
+    that are neighbours share a group, and neighbours that say the same of themselves where that is shorter.
+    Twins are one path, pictures what they are.
     """
-    colors, opacities = _colors(scene, per_pixel), _opacities(scene, opacity_scale)
+    colors, opacities = _colors(scene, ramps), _opacities(scene, opacity_scale)
     data = PathData(scene, per_pixel)
     has_twin = np.append(scene.twin[1:], 0).tolist()
     strokes = (scene.kind == Kind.STROKE).tolist()
     rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
     both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
-    for in_group, shapes in itertools.groupby(
-        np.flatnonzero(scene.twin == 0).tolist(), lambda i: strokes[i] and not has_twin[i]
+    pictures = (scene.paint == Paint.PICTURE).tolist()
+    ends = level_ends(scene)
+    layer = np.searchsorted(ends, np.arange(len(scene)), "right").tolist()
+    names = [f"{LEVEL_ID}{end}" for end in (*ends, len(scene))]
+    last = None
+    for (level, is_picture, in_group), shapes in itertools.groupby(
+        np.flatnonzero(scene.twin == 0).tolist(),
+        lambda i: (layer[i], pictures[i], strokes[i] and not has_twin[i]),
     ):
-        yield f"<g {STROKE_ATTRIBUTES}>" if in_group else "<g>"
-        for opacity, run in itertools.groupby(shapes, lambda i: both[i]):
-            alike = list(run)
-            group = f"<g{opacity}>", "</g>"
-            shared = len(alike) * len(opacity) > len("".join(group))
-            paths = (
-                _path(
-                    scene,
-                    i,
-                    data.of(i),
-                    colors[i],
-                    per_pixel,
-                    rest[i] + ("" if shared else opacity),
-                    in_group=in_group,
-                )
-                for i in alike
-            )
-            yield from (group[0], *paths, group[1]) if shared else paths
+        if ends and level != last:
+            yield ("" if last is None else "</g>") + f'<g id="{names[level]}">'
+            last = level
+        if is_picture:
+            yield from (_picture(scene.pictures[scene.picture[i]], scene, per_pixel) for i in shapes)
+            continue
+        paths = [
+            _path(scene, i, data.of(i), colors[i], both[i], per_pixel, rest[i], in_group=in_group)
+            for i in shapes
+        ]
+        group = (f"<g {STROKE_ATTRIBUTES}>", "</g>") if in_group else ("", "")
+        yield from (group[0], *nested(paths), group[1])
+    if last is not None:
         yield "</g>"
 
 
@@ -185,6 +209,7 @@ def write_svg(
     metadata: str = "",
     opacity_scale: float = 1.0,
     background: bool = True,
+    title: str = "",
 ) -> str:
     """The scene as an SVG document: a background and one path a shape, in painter's order.
 
@@ -192,33 +217,44 @@ def write_svg(
         scene: what to write; canvas units become user units.
         per_pixel: units of the view box a pixel; coordinates are whole numbers of units, points of splines
             even ones.
-        metadata: text for the ``metadata`` element, besides the program's name and version.
+        metadata: text behind the program's name in the comment that marks the file.
         opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
             below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
         background: whether to write it, if the canvas has one; without, the picture is transparent where no
             shape is.
+        title: of the picture; empty: none.
     """
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
     behind = ""
     if background and canvas.background is not None:
         fill = hex_colors(canvas.background[None])[0]
-        behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>\n'
-    elements, _ = gradients(scene, per_pixel)
-    defs = f"<defs>{''.join(elements)}</defs>\n" if elements else ""
-    shapes = "".join(_groups(scene, per_pixel, opacity_scale))
-    note = f"warpsplat {__version__} {metadata}".strip()
+        behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>'
+    elements, ramps = gradients(scene, per_pixel)
+    defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
+    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale))
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
-        f'viewBox="0 0 {width} {height}">\n'
-        f"<metadata>{note}</metadata>\n"
-        f"{defs}{behind}{shapes}\n</svg>\n"
+        f'viewBox="0 0 {width} {height}">{MARK}{" " if metadata else ""}{metadata}-->\n'
+        f"{titled(title)}{defs}{behind}{shapes}</svg>\n"
     )
 
 
+MARK = "<!--warpsplat"
+"""How the comment begins by which a file is known to be written here."""
+
+UNPRINTABLE = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What XML cannot hold (XML 1.0, 2.2)."""
+
+
+def titled(title: str) -> str:
+    """A ``title`` element, or nothing."""
+    return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
+
+
 OUR_HEAD = re.compile(
-    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)">\n'
-    "<metadata>warpsplat "
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" '
+    rf'viewBox="0 0 ([\d.]+) ([\d.]+)">{MARK}'
 )
 """How a file written here begins: its size in pixels, and that in units of its view box."""
 
@@ -231,13 +267,17 @@ def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> s
     assert found
     unit = float(found[3]) / float(found[1]) / scale
     view = f"0 {top * unit:.9g} {width * unit:.9g} {height * unit:.9g}"
-    head = (
-        f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">\n<metadata>warpsplat '
-    )
+    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">{MARK}'
     return head + text[found.end() :]
 
 
 def read_metadata(text: str) -> str:
     """The metadata text of a file written here; empty if there is none."""
-    found = re.search(r"<metadata>warpsplat (.*?)</metadata>", text[:1000])
+    found = re.search(rf"{MARK} (.*?)-->", text[:1000])
     return found.group(1) if found else ""
+
+
+def minified(text: str) -> str:
+    """A file written here without the mark and line breaks, which show nothing."""
+    head, found, rest = text.partition(MARK)
+    return head + rest.partition("-->\n")[2].rstrip("\n") if found else text

@@ -1,0 +1,136 @@
+"""Levels of detail: what the first shapes show is trained beside the whole picture."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import picture
+from tests.scenes import mixed_scene
+from warpsplat.errors import UsageError
+from warpsplat.fit.layered import fit_layered
+from warpsplat.fit.loop import Progress, fit
+from warpsplat.fit.schedule import Phase
+from warpsplat.fit.settings import levels_of, make_settings, parse_levels
+from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
+from warpsplat.jobs.vectorize import vectorize
+from warpsplat.metrics import score_svg
+from warpsplat.render.backend import Backend
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.scene import level_ends
+from warpsplat.svg.order import by_opacity
+from warpsplat.svg.write import write_svg
+
+
+def in_layers(scene: Scene, *ends: int) -> Scene:
+    layer = np.searchsorted(ends, np.arange(len(scene)), "right").astype(np.int32)
+    return replace(scene, layer=layer)
+
+
+def gradients_of(scene: Scene, device: str, **given: object) -> dict[str, FloatArray]:
+    """After a step without an update."""
+    settings = make_settings(curves=max(len(scene), 1), iterations=50, bending=0.0, texture=0.0, **given)
+    state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
+    step = Step(state, settings, Target(picture(), Phase(64, 48)))
+    step.time(1)
+    return state.parameters.gradients()
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.7])
+def test_the_gradient_is_that_of_all_pictures(device: str, weight: float) -> None:
+    """Of the whole and, weighted, of each earlier level, rendered by themselves."""
+    scene = mixed_scene(64, 48, seed=3)
+    ends = (2, 5)
+    whole, layered = (gradients_of(s, device, level_weight=weight) for s in (scene, in_layers(scene, *ends)))
+    for name in ("points", "colors", "opacities", "widths"):
+        expected = whole[name].astype(np.float64)
+        for end in ends:
+            part = gradients_of(scene.take(np.arange(end)), device)[name]
+            expected[: len(part)] += weight * part
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(layered[name], expected, rtol=1e-5, atol=1e-5 * scale)
+
+
+def test_each_level_is_a_picture(device: str) -> None:
+    """Nearly as good as one of so many shapes; the file has a group for each, in order."""
+    levels = (6, 16, 40)
+    told: list[Progress] = []
+    settings = make_settings(levels=levels, iterations=80)
+    result = vectorize(picture(), settings, Backend.on(device), report=told.append)
+    assert level_ends(result.scene) == levels[:-1]
+    assert re.findall('<g id="([^"]+)">', result.svg) == ["level-6", "level-16", "level-40"]
+    figures = [level.psnr or 99 for level in result.levels]
+    assert [level.shapes for level in result.levels] == list(levels)
+    assert result.score
+    assert figures[-1] == pytest.approx(result.score.psnr, abs=1e-3)
+    assert figures == sorted(figures)
+    for level, figure in zip(levels, figures, strict=True):
+        alone = vectorize(picture(), make_settings(curves=level, iterations=80), Backend.on(device))
+        assert alone.score
+        assert figure > alone.score.psnr - 1.5, f"{level} shapes"
+    work = [progress.work for progress in told]
+    assert work == sorted(work)
+    assert work[-1] == pytest.approx(1)
+    assert {progress.steps for progress in told} == {result.iterations}
+
+
+def test_hiding_groups_leaves_the_simpler_picture(device: str) -> None:
+    result = vectorize(picture(), make_settings(levels=(5, 20), iterations=40), Backend.on(device))
+    first, _ = result.svg.split('</g><g id="level-20">')
+    score = score_svg(first + "</g></svg>", picture(), own=True, eyes=False)
+    assert score.psnr == pytest.approx(result.levels[0].psnr, abs=0.02)
+
+
+def test_an_interrupted_run_has_the_levels_that_it_came_to(device: str) -> None:
+    calls = iter([False] * 10 + [True] * 1000)
+    made = fit_layered(
+        picture(),
+        make_settings(levels=(4, 12, 30), iterations=40),
+        Backend.on(device),
+        stop=lambda: next(calls),
+    )
+    assert made.interrupted
+    assert made.iterations == 11
+    assert len(made.scene) <= 12
+
+
+def test_shapes_stay_in_their_layers() -> None:
+    """Where they may change places for the file's sake."""
+    scene = in_layers(mixed_scene(64, 48, seed=1), 3, 6)
+    scene = replace(scene, opacities=np.tile([0.5, 0.9], len(scene))[: len(scene)].astype(np.float32))
+    assert (np.diff(scene.take(by_opacity(scene)).layer) >= 0).all()
+
+
+def test_without_levels_nothing_is_named() -> None:
+    scene = mixed_scene(64, 48, seed=1)
+    assert " id=" not in write_svg(scene)
+    assert " id=" in write_svg(in_layers(scene, 2))
+
+
+def test_levels_are_checked() -> None:
+    assert make_settings(levels="64,256").curves == 256
+    assert make_settings(layered=True, curves=512).levels == (32, 128, 512)
+    assert levels_of(20) == (20,)
+    assert parse_levels([3, 5]) == (3, 5)
+    for given, cause in (
+        ({"levels": "5,5"}, "ascend"),
+        ({"levels": "5,x"}, "numbers of shapes"),
+        ({"levels": "0,4"}, "levels must be a whole number"),
+        ({"levels": "4,8", "curves": 9}, "differ"),
+        ({"levels": "4,8", "max_bytes": "4KB"}, "max-bytes"),
+        ({"layered": "yes"}, "true or false"),
+    ):
+        with pytest.raises(UsageError, match=cause):
+            make_settings(**given)
+
+
+def test_new_shapes_lie_in_front_of_those_below(device: str) -> None:
+    backend = Backend.on(device)
+    below = fit(picture(), make_settings(curves=5, iterations=20), backend).scene
+    both = fit(picture(), make_settings(curves=7, iterations=30), backend, below=below).scene
+    assert len(both) == 12
+    np.testing.assert_array_equal(both.layer, np.repeat([0, 1], [5, 7]))

@@ -1,0 +1,153 @@
+"""Candidates for simpler outlines, and which of them are taken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.fit.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon, seam
+from tests.fit.test_drawing import assert_clean, psnr
+from tests.fit.test_merge import halves
+from warpsplat.fit.constraints import Drawing, Joint
+from warpsplat.fit.nodes import Edit, Outlines, applied, turned
+from warpsplat.fit.tidy import apart, finish_drawing, tidied
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+from warpsplat.scene import Canvas
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.write import rounded, write_svg
+
+
+def split(made: Drawing) -> Drawing:
+    """Each piece in two, of points that shapes share both in the same way."""
+    scene, on, following = made.scene, *made.links()
+    points, joints, same = [], [], []
+    numbers = iter(range(10_000, 90_000))
+    known: dict[tuple[float, ...], tuple[int, int, int]] = {}
+    for a, b, is_line in zip(on.tolist(), following.tolist(), made.lines().tolist(), strict=True):
+        first, second = halves(scene.points[[a, a + 1, a + 2, b]].astype(float), 0.5)
+        points += [*first[:3], *second[:3]]
+        inner = Joint.LINE_HANDLE if is_line else Joint.FREE
+        joints += [made.joints[a], inner, inner, Joint.CORNER if is_line else Joint.SMOOTH, inner, inner]
+        key = tuple(np.round(second[0], 3).tolist())
+        if made.same[a] >= 0 and made.same[b] >= 0:
+            again = key in known
+            middle = known.setdefault(key, (next(numbers), next(numbers), next(numbers)))
+            before, here, after = middle[::-1] if again else middle
+        else:
+            before = here = after = -1
+        same += [made.same[a], made.same[a + 1], before, here, after, made.same[a + 2]]
+    scene = replace(
+        scene, points=np.array(points, np.float32), starts=2 * scene.starts, first=2 * scene.first
+    )
+    return Drawing(scene, np.array(joints, np.int32), np.array(same, np.int32))
+
+
+def nodes(made: Drawing) -> int:
+    return len(made.joints) // 3
+
+
+def edits_of(made: Drawing, kind: str) -> list[Edit]:
+    return [edit for edit in Outlines(made).edits() if edit.kind == kind]
+
+
+CANVAS = Canvas(64, 48, WHITE)
+
+
+def test_needless_nodes_are_named() -> None:
+    """Of a square all but its corners, of a disc every other; no corner."""
+    square, ring = polygon((8, 8), (40, 8), (40, 40), (8, 40)), disc(30, 24, 15)
+    assert not edits_of(drawing(CANVAS, (RED, [square])), "without")
+    for outline, saved, count in ((square, 7, 4), (ring, 19, 7)):  # of a ring all but the first
+        made = split(drawing(CANVAS, (RED, [outline])))
+        edits = [edit for edit in edits_of(made, "without") if edit.off < 0.05]
+        assert len(edits) == count
+        assert {edit.saved for edit in edits} == {saved}
+        for edit in edits:
+            left = applied(made, [edit])
+            assert nodes(left) == nodes(made) - 1
+            assert left.lines().sum() == (7 if saved == 7 else 0)
+
+
+def test_nodes_of_a_seam_go_in_all_shapes_at_once() -> None:
+    """The place where the third region meets the others stays, and the corners of the canvas."""
+    made = split(seam())
+    edits = [edit for edit in edits_of(made, "without") if edit.off < 0.05]
+    sides = [edit for edit in edits if len(edit.removed) == 3]
+    shared = [edit for edit in edits if len(edit.removed) == 6]
+    assert len(edits) == len(sides) + len(shared)
+    assert len(shared) == 3, "of the two halves of the seam, and the line that meets it"
+    left = applied(made, shared)
+    for number in np.unique(left.same[left.same >= 0]):
+        assert len(np.unique(left.scene.points[left.same == number], axis=0)) == 1
+
+
+def test_almost_straight_cubics_are_named() -> None:
+    outline, joints = polygon((8, 8), (40, 8), (40, 40), (8, 40))
+    bent = outline.copy()
+    bent[1:3, 1] += (0.4, 0.4)
+    bent[4:6, 0] += (8, 8)
+    made = drawing(CANVAS, (RED, [(bent, [Joint.CORNER, Joint.FREE, Joint.FREE] * 2 + joints[6:])]))
+    (edit,) = edits_of(made, "straight")
+    assert edit.off == pytest.approx(0.3, abs=0.05)
+    assert applied(made, [edit]).lines().tolist() == [True, False, True, True]
+
+
+def test_almost_level_lines_and_tangents_are_named() -> None:
+    made = drawing(CANVAS, (RED, [polygon((8, 8), (40, 8.3), (38, 40), (8, 40))]))
+    (edit,) = edits_of(made, "level")
+    left = applied(made, [edit])
+    assert left.scene.points[0, 1] == left.scene.points[3, 1]
+    assert not edits_of(left, "level")
+    slanted = drawing(CANVAS, (RED, [disc(30, 24, 15, 0.02)]))
+    edits = edits_of(slanted, "tangent")
+    assert len(edits) == 4
+    assert not edits_of(applied(slanted, edits), "tangent")
+    assert not edits_of(drawing(CANVAS, (RED, [disc(30, 24, 15, 0.3)])), "tangent")
+
+
+def test_chosen_candidates_have_no_cell_in_common() -> None:
+    edits = Outlines(split(logo())).edits()
+    chosen = apart(edits)
+    assert 1 < len(chosen) < len(edits)
+    assert sum(len(edit.cells) for edit in chosen) == len(frozenset().union(*(e.cells for e in chosen)))
+
+
+def test_turned_outlines_are_the_same() -> None:
+    made = split(seam())
+    again = turned(made)
+    assert (again.scene.points != made.scene.points).any()
+    for shape in range(len(made.scene)):
+        rows = [sorted(map(tuple, d.scene.points_of(shape).tolist())) for d in (made, again)]
+        assert rows[0] == rows[1]
+    assert again.lines().sum() == made.lines().sum()
+
+
+def test_a_logo_has_its_nodes_again(device: str) -> None:
+    """Half of its nodes are needless; at the end it is as good, clean, and written and read as it is."""
+    backend = Backend.on(device, 1)
+    exact = logo(None)
+    target = render(exact.scene, backend=backend)
+    made = split(logo(None, spread=0.15))
+    finished = finish_drawing(target, made, backend)
+    drawn = finished.drawing
+    assert nodes(drawn) <= nodes(exact) + 4 < nodes(made) - 20
+    assert psnr(drawn.scene, target, backend) > 45
+    np.testing.assert_array_equal(rounded(drawn.scene, finished.per_pixel).points, drawn.scene.points)
+    text = write_svg(drawn.scene, per_pixel=finished.per_pixel)
+    back, _ = load_scene(text, 64, 64, "a.svg")
+    assert write_svg(replace(back, canvas=drawn.scene.canvas), per_pixel=finished.per_pixel) == text
+
+
+def test_what_is_seen_stays(device: str) -> None:
+    """Small notches of strong contrast are no needless nodes; and the result is clean."""
+    backend = Backend.on(device, 1)
+    notched = polygon((6, 6), (30, 6), (31, 9), (32, 6), (58, 6), (58, 40), (6, 40))
+    exact = drawing(CANVAS, (BLUE, [notched]), (GOLD, [disc(30, 25, 9, 0.4)]))
+    target = render(exact.scene, backend=backend)
+    made = tidied(target, exact, backend)
+    assert nodes(made) == nodes(exact)
+    assert psnr(made.scene, target, backend) > 50
+    assert_clean(made, made.scene)

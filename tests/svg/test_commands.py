@@ -1,0 +1,138 @@
+"""Lines and cubics in the fewest characters."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tests.fit.drawings import logo, seam
+from tests.scenes import random_scene
+from warpsplat.scene import Kind
+from warpsplat.svg.commands import Pair, Segment, _ways, row, shortest, shortest_ring
+from warpsplat.svg.data import cubic_data
+from warpsplat.svg.paths import cubics
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.write import GRIDS, rounded, write_svg
+
+
+def segments(seed: int, count: int) -> list[Segment]:
+    """A chain of lines, level and upright ones among them, and of cubics, some of them smooth."""
+    rng = np.random.default_rng(seed)
+    at, mirrored = (0, 0), (0, 0)
+    chain = []
+    for _ in range(count):
+        step = rng.integers(-20, 30, 2) * rng.permutation([1, rng.integers(0, 2)])
+        end = (at[0] + int(step[0]), at[1] + int(step[1]))
+        if rng.integers(0, 2):
+            chain.append(Segment(at, None, end))
+            mirrored = end
+        else:
+            first, second = rng.integers(-99, 99, (2, 2)).tolist()
+            handles = (mirrored if rng.integers(0, 2) else (first[0], first[1]), (second[0], second[1]))
+            chain.append(Segment(at, handles, end))
+            mirrored = chain[-1].mirrored()
+        at = end
+    return chain
+
+
+def every_text(pen: Pair | None, chain: list[Segment]) -> list[str]:
+    """All ways to write a chain."""
+    texts = []
+    choices = []
+    mirrored = chain[0].start
+    for segment in chain:
+        choices.append(_ways(segment, mirrored))
+        mirrored = segment.mirrored()
+    moves = (
+        ("M", chain[0].start),
+        ("m", (chain[0].start[0] - (pen or (0, 0))[0], chain[0].start[1] - (pen or (0, 0))[1])),
+    )
+    for (move, numbers), ways in itertools.product(moves, itertools.product(*choices)):
+        text, last = move + row(numbers, False), {"M": "L", "m": "l"}[move]
+        for letter, values in ways:
+            text += row(values, True) if letter == last else letter + row(values, False)
+            last = letter
+        texts.append(text)
+    return texts
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_other_text_is_shorter(seed: int) -> None:
+    chain = segments(seed, 4)
+    pen = None if seed % 2 else (7, -9)
+    assert len(shortest(pen, chain)) == min(map(len, every_text(pen, chain)))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_it_is_read_as_it_is(seed: int) -> None:
+    """By the reader of path data: exactly the points, lines as cubics with handles at the thirds."""
+    chain = segments(seed, 30)
+    (drawn,) = cubics(shortest(None, chain), keep_dots=True)
+    want = [chain[0].start]
+    for start, handles, end in chain:
+        thirds = [tuple(np.add(start, np.subtract(end, start) * k / 3)) for k in (1, 2)]
+        want += [*(handles or thirds), end]
+    np.testing.assert_allclose(drawn.points, want, atol=1e-9)
+
+
+SAID = {
+    "level and upright lines by one number": (
+        [(0, 0), (9, 0), (9, 8), (1, 8), (1, 2), (5, 1)],
+        "M0 0h9v8H1V2l4-1",
+    ),
+    "pairs behind a move": ([(5, 5), (6, 7), (8, 6)], "M5 5l1 2 2-1"),
+    "absolute ones": ([(90, 90), (0, 7), (95, 93)], "M90 90L0 7 95 93"),
+}
+
+
+@pytest.mark.parametrize(("points", "text"), SAID.values(), ids=SAID.keys())
+def test_how_lines_are_said(points: list[Pair], text: str) -> None:
+    made = shortest(None, [Segment(a, None, b) for a, b in itertools.pairwise(points)])
+    assert len(made) == len(text)
+
+
+def test_a_line_that_closes_is_left_out() -> None:
+    """Of a fill, from wherever it starts; a stroke is closed by the command for it."""
+    square = [(0, 0), (100, 0), (103, 50), (0, 50)]
+    chain = [Segment(a, None, b) for a, b in zip(square, [*square[1:], square[0]], strict=True)]
+    text, end = shortest_ring(None, chain)
+    assert text.count("l") + text.count("h") + text.count("v") + text.count("H") + text.count("V") <= 3
+    (drawn,) = cubics(text, keep_dots=False)
+    assert len(drawn.points) == 10
+    assert tuple(drawn.points[-1]) == end
+    grid = [(int(x), int(y)) for x, y in np.repeat(square, 3, axis=0)]
+    stroked, pen = cubic_data(grid, [True] * 4, True, is_stroked=True, keep_dots=True, pen=None)
+    assert stroked.endswith("z")
+    assert pen == (0, 0)
+    (drawn,) = cubics(stroked, keep_dots=True)
+    assert drawn.is_closed
+    np.testing.assert_allclose(drawn.points[::3], [*square, square[0]])
+
+
+@pytest.mark.parametrize("per_pixel", GRIDS[2:])
+def test_files_of_drawings_hold_what_they_say(per_pixel: float) -> None:
+    """Read they are the rounded drawing, and written again the same bytes, contours and lines included."""
+    for made in (logo(), seam()):
+        scene = made.scene
+        text = write_svg(scene, per_pixel=per_pixel)
+        canvas = scene.canvas
+        back, _ = load_scene(text, canvas.width, canvas.height, "a.svg")
+        assert write_svg(back, per_pixel=per_pixel) == text
+        held = rounded(scene, per_pixel)
+        for shape in range(len(scene)):
+            for (ring, _), (other, _) in zip(back.contours_of(shape), held.contours_of(shape), strict=True):
+                turns = [np.roll(ring, 3 * k, axis=0) for k in range(len(ring) // 3)]
+                kept = np.abs(np.stack([t for t in turns if t.shape == other.shape]) - other).max(axis=(1, 2))
+                assert kept.min() < 1e-4
+
+
+def test_lines_of_a_drawing_are_lines() -> None:
+    """However they lie; a curve as long is none."""
+    text = write_svg(logo().scene, per_pixel=10)
+    star = text.split('<path d="')[3].split('"')[0]
+    assert set(star) <= set("Mml-0123456789 ")
+    assert text.split('<path d="')[2].count("c") >= 2
+    curved = write_svg(random_scene(Kind.FILL, 3), per_pixel=10)
+    assert "l" not in "".join(part.split('"')[0] for part in curved.split('<path d="')[1:])

@@ -1,0 +1,280 @@
+"""What a fit keeps of a drawing's outlines: corners, straight lines, smooth joints, seams and borders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+import warp as wp
+
+from warpsplat.kernels import constraints as kernels
+from warpsplat.kernels.constants import NONE
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.program import Program
+from warpsplat.scene import Basis, Canvas, FloatArray, Scene
+
+Ints = npt.NDArray[np.int32]
+Links = npt.NDArray[np.intp]
+
+EQUAL = 1e-3
+"""Coordinates that differ by less [canvas units] are one, as those of the ends of an upright line."""
+
+BEFORE, AFTER = 1, 2
+"""Which neighbours of a smooth joint are free handles; the other one is the far end of a line."""
+
+
+class Joint(IntEnum):
+    """What a control point of a drawing's outline is."""
+
+    FREE = 0
+    """A handle, or a point without conditions."""
+    CORNER = 1
+    """On the outline, which may turn there."""
+    SMOOTH = 2
+    """On the outline, which goes straight on there: both handles lie on one line through it."""
+    LINE_HANDLE = 3
+    """At a third of a straight line."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Shapes whose outlines have conditions."""
+
+    scene: Scene
+    """Fills of cubics."""
+    joints: Ints
+    """``Joint`` of each point, shape (point,)."""
+    same: Ints
+    """Points with the same number, 0 or more, are one place in several shapes; NONE: the point is alone.
+    Shape (point,)."""
+
+    def __post_init__(self) -> None:
+        """Check that the arrays fit one another.
+
+        Raises:
+            ValueError: they do not, or the shapes are others than fills of cubics.
+        """
+        count = len(self.scene.points)
+        for name, values in (("joints", self.joints), ("same", self.same)):
+            if values.shape != (count,):
+                raise ValueError(f"{name} has shape {values.shape}, not ({count},)")
+        if (self.scene.basis != Basis.CUBIC).any() or not self.scene.closed.all():
+            raise ValueError("a drawing has closed outlines of cubics")
+
+    def links(self) -> tuple[Links, Links]:
+        """The points on the outlines, in order, and for each the next one of its contour; shape (cubic,)."""
+        starts = self.scene.starts.astype(np.intp)
+        on = np.concatenate([np.arange(a, b, 3) for a, b in pairwise(starts)])
+        following = on + 3
+        last = np.searchsorted(on, starts[1:] - 3)
+        following[last] = starts[:-1]
+        return on, following
+
+    def lines(self) -> npt.NDArray[np.bool_]:
+        """Which cubics are straight lines, in the order of ``links``, shape (cubic,): those whose handles lie
+        on one, in any of the shapes.
+        """
+        on, _ = self.links()
+        marked = self.joints == Joint.LINE_HANDLE
+        marked |= (self.same >= 0) & np.isin(self.same, self.same[marked])
+        return np.asarray(marked[on + 1] & marked[on + 2])
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """A drawing's conditions, as ``kernels.constraints`` takes them."""
+
+    line_end: Ints
+    """Where the line that begins at each point ends, or NONE, shape (point,)."""
+    line_start: Ints
+    """Where the line that ends at each point begins, or NONE, shape (point,)."""
+    joint_point: Ints
+    """Smooth joints that bind handles, shape (joint,); others do so by ties."""
+    joint_before: Ints
+    joint_after: Ints
+    joint_free: Ints
+    turned_by: Ints
+    """Joints whose line has its far end at each point, or NONE, shape (point, 2)."""
+    tie_first: Ints
+    """First member of each tie and, last, the number of members, shape (tie + 1,)."""
+    tie_member: Ints
+    """Coordinates, 2 x point + axis, of each tie, shape (member,)."""
+    tie_pinned: Ints
+    """1 for ties that stay as they are, shape (tie,)."""
+
+    @staticmethod
+    def of(drawing: Drawing) -> Constraints:
+        """The conditions of ``drawing``: coordinates that are equal along a line or a tangent stay so, and
+        those on the border. Of smooth joints that would bind one handle twice the first one does.
+        """
+        points, canvas = drawing.scene.points, drawing.scene.canvas
+        count = len(points)
+        on, following = drawing.links()
+        straight = drawing.lines()
+        line_end, line_start = np.full((2, count), NONE, np.int32)
+        line_end[on[straight]] = following[straight]
+        line_start[following[straight]] = on[straight]
+        ties = _Ties(2 * count)
+        ties.join_same(drawing.same)
+        for a, b in zip(on[straight].tolist(), following[straight].tolist(), strict=True):
+            ties.join_where(_equal(points, a, b), a, b)
+        joints = _smooth_joints(drawing, line_start, line_end, ties)
+        turned = np.full((count, 2), NONE, np.int32)
+        for number, (_, begin, end, side) in enumerate(joints):
+            if side == AFTER:
+                turned[begin, 0] = number
+            elif side == BEFORE:
+                turned[end, 1] = number
+        leaders = {handle for joint in joints for handle in _handles(*joint[1:])}
+        laid = set(np.concatenate([on[straight] + 1, on[straight] + 2]).tolist())
+        point, before, after, free = np.asarray(joints, np.int32).reshape(-1, 4).T
+        first, member, pinned = ties.groups(leaders, set(on.tolist()), laid, _on_border(points, canvas))
+        return Constraints(line_end, line_start, point, before, after, free, turned, first, member, pinned)
+
+    @property
+    def laid(self) -> npt.NDArray[np.bool_]:
+        """Handles of lines, shape (point,)."""
+        found = np.zeros(len(self.line_end), np.bool_)
+        starts = np.flatnonzero(self.line_end != NONE)
+        found[starts + 1] = found[starts + 2] = True
+        return found
+
+
+def _equal(points: FloatArray, a: int, b: int) -> npt.NDArray[np.bool_]:
+    """In which axes two points have the same coordinate."""
+    return np.asarray(np.abs(points[a] - points[b]) < EQUAL)
+
+
+def _on_border(points: FloatArray, canvas: Canvas) -> npt.NDArray[np.bool_]:
+    """Which coordinates lie on the border of the canvas, shape (point, 2)."""
+    size = np.array([canvas.width, canvas.height])
+    return np.asarray((np.abs(points) < EQUAL) | (np.abs(points - size) < EQUAL))
+
+
+def _smooth_joints(
+    drawing: Drawing, line_start: Ints, line_end: Ints, ties: _Ties
+) -> list[tuple[int, int, int, int]]:
+    """Point, before, after and what is free of each smooth joint that binds handles. Where its tangent is
+    level or upright, ties do that.
+    """
+    points = drawing.scene.points
+    on, following = drawing.links()
+    previous = dict(zip(following.tolist(), on.tolist(), strict=True))
+    places = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(len(points)))
+    bound: set[int] = set()
+    joints = []
+    for p in on[drawing.joints[on] == Joint.SMOOTH].tolist():
+        free = BEFORE * (line_start[p] == NONE) + AFTER * (line_end[p] == NONE)
+        handles = _handles(previous[p] + 2, p + 1, free)
+        keys = {int(places[handle]) for handle in handles}
+        if not handles or keys & bound:
+            continue
+        bound |= keys
+        before = handles[0] if free & BEFORE else int(line_start[p])
+        after = p + 1 if free & AFTER else int(line_end[p])
+        flat = _equal(points, before, p) & _equal(points, p, after)
+        if flat.any():
+            for handle in handles:
+                ties.join_where(flat, p, handle)
+        else:
+            joints.append((p, before, after, free))
+    return joints
+
+
+def _handles(before: int, after: int, free: int) -> list[int]:
+    """Those of a smooth joint that are no lines."""
+    return [before] * bool(free & BEFORE) + [after] * bool(free & AFTER)
+
+
+class _Ties:
+    """Coordinates that are one, by union and find."""
+
+    def __init__(self, count: int) -> None:
+        self._parent = list(range(count))
+
+    def root(self, i: int) -> int:
+        while self._parent[i] != i:
+            self._parent[i] = self._parent[self._parent[i]]
+            i = self._parent[i]
+        return i
+
+    def join_where(self, axes: npt.NDArray[np.bool_], a: int, b: int) -> None:
+        """Two points' coordinates along ``axes``, shape (2,)."""
+        for axis in np.flatnonzero(axes).tolist():
+            i, j = sorted((self.root(2 * a + axis), self.root(2 * b + axis)))
+            self._parent[j] = i
+
+    def join_same(self, same: Ints) -> None:
+        """All points with the same number."""
+        first: dict[int, int] = {}
+        for point in np.flatnonzero(same >= 0).tolist():
+            self.join_where(np.ones(2, np.bool_), first.setdefault(int(same[point]), point), point)
+
+    def groups(
+        self, leaders: set[int], on: set[int], laid: set[int], border: npt.NDArray[np.bool_]
+    ) -> tuple[Ints, Ints, Ints]:
+        """First members, members and pins of the ties: those of several coordinates, and of pinned ones.
+
+        Args:
+            leaders: points that come first in their ties ...
+            on: ... and after these, those on the outlines.
+            laid: points that are in none.
+            border: coordinates that are pinned, with their ties, shape (point, 2).
+        """
+        members: dict[int, list[int]] = {}
+        for i in range(len(self._parent)):
+            if i // 2 not in laid:
+                members.setdefault(self.root(i), []).append(i)
+        pinned = border.reshape(-1)
+        kept = [m for m in members.values() if len(m) > 1 or pinned[m].any()]
+        ordered = [sorted(m, key=lambda i: (i // 2 not in leaders, i // 2 not in on)) for m in kept]
+        first = np.cumsum([0, *map(len, ordered)]).astype(np.int32)
+        flat = np.array([i for m in ordered for i in m], np.int32)
+        return first, flat, np.array([pinned[m].any() for m in ordered], np.int32)
+
+
+class Keeper:
+    """The conditions of a drawing on a device."""
+
+    def __init__(
+        self,
+        constraints: Constraints,
+        parameters: Parameters,
+        held: npt.NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Of the drawing whose scene ``parameters`` are; ``held``: points that stay, shape (point,)."""
+        device = parameters.backend.device
+        self._parameters = parameters
+        self._joints, self._ties = len(constraints.joint_point), len(constraints.tie_pinned)
+        self._arrays: dict[str, wp.array] = {
+            f.name: wp.array(getattr(constraints, f.name), dtype=wp.int32, device=device)
+            for f in fields(constraints)
+        }
+        self._arrays["joint_turn"] = parameters.backend.array(wp.vec2, self._joints)
+        parameters.hold("points", constraints.laid if held is None else constraints.laid | held)
+
+    def record_project(self, program: Program) -> None:
+        """Record what brings the points back to where they may be."""
+        p, group = self._parameters, self._parameters.groups["points"]
+        program.launch(kernels.align, self._joints, p.arrays, self._arrays)
+        program.launch(kernels.spread, self._ties, self._arrays, value=group.value)
+        program.launch(kernels.lay, p.point_count, p.arrays, self._arrays)
+
+    def record_adjoint(self, program: Program) -> None:
+        """Record what makes the gradient of the points that of what is free."""
+        p, group = self._parameters, self._parameters.groups["points"]
+        program.launch(kernels.lay_backward, p.point_count, p.arrays, self._arrays)
+        program.launch(kernels.spread_backward, self._ties, self._arrays, grad=group.grad)
+        program.launch(kernels.align_backward, self._joints, p.arrays, self._arrays)
+        if self._joints:
+            program.launch(kernels.turn_backward, p.point_count, p.arrays, self._arrays)
+        program.launch(kernels.share, self._ties, self._arrays, grad=group.grad)
+
+    def project(self) -> None:
+        """Bring the points to where they may be."""
+        program = self._parameters.backend.program()
+        self.record_project(program)
+        program.run()

@@ -1,0 +1,265 @@
+"""What a drawing's outlines may do without: candidates for fewer, straighter or more upright pieces.
+
+Each is an ``Edit`` of the arrays, with the part of the canvas that it changes and the bytes that it spares.
+What it costs is for the renderer to say (``fit.tidy``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.fit.constraints import EQUAL, Drawing, Joint
+from warpsplat.fit.merge import handles_through, points_at
+
+Floats = npt.NDArray[np.float64]
+
+MOST_OFF = 0.6
+"""How far a candidate may move an outline [canvas units]: what moves further is no candidate."""
+
+STEEP = 0.06
+"""Slope below which a line may be level, or upright, and a tangent likewise."""
+
+CELL = 2
+"""Side of the squares by which is told what a candidate changes [canvas units]."""
+
+NEAR = (-1, 0, 1)
+"""Steps from a cell to those that an outline in it may change as well."""
+
+CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
+"""What a cubic, a line, the handles of a cubic and a number take in a file."""
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A change of a drawing."""
+
+    kind: str
+    at: tuple[float, float]
+    """Where it is [canvas units]."""
+    cells: frozenset[tuple[int, int]]
+    """What it may change: column and row of cells of ``CELL``."""
+    off: float
+    """How far it moves the outline, about [canvas units]."""
+    saved: int
+    """Bytes."""
+    points: dict[int, Any] = field(default_factory=dict)
+    """Points that move, and where to."""
+    joints: dict[int, Joint] = field(default_factory=dict)
+    removed: tuple[int, ...] = ()
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What names it from round to round, whatever the numbers of its points are."""
+        return (self.kind, *np.round(np.divide(self.at, 2)).tolist())
+
+
+def applied(drawing: Drawing, edits: Sequence[Edit]) -> Drawing:
+    """The drawing with ``edits`` that have no points in common."""
+    points, joints = drawing.scene.points.copy(), drawing.joints.copy()
+    keep = np.ones(len(points), np.bool_)
+    for edit in edits:
+        for i, place in edit.points.items():
+            points[i] = place
+        for i, joint in edit.joints.items():
+            joints[i] = joint
+        keep[list(edit.removed)] = False
+    scene = replace(drawing.scene, points=points).without_points(keep)
+    return Drawing(scene, joints[keep], drawing.same[keep])
+
+
+def turned(drawing: Drawing) -> Drawing:
+    """The same outlines, each from another of its points on: the first one is never removed."""
+    starts = drawing.scene.starts
+    order = np.concatenate(
+        [np.roll(np.arange(a, b), -3 * max(1, (b - a) // 6)) for a, b in pairwise(starts.tolist())]
+    )
+    scene = replace(drawing.scene, points=drawing.scene.points[order])
+    return Drawing(scene, drawing.joints[order], drawing.same[order])
+
+
+class Outlines:
+    """A drawing's outlines, place by place."""
+
+    def __init__(self, drawing: Drawing) -> None:
+        self.drawing = drawing
+        self.points = drawing.scene.points.astype(np.float64)
+        on, following = drawing.links()
+        self.on = on.tolist()
+        self.next = dict(zip(self.on, following.tolist(), strict=True))
+        self.previous = {b: a for a, b in self.next.items()}
+        self.is_line = dict(zip(self.on, drawing.lines().tolist(), strict=True))
+        count = len(self.points)
+        self.place = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(count)).tolist()
+        self._cells: dict[int, frozenset[tuple[int, int]]] = {}
+        self._members: dict[int, list[int]] = {}
+        for i, place in enumerate(self.place):
+            self._members.setdefault(place, []).append(i)
+        starts = drawing.scene.starts
+        self._firsts = set(starts[:-1].tolist())
+        sizes = np.repeat(np.diff(starts), np.diff(starts))
+        self._sizes = sizes.tolist()
+
+    def members(self, point: int) -> list[int]:
+        """All points at the place of ``point``."""
+        return self._members[self.place[point]]
+
+    def corners(self, a: int) -> Floats:
+        """The cubic that begins at ``a``, shape (4, 2)."""
+        return self.points[[a, a + 1, a + 2, self.next[a]]]
+
+    def cells(self, *starts: int) -> frozenset[tuple[int, int]]:
+        """Around the cubics that begin at ``starts``, and those that turn with them."""
+        wide = set(starts)
+        for a in starts:
+            if self.drawing.joints[a] == Joint.SMOOTH:
+                wide.add(self.previous[a])
+            if self.drawing.joints[self.next[a]] == Joint.SMOOTH:
+                wide.add(self.next[a])
+        return frozenset().union(*(self._cells_of(a) for a in wide))
+
+    def _cells_of(self, a: int) -> frozenset[tuple[int, int]]:
+        """Around the cubic that begins at ``a``."""
+        if a not in self._cells:
+            corners = self.corners(a)
+            reach = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
+            t = np.linspace(0, 1, 2 + math.ceil(1.5 * reach / CELL))[:, None]
+            places = set(map(tuple, np.floor(points_at(corners, t) / CELL).astype(np.intp).tolist()))
+            self._cells[a] = frozenset((x + i, y + j) for x, y in places for i in NEAR for j in NEAR)
+        return self._cells[a]
+
+    def _at(self, p: int) -> tuple[float, float]:
+        x, y = self.points[p].tolist()
+        return x, y
+
+    def edits(self) -> list[Edit]:
+        """All candidates."""
+        found: list[Edit] = []
+        done: set[int] = set()
+        for p in self.on:
+            if self.place[p] in done:
+                continue
+            done.add(self.place[p])
+            found += [*self._without(p), *self._level_tangent(p)]
+        for a in self.on:
+            if min(self.members(a + 1) + self.members(a + 2)) >= a:  # once for all shapes
+                found += [*self._level_line(a)] if self.is_line[a] else [*self._straight(a)]
+        return found
+
+    def _without(self, p: int) -> Iterator[Edit]:
+        """The two pieces that meet in ``p`` as one."""
+        members = self.members(p)
+        a, b = self.previous[p], self.next[p]
+        ends = {self.place[a], self.place[b]}
+        for m in members:
+            around = {self.place[self.previous[m]], self.place[self.next[m]]}
+            if m in self._firsts or self._sizes[m] <= 6 or around != ends or len(ends) < 2:
+                return
+        lines = self.is_line[a] + self.is_line[p]
+        first, second = self.corners(a), self.corners(p)
+        if lines == 2:
+            handles = np.stack([(2 * first[0] + second[3]) / 3, (first[0] + 2 * second[3]) / 3])
+        else:
+            handles = handles_through(first, second)
+        made = np.stack([first[0], *handles, second[3]])
+        off = _apart(made, first, second)
+        if off > MOST_OFF:
+            return
+        points, joints, removed = {}, {}, []
+        kind = Joint.LINE_HANDLE if lines == 2 else Joint.FREE
+        for m in members:
+            before = self.previous[m]
+            forward = self.place[before] == self.place[a]
+            points[before + 1], points[m + 2] = handles if forward else handles[::-1]
+            joints[before + 1] = joints[m + 2] = kind
+            removed += [before + 2, m, m + 1]
+        saved = (LINE_BYTES if lines else CUBIC_BYTES) * len(members)
+        yield Edit("without", self._at(p), self.cells(a, p), off, saved, points, joints, tuple(removed))
+
+    def _straight(self, a: int) -> Iterator[Edit]:
+        """A cubic as a line."""
+        corners = self.corners(a)
+        thirds = np.stack([(2 * corners[0] + corners[3]) / 3, (corners[0] + 2 * corners[3]) / 3])
+        off = _apart(np.stack([corners[0], *thirds, corners[3]]), corners)
+        if off > MOST_OFF:
+            return
+        saved = HANDLES_BYTES * len(self.members(a + 1))
+        points, joints = {}, {}
+        for handle, third in zip((a + 1, a + 2), thirds, strict=True):
+            for m in self.members(handle):
+                points[m], joints[m] = third, Joint.LINE_HANDLE
+        b = self.next[a]
+        for end, beyond in ((a, self.previous[a]), (b, b)):
+            if self.is_line[beyond]:
+                joints |= dict.fromkeys(self.members(end), Joint.CORNER)
+        yield Edit("straight", self._at(a + 1), self.cells(a), off, saved, points, joints)
+
+    def _level_line(self, a: int) -> Iterator[Edit]:
+        """A line that is almost level or upright, so."""
+        b = self.next[a]
+        way = np.abs(self.points[b] - self.points[a])
+        axis = int(way.argmin())
+        if way[axis] < EQUAL or way[axis] > min(STEEP * way[1 - axis], MOST_OFF):
+            return
+        bound = [self._is_bound(end, axis) for end in (a, b)]
+        if all(bound):
+            return
+        ends = self.points[[a, b], axis]
+        level = ends[bound.index(True)] if any(bound) else ends.mean()
+        points = {}
+        for end in (a, b):
+            for m in self.members(end):
+                points[m] = self.points[m].copy()
+                points[m][axis] = level
+        cells = self.cells(a, self.previous[a], b)
+        saved = NUMBER_BYTES * len(self.members(a))
+        yield Edit("level", self._at(a + 1), cells, float(way[axis]), saved, points)
+
+    def _is_bound(self, p: int, axis: int) -> bool:
+        """Whether a level or upright line, or the border, holds a coordinate of ``p``."""
+        size = (self.drawing.scene.canvas.width, self.drawing.scene.canvas.height)[axis]
+        if min(abs(self.points[p, axis]), abs(self.points[p, axis] - size)) < EQUAL:
+            return True
+        for m in self.members(p):
+            for a, end in ((m, self.next[m]), (self.previous[m], self.previous[m])):
+                if self.is_line[a] and abs(self.points[end, axis] - self.points[m, axis]) < EQUAL:
+                    return True
+        return False
+
+    def _level_tangent(self, p: int) -> Iterator[Edit]:
+        """A smooth joint whose tangent is almost level or upright, so."""
+        a = self.previous[p]
+        if self.drawing.joints[p] != Joint.SMOOTH or self.is_line[a] or self.is_line[p]:
+            return
+        handles = (a + 2, p + 1)
+        ways = np.abs(self.points[list(handles)] - self.points[p])
+        axis = int(ways.sum(axis=0).argmin())
+        off = float(ways[:, axis].max())
+        if off < EQUAL or (ways[:, axis] > STEEP * ways[:, 1 - axis]).any():
+            return
+        points = {}
+        for handle in handles:
+            for m in self.members(handle):
+                points[m] = self.points[m].copy()
+                points[m][axis] = self.points[p, axis]
+        yield Edit(
+            "tangent", self._at(p), self.cells(a, p), 0.4 * off, NUMBER_BYTES * len(self.members(p)), points
+        )
+
+
+def _apart(made: Floats, *pieces: Floats) -> float:
+    """Largest distance of points of ``pieces`` from the cubic ``made``, about."""
+    t = np.linspace(0, 1, 17)[:, None]
+    curve = points_at(made, t)
+    samples = np.concatenate([points_at(piece, t[1:-1:2]) for piece in pieces])
+    ways = np.diff(curve, axis=0)
+    behind = samples[:, None] - curve[:-1]
+    along = (behind * ways).sum(axis=2) / np.maximum((ways**2).sum(axis=1), 1e-12)
+    apart = behind - np.clip(along, 0, 1)[..., None] * ways
+    return float(np.linalg.norm(apart, axis=2).min(axis=1).max())

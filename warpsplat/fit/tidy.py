@@ -1,0 +1,175 @@
+"""A drawing finished: fitted, without nodes that nobody would miss, on a grid that costs little."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.alpha import squares
+from warpsplat.fit.constraints import Constraints, Drawing, Keeper
+from warpsplat.fit.drawing import Refinement, refine_drawing
+from warpsplat.fit.nodes import CELL, Edit, Outlines, applied, turned
+from warpsplat.fit.rate import byte_worth
+from warpsplat.fit.rounding import STAGED
+from warpsplat.render.backend import Backend, Viewport
+from warpsplat.render.models import EXACT
+from warpsplat.render.parameters import Parameters
+from warpsplat.render.renderer import Renderer
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.svg.write import GRIDS, rounded, write_svg
+
+ROUNDS = 16
+"""In which candidates are tried, at the most."""
+
+REFIT = Refinement(steps=50, point_rate=0.1)
+"""After each round."""
+
+LEAST_ERROR = 3e-5
+"""Mean squared error below which a picture is as good as another: 45 dB. A drawing can have much more, at the
+price of nodes that nobody would miss."""
+
+USUAL_GRID = 10.0
+"""Units a pixel, where the grid is not known yet."""
+
+MENDED = 10.0
+"""How much more a candidate may cost before it is fitted anew."""
+
+Floats = npt.NDArray[np.float64]
+Stop = Callable[[], bool]
+
+
+class Finished(NamedTuple):
+    """What there is to write."""
+
+    drawing: Drawing
+    """Rounded to the grid."""
+    per_pixel: float
+    """Units of the view box a pixel."""
+
+
+def finish_drawing(
+    target: FloatArray,
+    drawing: Drawing,
+    backend: Backend,
+    how: Refinement | None = None,
+    *,
+    finest: float = GRIDS[-1],
+    stop: Stop | None = None,
+) -> Finished:
+    """Refine a traced drawing, remove nodes, and round it.
+
+    Args:
+        target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
+            width, 4).
+        drawing: as traced.
+        backend: where to compute.
+        how: rates and steps of the first refinement.
+        finest: most units of the view box a pixel.
+        stop: asked after every step and round; once true, what there is is rounded.
+    """
+
+    def refined(
+        drawing: Drawing, how: Refinement | None, held: npt.NDArray[np.bool_] | None = None
+    ) -> Drawing:
+        fields = (drawing.scene, drawing.joints, drawing.same)
+        return replace(drawing, scene=refine_drawing(target, *fields, backend, how, held=held, stop=stop))
+
+    if not len(drawing.scene):
+        return Finished(drawing, min(USUAL_GRID, finest))
+    drawing = tidied(target, refined(drawing, how), backend, stop)
+    drawing = refined(drawing, replace(REFIT, steps=2 * REFIT.steps))
+    grid = drawing_grid(target, drawing, backend, finest)
+    on, _ = drawing.links()
+    held = np.zeros(len(drawing.joints), np.bool_)
+    held[on] = True
+    low = rounded(drawing.scene, grid)
+    points = np.where(held[:, None], low.points, drawing.scene.points)
+    drawing = refined(replace(drawing, scene=replace(drawing.scene, points=points)), REFIT, held)
+    return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+
+
+def tidied(target: FloatArray, drawing: Drawing, backend: Backend, stop: Stop | None = None) -> Drawing:
+    """A drawing without the nodes, curves and slants that are worth less than their bytes.
+
+    In each round candidates that do not meet are made together and fitted anew; each is judged by the pixels
+    around it, and where some cost too much, the others are made alone.
+    """
+    refused: set[tuple[object, ...]] = set()
+    errors = error_map(target, drawing, backend)
+
+    def refitted(edits: Sequence[Edit]) -> tuple[Drawing, Floats]:
+        made = applied(drawing, edits)
+        scene = refine_drawing(target, made.scene, made.joints, made.same, backend, REFIT, stop=stop)
+        made = replace(made, scene=scene)
+        return made, error_map(target, made, backend)
+
+    for _ in range(ROUNDS):
+        edits = apart([e for e in Outlines(drawing).edits() if e.key not in refused])
+        if not edits or (stop and stop()):
+            break
+        worth = worth_of(errors, drawing.scene)
+        growth = error_map(target, applied(drawing, edits), backend) - errors
+        left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
+        refused |= {e.key for e in edits} - {e.key for e in left}
+        while left:
+            made, after = refitted(left)
+            taken = [e for e in left if within(after - errors, e) <= e.saved * worth]
+            if len(taken) == len(left):
+                drawing, errors = made, after
+                break
+            refused |= {e.key for e in left} - {e.key for e in taken}
+            left = taken
+        drawing = turned(drawing)
+    return drawing
+
+
+def error_map(target: FloatArray, drawing: Drawing, backend: Backend) -> Floats:
+    """What each pixel adds to the mean squared error, shape (height, width)."""
+    parameters = Parameters(drawing.scene, backend)
+    Keeper(Constraints.of(drawing), parameters).project()
+    height, width = target.shape[:2]
+    renderer = Renderer(parameters, Viewport(width, height), model=EXACT)
+    renderer.forward_complete()
+    errors = squares(renderer.read_image() - target).astype(np.float64)
+    return errors / (3 * errors.size)
+
+
+def within(errors: Floats, edit: Edit) -> float:
+    """Sum over the pixels that an edit may change."""
+    cells = (
+        errors[CELL * y : CELL * (y + 1), CELL * x : CELL * (x + 1)] for x, y in edit.cells if min(x, y) >= 0
+    )
+    return float(sum(cell.sum() for cell in cells))
+
+
+def worth_of(errors: Floats, scene: Scene) -> float:
+    """What a byte is worth of the mean squared error."""
+    size = len(write_svg(scene, per_pixel=USUAL_GRID))
+    return byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
+
+
+def apart(edits: Sequence[Edit]) -> list[Edit]:
+    """Those that cost least for what they spare, no two of them with pixels in common."""
+    chosen: list[Edit] = []
+    changed: set[tuple[int, int]] = set()
+    for edit in sorted(edits, key=lambda e: (e.off / e.saved, e.key)):
+        if not changed & edit.cells:
+            chosen.append(edit)
+            changed |= edit.cells
+    return chosen
+
+
+def drawing_grid(target: FloatArray, drawing: Drawing, backend: Backend, finest: float) -> float:
+    """Units a pixel of the grid that costs least: in error, of which refitting mends most, and in bytes."""
+    errors = error_map(target, drawing, backend)
+    worth = worth_of(errors, drawing.scene)
+    costs = {}
+    for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
+        low = replace(drawing, scene=rounded(drawing.scene, grid))
+        loss = float(error_map(target, low, backend).sum() - errors.sum())
+        costs[grid] = 2 * STAGED * loss + worth * len(write_svg(low.scene, per_pixel=grid))
+    return min(costs, key=costs.__getitem__)

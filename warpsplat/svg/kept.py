@@ -1,0 +1,73 @@
+"""What a scene cannot hold and a file keeps: elements of the document, each whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from warpsplat.errors import ImageError
+from warpsplat.svg.clip import clipped
+from warpsplat.svg.document import Document, Element
+from warpsplat.svg.paths import Points
+from warpsplat.svg.shapes import Shape
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An element that stays as it is."""
+
+    element: Element
+    cause: str
+    """What of it no scene can hold."""
+    blends: bool
+    """Whether its colours depend on what lies below."""
+
+
+Part = Shape | Kept
+"""What a document draws, in painter's order."""
+
+
+def shapes_of(parts: Sequence[Part]) -> list[Shape]:
+    """Those of ``parts`` that are shapes."""
+    return [part for part in parts if isinstance(part, Shape)]
+
+
+class Keeping:
+    """Which elements of a document are kept: the smallest that show the same without what is around them."""
+
+    def __init__(self, document: Document) -> None:
+        self._css = document.css
+
+    def part(self, element: Element, error: ImageError) -> Kept:
+        """An element that cannot be read for the reason that ``error`` says."""
+        styles = [self._css, *(child.get("style", "") for child in element.iter())]
+        return Kept(element, str(error), any("mix-blend-mode" in style for style in styles))
+
+    def isolates(self, group: Element) -> bool:
+        """Whether what is in a group blends with nothing below the group, clips aside."""
+        return "isolation" in self._css or "isolation" in group.get("style", "")
+
+    def inside(self, parts: list[Part], clip: Points | None) -> list[Part]:
+        """The parts of a group that isolates, or clips.
+
+        Raises:
+            ImageError: they show something else without the group.
+        """
+        if any(isinstance(part, Kept) and part.blends for part in parts):
+            raise ImageError("uses a blend mode in a group, not supported")
+        return parts if clip is None else list(self._clipped(parts, clip))
+
+    def _clipped(self, parts: list[Part], clip: Points) -> Iterator[Part]:
+        for _, run in groupby(parts, lambda part: id(part.element)):
+            alike = list(run)
+            element, shapes = alike[0].element, shapes_of(alike)
+            if not shapes:
+                yield from alike
+                continue
+            try:
+                yield from clipped(shapes, clip)
+            except ImageError as error:
+                if element is None:
+                    raise
+                yield self.part(element, error)
