@@ -3,7 +3,6 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint.gradient import frame
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -57,23 +56,6 @@ def tie_twins(
         both = points_grad[i] + points_grad[j]
         points_grad[i] = both
         points_grad[j] = both
-
-
-@wp.kernel
-def tie_circles(
-    # In:
-    offset: wp.int32,
-    circular: wp.array[wp.int32],  # [shape_count] 1 where the frame is a circle's
-    # Out:
-    frames_grad: wp.array[frame],  # [shape_count] updated
-):
-    """A circle stays one: its second axis is the first one, turned by a right angle."""
-    i = offset + wp.tid()
-    if circular[i] == 1:
-        g = frames_grad[i]
-        x = g[2] + g[5]
-        y = g[3] - g[4]
-        frames_grad[i] = frame(g[0], g[1], x, y, -y, x)
 
 
 @wp.kernel

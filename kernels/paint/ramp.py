@@ -224,3 +224,20 @@ def ramp_backward(
     along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
     across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
     frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+
+
+@wp.kernel
+def tie_circles(
+    # In:
+    offset: wp.int32,
+    circular: wp.array[wp.int32],  # [shape_count] 1 where the frame is a circle's
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] updated
+):
+    """A circle stays one: its second axis is the first one, turned by a right angle."""
+    i = offset + wp.tid()
+    if circular[i] == 1:
+        g = frames_grad[i]
+        x = g[2] + g[5]
+        y = g[3] - g[4]
+        frames_grad[i] = frame(g[0], g[1], x, y, -y, x)
