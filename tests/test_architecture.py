@@ -25,7 +25,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "files": ("errors", "native", "scene", "_version"),
     "svg": ("errors", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
-    "trace": ("alpha", "scene"),
+    "trace": ("alpha", "errors", "scene"),
     "render": ("errors", "native", "scene", "kernels"),
     "fit": ("alpha", "errors", "scene", "kernels", "render", "svg", "metrics"),
     "jobs": (

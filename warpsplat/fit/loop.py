@@ -11,7 +11,7 @@ import numpy as np
 from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
-from warpsplat.fit.palette import SNAP_INTERVAL, Palette
+from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.schedule import (
@@ -124,7 +124,7 @@ def fit(
             step = Step(state, settings, Target(image, phase, weights))
             step = operate(step, grows=True) if first else step
         step.advance()
-        if palette and not rounding and state.step % SNAP_INTERVAL == 0:
+        if palette and not rounding:
             palette.choose(state)
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:

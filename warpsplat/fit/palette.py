@@ -14,13 +14,10 @@ from warpsplat.fit.state import FitState
 from warpsplat.scene import Canvas, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas
 
-SNAP_INTERVAL = 5
-"""Steps between two choices of colours."""
-
 ROUNDS = 20
 """Of k-means."""
 
-FOLLOWED = 0.3
+FOLLOWED = 0.01
 """Share of the way to what shapes would like that the colours of a palette go at each choice."""
 
 SOLID = 0.5
@@ -33,9 +30,9 @@ Floats = npt.NDArray[np.floating]
 class Palette:
     """The colours that shapes may have.
 
-    Shapes are rendered in these colours only, and between two choices their own are trained from there. Where
-    a shape's would be is remembered, so that many small steps towards another colour of the palette add up
-    (the straight-through estimator of Bengio et al. 2013, every few steps).
+    Shapes are rendered in these colours only, and each step trains their own from there. What a shape would
+    like is remembered, so that many small steps towards another colour of the palette add up (the
+    straight-through estimator of Bengio et al. 2013).
     """
 
     def __init__(self, colors: FloatArray, *, given: bool = True) -> None:

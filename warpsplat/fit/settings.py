@@ -21,6 +21,7 @@ Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Renderer = Literal["exact", "splat", "gaussian"]
+Painting = Literal["flat", "linear", "radial", "auto"]
 
 
 FRACTION = (0.0, 1.0)
@@ -139,6 +140,8 @@ class Settings:
     renderer: Renderer = "exact"
     """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
     look like the paths, or the paper's own soft ones."""
+    paint: Painting = "flat"
+    """Of each shape: a colour, a gradient of one kind, or a gradient where it is worth its bytes."""
     softness: float = 0.6
     """Standard deviation that soft Gaussians have at least [px of the canvas]."""
     gaussian_density: float = 0.5
@@ -252,6 +255,7 @@ class Settings:
             ("subject", self.subject, get_args(Subject)),
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
+            ("paint", self.paint, get_args(Painting)),
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
@@ -274,6 +278,7 @@ class Settings:
             "open": self.kind == Kind.STROKE,
             "mixed": self.mixed,
             "levels": bool(self.levels),
+            f"paint {self.paint}": self.paint != "flat",
             f"renderer {self.renderer}": self.renderer != "exact",
             "target-psnr": self.target_psnr is not None,
             "max-bytes": self.max_bytes is not None,
@@ -385,6 +390,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         given["max_bytes"] = parse_bytes(given["max_bytes"])
     if "palette" in given:
         given["palette"] = parse_palette(given["palette"])
+    if given.get("paint", "flat") != "flat" and (given.get("colors") or given.get("palette")):
+        raise UsageError(f"paint {given['paint']} and a palette do not go together")
     if given.get("colors") or given.get("palette"):
         given["opaque"] = True
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
@@ -395,6 +402,9 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
     if given.get("opaque"):
         preset = replace(preset, rates={**preset.rates, "opacities": 0.0})
+    if given.get("paint", "flat") != "flat":
+        # They have bytes for what colours and frames can say as well.
+        preset = replace(preset, rates={**preset.rates, "stop_opacities": 0.0, "stop_offsets": 0.0})
     if "rates" in given:
         given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
     if isinstance(given.get("density"), Mapping):
@@ -408,6 +418,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     settings = replace(preset, **given)
     if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
         raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
+    if settings.renderer == "gaussian" and settings.paint != "flat":
+        raise UsageError("renderer gaussian needs the paint flat")
     return settings
 
 

@@ -12,7 +12,15 @@ from pathlib import Path
 from typing import Any, get_args
 
 from warpsplat.errors import UsageError, printable
-from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, Subject, make_settings
+from warpsplat.fit.settings import (
+    DEFAULT_QUALITY,
+    QUALITIES,
+    Painting,
+    Renderer,
+    Settings,
+    Subject,
+    make_settings,
+)
 from warpsplat.scene import Kind
 
 _defaults = Settings()
@@ -68,6 +76,13 @@ OPTIONS = (
         "Model of coverage: the file's, or Gaussians that look like it, or the paper's soft ones.",
         _defaults.renderer,
         choices=get_args(Renderer),
+    ),
+    Option(
+        "paint",
+        str,
+        "A colour for each shape, a gradient for each, or whichever is worth its bytes.",
+        _defaults.paint,
+        choices=get_args(Painting),
     ),
     Option("layered", bool, "Groups from coarse to fine, each with those before it a picture of its own."),
     Option("levels", str, "Shapes up to the end of each of these groups, as 64,256,1024.", metavar="N,N"),
