@@ -109,3 +109,16 @@ def test_a_picture_without_shapes(device: str) -> None:
     none = made.scene.take(np.zeros(0, np.intp))
     empty = np.zeros(0, np.int32)
     assert len(refine_drawing(np.ones((64, 64, 3), np.float32), none, empty, empty, Backend.on(device))) == 0
+
+
+def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
+    """The picture counts as opaque; what shines through the seam bounds how near shapes side by side come."""
+    backend = Backend.on(device)
+    exact = seam()
+    scene = replace(exact.scene, canvas=replace(exact.scene.canvas, background=None))
+    target = render(exact.scene, backend=backend)
+    start, same = seam(spread=0.3), exact.same
+    off = replace(scene, points=start.scene.points)
+    found = refine_drawing(target, off, exact.joints, same, backend, QUICK)
+    whole = np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
+    assert psnr(found, whole, backend) > psnr(off, whole, backend) + 3

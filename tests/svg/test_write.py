@@ -293,6 +293,10 @@ def test_black_need_not_be_said() -> None:
         colors = scene.colors.copy()
         colors[1] = 0
         scene = replace(scene, colors=colors)
+        black = replace(scene, canvas=replace(scene.canvas, background=np.zeros(3, np.float32)))
+        assert '<rect width="4000" height="3600"/>' in write_svg(black)
+        read = load_scene(write_svg(black), 40, 36, "a.svg")[0].canvas.background
+        assert read is not None and not read.any()
         text = write_svg(scene)
         assert ("#000" in text) == (kind == Kind.STROKE)
         back, _ = load_scene(text, 40, 36, "a.svg")

@@ -16,7 +16,7 @@ from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.render.backend import Backend
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import Canvas, FloatArray, Scene
 
 Colors = Literal["held", "fitted"]
 
@@ -93,6 +93,7 @@ def refine_drawing(
     drawing = Drawing(opaque, joints, same)
     if not len(scene):
         return opaque
+    target = matching(target, scene.canvas)
     step = start(target, drawing, backend, how, held)
     best, least = _look(step)
     for done in range(1, how.steps + 1):
@@ -110,6 +111,13 @@ def refine_drawing(
         step.state.parameters.assign(snapped)
         best = _look(step)[0]
     return best
+
+
+def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
+    """``target`` with opacity, shape (height, width, 4), where the canvas is transparent."""
+    if canvas.background is None and target.shape[2] == 3:
+        return np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
+    return target
 
 
 def start(

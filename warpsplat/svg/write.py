@@ -66,6 +66,9 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
     )
 
 
+BLACK = "#000"
+"""Of fills, it holds where nothing is said."""
+
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
@@ -110,8 +113,7 @@ def _path(
     if kind == Kind.STROKE:
         return Path(data, (opacity, paint, _line(scene, shape, per_pixel, in_group=in_group)), rest)
     rule = ' fill-rule="evenodd"' if scene.rule[shape] == Rule.EVENODD else ""
-    # Black is what holds where nothing is said.
-    return Path(data, (opacity, "" if color == "#000" else paint, ""), rule + rest)
+    return Path(data, (opacity, "" if color == BLACK else paint, ""), rule + rest)
 
 
 def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
@@ -229,7 +231,8 @@ def write_svg(
     behind = ""
     if background and canvas.background is not None:
         fill = hex_colors(canvas.background[None])[0]
-        behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>'
+        paint = "" if fill == BLACK else f' fill="{fill}"'
+        behind = f'<rect width="{width}" height="{height}"{paint}/>'
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
     shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale))
