@@ -22,6 +22,9 @@ from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
 
+SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing", "pixel": "picture of cells"}
+"""What messages call what an image shows."""
+
 BAR_LENGTH = 1000
 """Of a progress bar: thousandths of the work."""
 
@@ -114,7 +117,12 @@ def run_file(
             stop=interrupt,
         )
     count = len(result.scene)
-    if settings.simplify and not pursued and count < settings.curves and not quiet:
+    traced = result.subject != "photo"
+    if result.why and not quiet and (traced or verbose):
+        other = "; --subject photo fits translucent shapes" if traced else ""
+        taken = f"taken for a {SUBJECTS[result.subject]}"
+        say(f"warpsplat: {input_name(source)}: {taken}: {result.why}{other}", err=True)
+    if not traced and settings.simplify and not pursued and count < settings.curves and not quiet:
         hint = f"a simple image: {count} shapes; --curves N for another number"
         say(f"warpsplat: {input_name(source)}: {hint}", err=True)
     return result

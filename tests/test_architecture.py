@@ -25,6 +25,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "files": ("errors", "native", "scene", "_version"),
     "svg": ("errors", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
+    "trace": ("alpha", "scene"),
     "render": ("errors", "native", "scene", "kernels"),
     "fit": ("alpha", "errors", "scene", "kernels", "render", "svg", "metrics"),
     "jobs": (
@@ -35,6 +36,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "kernels.constants",
         "render",
         "fit",
+        "trace",
         "files",
         "svg",
         "metrics",

@@ -18,6 +18,7 @@ from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
+Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Renderer = Literal["exact", "splat", "gaussian"]
 
 
@@ -111,6 +112,8 @@ class Density:
 class Settings:
     """All that decides the result, besides the image."""
 
+    subject: Subject = "auto"
+    """What the image shows: ``photo`` is fitted, the others are traced (``jobs.subjects``)."""
     kind: Kind = Kind.FILL
     """Of new shapes."""
     mixed: bool = False
@@ -231,7 +234,11 @@ class Settings:
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")
         self._check_levels()
+        fitted = self.fitted_options()
+        if self.subject not in {"auto", "photo"} and fitted:
+            raise UsageError(f"subject {self.subject} and {fitted[0]} do not go together")
         choices = (
+            ("subject", self.subject, get_args(Subject)),
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
         )
@@ -244,6 +251,18 @@ class Settings:
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
+
+    def fitted_options(self) -> list[str]:
+        """Options that say something of fitted shapes only, as they are given."""
+        given = {
+            "open": self.kind == Kind.STROKE,
+            "mixed": self.mixed,
+            "levels": bool(self.levels),
+            f"renderer {self.renderer}": self.renderer != "exact",
+            "target-psnr": self.target_psnr is not None,
+            "max-bytes": self.max_bytes is not None,
+        }
+        return [name for name, is_given in given.items() if is_given]
 
     def _check_levels(self) -> None:
         levels = self.levels

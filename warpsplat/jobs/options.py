@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, make_settings
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, Subject, make_settings
 from warpsplat.scene import Kind
 
 _defaults = Settings()
@@ -45,6 +45,13 @@ OPTIONS = (
         "Number of shapes; with a goal the most.",
         f"{_defaults.curves}; fewer for a simple image",
         "N",
+    ),
+    Option(
+        "subject",
+        str,
+        "What the image shows: photo is fitted by shapes, the others are traced.",
+        _defaults.subject,
+        choices=get_args(Subject),
     ),
     Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
     Option("open", bool, "Strokes.", kind=Kind.STROKE),

@@ -24,8 +24,9 @@ from warpsplat.fit.goals import pursue
 from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.settings import Renderer, Settings, solid_color
+from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.step import model_for
+from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import render
@@ -73,12 +74,18 @@ class Result:
     """Goals that were not reached, each as a sentence."""
     levels: tuple[LevelScore, ...] = ()
     """Of a layered file, of each level's picture."""
+    subject: Subject = "photo"
+    """What the image was taken for ..."""
+    why: str = ""
+    """... and why; empty where it was given."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
             **(self.score.as_dict() if self.score else figures),
+            "subject": self.subject,
+            "why": self.why,
             "renderer": self.renderer,
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
@@ -120,7 +127,7 @@ def vectorize(
     Args:
         target: the image, sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape
             (height, width, 4), it makes a file without a background.
-        settings: all that decides the result.
+        settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
         scene: curves to start from; without, new ones.
@@ -133,11 +140,14 @@ def vectorize(
     """
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
+    traced = scene is None and settings.subject not in {"auto", "photo"}
     pursued = scene is None and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
             target, settings, backend, importance=importance, seconds=seconds, report=report, stop=stop
         )
+    elif traced:
+        made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop)
     elif scene is None and settings.levels:
         made = fit_layered(target, settings, backend, importance=importance, report=report, stop=stop)
     else:
@@ -153,10 +163,10 @@ def vectorize(
             report=report,
             stop=stop,
         )
-    if not pursued and settings.renderer != "gaussian":
+    if not pursued and not traced and settings.renderer != "gaussian":
         # Soft Gaussians reach beyond the outlines that this order goes by.
         made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
-    if target.shape[2] == 4 and not made.interrupted:
+    if target.shape[2] == 4 and not traced and not made.interrupted:
         clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
     # A file that was cut short must not pass for a finished one.
@@ -336,9 +346,10 @@ def vectorize_file(
     target = load_target(source, name, settings.background)
     mask, mask_name = (read_input(importance), input_name(importance)) if importance else (None, "")
     height, width = target.shape[:2]
-    return vectorize(
+    chosen, why = decided(target, settings)
+    result = vectorize(
         target,
-        settings,
+        chosen,
         backend,
         metadata=job_key(settings, source, mask) if keyed else "",
         importance=None if mask is None else load_importance(mask, width, height, mask_name),
@@ -346,3 +357,4 @@ def vectorize_file(
         stop=stop,
         write=lambda svg: write_svg_text(output, svg),
     )
+    return replace(result, subject=chosen.subject, why=why)

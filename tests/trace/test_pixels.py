@@ -1,0 +1,79 @@
+"""Pixel art: the file shows the very image, by as few corners as its cells have."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpsplat.errors import ImageError
+from warpsplat.metrics import score_svg
+from warpsplat.scene import FloatArray
+from warpsplat.svg.write import write_svg
+from warpsplat.trace import pixels
+from warpsplat.trace.pixels import find_cells, outlines, trace_pixels
+
+
+def noise(side: int, colors: int, seed: int = 0) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    palette = rng.integers(0, 256, (colors, 3)) / 255
+    return palette[rng.integers(0, colors, (side, side))].astype(np.float32)
+
+
+def enlarged(image: FloatArray, size: int) -> FloatArray:
+    return np.kron(image, np.ones((size, size, 1), np.float32))
+
+
+@pytest.mark.parametrize("size", [1, 3, 10])
+def test_nothing_is_lost(size: int) -> None:
+    image = enlarged(noise(16, 5), size)
+    scene, per_pixel = trace_pixels(image)
+    assert find_cells(image).size == size
+    assert per_pixel == 1 / size
+    score = score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False)
+    assert score.psnr == np.inf
+    assert score.paths == 4, "and the ground"
+
+
+def test_what_is_empty_stays_empty() -> None:
+    image = np.concatenate([noise(16, 4), np.ones((16, 16, 1), np.float32)], axis=2)
+    image[np.random.default_rng(1).random((16, 16)) < 0.3] = 0
+    scene, per_pixel = trace_pixels(image)
+    assert scene.canvas.background is None
+    assert len(scene) == 4
+    assert score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False).psnr == np.inf
+
+
+def test_a_background_of_its_own_needs_no_path() -> None:
+    image = noise(8, 3)
+    scene, _ = trace_pixels(image, np.asarray(image[0, 0]))
+    assert len(scene) == 2
+    scene, _ = trace_pixels(image, np.array([0.1, 0.2, 0.3], np.float32))
+    assert len(scene) == 3
+
+
+def test_only_corners_are_kept() -> None:
+    """A ring: four corners outside, four inside, the other way round."""
+    ring = np.ones((5, 6), np.bool_)
+    ring[2, 2:4] = False
+    outer, inner = sorted(outlines(ring), key=min)
+    assert set(outer) == {(0, 0), (6, 0), (6, 5), (0, 5)}
+    assert set(inner) == {(2, 2), (4, 2), (4, 3), (2, 3)}
+    assert _area(outer) == 30
+    assert _area(inner) == -2
+
+
+def _area(points: list[tuple[int, int]]) -> float:
+    x, y = np.array(points, float).T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+
+
+def test_cells_that_touch_by_a_corner_are_apart() -> None:
+    found = outlines(np.eye(3, dtype=np.bool_))
+    assert len(found) == 3
+    assert all(len(points) == 4 for points in found)
+
+
+def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pixels, "MOST_CELLS", 100)
+    with pytest.raises(ImageError, match="16x16 cells of 2 px, more than pixel art may have"):
+        trace_pixels(enlarged(noise(16, 3), 2))

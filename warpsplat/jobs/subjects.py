@@ -1,0 +1,76 @@
+"""What an image shows decides how it is vectorized: a photograph by fitting shapes, all else by tracing."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from warpsplat.fit.constraints import Drawing
+from warpsplat.fit.drawing import Refinement
+from warpsplat.fit.loop import Fit, Progress
+from warpsplat.fit.rounding import finest
+from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.fit.tidy import finish_drawing
+from warpsplat.metrics import psnr
+from warpsplat.render.backend import Backend
+from warpsplat.render.renderer import render
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.trace.pixels import trace_pixels
+from warpsplat.trace.subject import guess_subject
+from warpsplat.trace.trace import trace
+
+Report = Callable[[Progress], None]
+Stop = Callable[[], bool]
+
+
+def decided(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
+    """``settings`` with a subject, and why it is that; the reason is empty where it was given.
+
+    What only a fit can do makes a photograph of any image: strokes, levels, a goal.
+    """
+    if settings.subject != "auto":
+        return settings, ""
+    fitted = settings.fitted_options()
+    if fitted:
+        return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
+    guess = guess_subject(target)
+    return replace(settings, subject=guess.subject), guess.why
+
+
+def draw(
+    target: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    *,
+    seconds: float | None = None,
+    report: Report | None = None,
+    stop: Stop | None = None,
+) -> Fit:
+    """Trace ``target`` as its ``settings.subject`` asks for; arguments are those of ``fit``."""
+    deadline = math.inf if seconds is None else time.monotonic() + seconds
+
+    def over() -> bool:
+        return time.monotonic() > deadline or bool(stop and stop())
+
+    if settings.subject == "pixel":
+        scene, per_pixel = trace_pixels(target, solid_color(settings.background))
+        return _made(scene, per_pixel, target, backend, interrupted=False)
+    traced = trace(target, most=None if settings.simplify else settings.curves)
+    finished = finish_drawing(
+        target,
+        Drawing(traced.scene, traced.joints, traced.same),
+        backend,
+        Refinement(),
+        finest=finest(settings),
+        stop=over,
+    )
+    scene, per_pixel = finished.drawing.scene, finished.per_pixel
+    return _made(scene, per_pixel, target, backend, interrupted=bool(stop and stop()))
+
+
+def _made(scene: Scene, per_pixel: float, target: FloatArray, backend: Backend, *, interrupted: bool) -> Fit:
+    """With the figure of the render, for want of a training's."""
+    shown = psnr(255 * render(scene, backend=backend), 255 * target)
+    return Fit(scene, per_pixel, shown, shown, 0, interrupted)

@@ -1,0 +1,139 @@
+"""Corners of a polyline of sub-pixel points, and where exactly they lie."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpsplat.trace.grids import Floats
+
+SCALES = ((4.0, 28.0), (2.2, 50.0))
+"""Lengths of outline on both sides that are compared [px], and the least turn of a corner [degrees], besides
+what the outline turns beside it: a small circle turns everywhere.
+"""
+
+ROUNDED = 1.1
+"""Length of outline on each side of a corner that its antialiasing bends [px]."""
+
+SIDE = 6.0
+"""Length of outline on each side that tells where a corner is [px]."""
+
+FAR = 4.0
+"""How far a corner may lie from the outline's points [px]: the tips of stars do."""
+
+NEAR = 1.2
+"""The same of one with short sides."""
+
+Corner = tuple[float, Floats]
+"""Where along the polyline, and the point."""
+
+
+def lengths(points: Floats, closed: bool) -> Floats:
+    """Arc length at each point and, of a closed polyline, of the whole at last."""
+    following = np.roll(points, -1, axis=0) if closed else points[1:]
+    steps = np.hypot(*(following - points[: len(following)]).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def at_length(points: Floats, along: Floats, closed: bool, where: Floats) -> Floats:
+    """Points at arc lengths; of a closed polyline modulo its length."""
+    ring = np.concatenate([points, points[:1]]) if closed else points
+    where = where % along[-1] if closed else np.clip(where, 0, along[-1])
+    return np.stack([np.interp(where, along, ring[:, axis]) for axis in (0, 1)], axis=1)
+
+
+def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corner]:
+    """Corners of a polyline, in order along it.
+
+    Args:
+        points: shape (point, 2).
+        closed: whether the last joins the first.
+        scale: factor of the lengths that are compared; larger for coarser outlines.
+    """
+    along = lengths(points, closed)
+    total = float(along[-1])
+    here = along[: len(points)]
+    strength = np.zeros(len(points))
+    for scale_px, least in SCALES:
+        reach = min(scale_px * scale, total / 6)
+        if reach < 1.2:
+            continue
+        turn = _turns(points, along, closed, here, reach)
+        beside = 0.5 * (
+            np.abs(_turns(points, along, closed, here - reach, reach))
+            + np.abs(_turns(points, along, closed, here + reach, reach))
+        )
+        excess = np.abs(turn) - beside
+        if not closed:
+            excess[(here < reach * 0.6) | (here > total - reach * 0.6)] = 0
+        strength = np.maximum(strength, excess / least)
+    return _located(points, along, closed, _peaks(strength, here, total, closed))
+
+
+def _turns(points: Floats, along: Floats, closed: bool, where: Floats, reach: float) -> Floats:
+    """Degrees that the polyline turns at arc lengths."""
+    before, middle, after = (at_length(points, along, closed, where + d) for d in (-reach, 0.0, reach))
+    a, b = middle - before, after - middle
+    cross, dot = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)
+    return np.asarray(np.degrees(np.arctan2(cross, dot)))
+
+
+def _peaks(strength: Floats, here: Floats, total: float, closed: bool) -> list[int]:
+    """The strongest points, none within 2 px of a stronger one."""
+    found: list[int] = []
+    candidates = np.flatnonzero(strength >= 1)
+    for i in candidates[np.argsort(-strength[candidates], kind="stable")].tolist():
+        gaps = np.abs(here[found] - here[i])
+        if closed:
+            gaps = np.minimum(gaps, total - gaps)
+        if not len(gaps) or gaps.min() > 2.0:
+            found.append(i)
+    return sorted(found)
+
+
+def _located(points: Floats, along: Floats, closed: bool, corners: list[int]) -> list[Corner]:
+    total = float(along[-1])
+    result = []
+    for number, i in enumerate(corners):
+        here = float(along[i])
+        before = float(along[corners[number - 1]]) if number else -np.inf
+        after = float(along[corners[number + 1]]) if number + 1 < len(corners) else np.inf
+        if closed:
+            before = before if number else float(along[corners[-1]]) - total
+            after = after if number + 1 < len(corners) else float(along[corners[0]]) + total
+        else:
+            before, after = max(before, -ROUNDED), min(after, total + ROUNDED)
+        low, high = max(here - SIDE, before + ROUNDED), min(here + SIDE, after - ROUNDED)
+        point = _meeting(
+            _side(points, along, closed, low, here - ROUNDED),
+            _side(points, along, closed, here + ROUNDED, high),
+            points[i],
+            FAR if min(here - low, high - here) > 0.6 * SIDE else NEAR,
+        )
+        result.append((here, point))
+    return result
+
+
+def _side(
+    points: Floats, along: Floats, closed: bool, low: float, high: float
+) -> tuple[Floats, Floats] | None:
+    """A point of a side and its direction; None where there is too little of it."""
+    if high - low < 1.5:
+        return None
+    part = at_length(points, along, closed, np.linspace(low, high, 9))
+    middle = part.mean(axis=0)
+    way = np.linalg.svd(part - middle)[2][0]
+    return middle, way
+
+
+def _meeting(
+    one: tuple[Floats, Floats] | None, other: tuple[Floats, Floats] | None, near: Floats, far: float
+) -> Floats:
+    """Where two sides meet; ``near`` where they do not, or farther away from it than ``far`` [px]."""
+    if one is None or other is None:
+        return near
+    matrix = np.stack([one[1], -other[1]], axis=1)
+    if abs(np.linalg.det(matrix)) < 0.2:
+        return near
+    share = np.linalg.solve(matrix, other[0] - one[0])
+    point = one[0] + share[0] * one[1]
+    return np.asarray(point if np.hypot(*(point - near)) <= far else near)

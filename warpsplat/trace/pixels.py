@@ -1,0 +1,149 @@
+"""Pixel art and QR codes: the exact outlines of the cells of each colour."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpsplat.alpha import straight
+from warpsplat.errors import ImageError
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
+from warpsplat.scene.scene import starts_of
+from warpsplat.trace.grids import Bools, Floats, Ints
+
+MOST_CELLS = 1 << 18
+"""Of pixel art: a picture with more has outlines that nobody would edit."""
+
+Point = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A picture as cells of one colour each."""
+
+    colors: Ints
+    """Number of each cell's colour, shape (row, column)."""
+    palette: Floats
+    """The image's values of each colour, shape (color, 3 or 4)."""
+    size: int
+    """Side of a cell [px]."""
+
+
+def find_cells(image: FloatArray) -> Cells:
+    """The largest cells that each have one colour.
+
+    Args:
+        image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
+
+    Raises:
+        ImageError: there are more than ``MOST_CELLS``.
+    """
+    height, width = image.shape[:2]
+    columns = np.flatnonzero((np.diff(image, axis=1) != 0).any(axis=(0, 2))) + 1
+    rows = np.flatnonzero((np.diff(image, axis=0) != 0).any(axis=(1, 2))) + 1
+    size = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
+    cells = image[::size, ::size]
+    if cells.shape[0] * cells.shape[1] > MOST_CELLS:
+        shape = f"{cells.shape[1]}x{cells.shape[0]}"
+        raise ImageError(f"{shape} cells of {size} px, more than pixel art may have ({MOST_CELLS})")
+    palette, colors = np.unique(cells.reshape(-1, image.shape[2]), axis=0, return_inverse=True)
+    return Cells(colors.reshape(cells.shape[:2]), palette, size)
+
+
+def outlines(inside: Bools) -> list[list[Point]]:
+    """Corners of the cells ``inside``, shape (row, column), in cells: closed polygons, x and y.
+
+    The inside lies on the right of each edge as it runs, so that holes run the other way. Cells that touch by
+    a corner only are outlined apart.
+    """
+    padded = np.pad(inside, 1)
+    edges: dict[Point, list[Point]] = {}
+
+    def add(mask: Bools, start: Point, end: Point) -> None:
+        for y, x in np.argwhere(mask).tolist():
+            edges.setdefault((x + start[0], y + start[1]), []).append((x + end[0], y + end[1]))
+
+    core = padded[1:-1, 1:-1]
+    add(core & ~padded[:-2, 1:-1], (0, 0), (1, 0))
+    add(core & ~padded[1:-1, 2:], (1, 0), (1, 1))
+    add(core & ~padded[2:, 1:-1], (1, 1), (0, 1))
+    add(core & ~padded[1:-1, :-2], (0, 1), (0, 0))
+    found = []
+    while edges:
+        start = next(iter(edges))
+        ring = [start, _leave(edges, start, None)]
+        while ring[-1] != start:
+            ring.append(_leave(edges, ring[-1], ring[-2]))
+        found.append(_corners(ring[:-1]))
+    return found
+
+
+def _leave(edges: dict[Point, list[Point]], at: Point, before: Point | None) -> Point:
+    """Take the edge on from ``at``; where two leave it, the one that turns right, along the same cell."""
+    ends = edges[at]
+    end = ends[0]
+    if len(ends) > 1 and before is not None:
+        dx, dy = at[0] - before[0], at[1] - before[1]
+        end = (at[0] - dy, at[1] + dx)
+    ends.remove(end)
+    if not ends:
+        del edges[at]
+    return end
+
+
+def _corners(ring: list[Point]) -> list[Point]:
+    """The points of a ring where it turns."""
+    around = zip([ring[-1], *ring[:-1]], ring, [*ring[1:], ring[0]], strict=True)
+    return [b for a, b, c in around if (b[0] - a[0], b[1] - a[1]) != (c[0] - b[0], c[1] - b[1])]
+
+
+def _lines(corners: list[Point], size: int) -> Floats:
+    """A polygon as a ring of cubics, handles at the thirds of its lines."""
+    start = np.asarray(corners, np.float64) * size
+    way = np.roll(start, -1, axis=0) - start
+    return np.stack([start, start + way / 3, start + way * 2 / 3], axis=1).reshape(-1, 2)
+
+
+def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tuple[Scene, float]:
+    """A scene that shows the very image, one shape a colour.
+
+    Args:
+        image: as in ``find_cells``.
+        background: colour of an opaque image's canvas; without, the colour with the longest outline.
+
+    Returns:
+        the scene, and units of the view box a pixel that its points lie on.
+
+    Raises:
+        ImageError: as ``find_cells``.
+    """
+    cells = find_cells(image)
+    rings = [outlines(cells.colors == i) for i in range(len(cells.palette))]
+    seen = np.ones(len(rings), np.bool_)
+    height, width = image.shape[:2]
+    if image.shape[2] == 4:
+        seen = cells.palette[:, 3] > 0
+    elif background is None:
+        ground = int(np.argmax([sum(map(len, ring)) for ring in rings]))
+        seen[ground], background = False, cells.palette[ground]
+    else:
+        seen = (cells.palette != background).any(axis=1)
+    contours = [[_lines(corners, cells.size) for corners in rings[i]] for i in np.flatnonzero(seen)]
+    palette = np.asarray(cells.palette[seen], np.float32)
+    opacities = palette[:, 3] if image.shape[2] == 4 else np.ones(len(palette), np.float32)
+    flat = list(itertools.chain.from_iterable(contours))
+    scene = Scene.of(
+        Canvas(width, height, None if image.shape[2] == 4 else np.asarray(background, np.float32)),
+        np.full(len(contours), Kind.FILL, np.int32),
+        starts_of(np.array([sum(map(len, ring)) for ring in contours], np.int32)),
+        np.full(len(contours), Basis.CUBIC, np.int32),
+        starts=starts_of(np.array([len(points) for points in flat], np.int32)),
+        closed=np.ones(len(flat), np.int32),
+        points=np.concatenate([*flat, np.empty((0, 2))]).astype(np.float32),
+        colors=straight(palette),
+        opacities=opacities,
+        rule=np.full(len(contours), Rule.EVENODD, np.int32),
+    )
+    return scene, 1 / cells.size

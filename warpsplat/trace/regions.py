@@ -1,0 +1,474 @@
+"""Image -> label map and palette: flat regions and smooth ramps, antialiasing understood."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, Sets, linked_parts
+from warpsplat.trace.mixtures import explain
+from warpsplat.trace.ramps import Ramp, fit_ramp
+from warpsplat.trace.seeds import find_seeds, noise_of
+
+MIXED = 7.0
+"""How far a pixel may be from a mixture of its neighbours' colours [levels], besides noise."""
+
+ALIKE = 1.5
+"""Flat regions whose colours are that near are of one colour [levels], besides noise."""
+
+BLURRED = 6.0
+"""What a level of noise adds to that [levels]."""
+
+SLACK = 0.2
+"""How far off a mixture may be in a noisy picture, for the difference of its colours."""
+
+CALM = 12.0
+"""Steps that are smoothed in a noisy picture [levels], besides noise."""
+
+CLEAR = 2.5
+"""Opacity below which a region is not painted [levels]."""
+
+NARROW = 30
+"""Pixels of the smallest region that cannot be a coincidence of antialiasing."""
+
+WIDE = 400
+"""Pixels of the smallest ramp in a noisy picture."""
+
+FAINT = 24.0
+"""How far a small part must be from all mixtures to be a region of its own [levels]."""
+
+THIN = 0.35
+"""Share of a thin line in a pixel from which on it is the line's."""
+
+SPECK = 8
+"""Pixels of a part that may be where several regions meet."""
+
+BESIDE = 5
+"""How far from a thin part the colours are looked for that it may be mixed of [px]."""
+
+SMALL = 60
+"""Pixels of the largest region that may be given up."""
+
+UNSEEN = 120.0
+"""How far all the pixels of a region may be from mixtures of what is around it, taken together, for that
+[levels].
+"""
+
+MOST_THIN = 4000
+"""Thin parts that are looked at; a picture with more is no drawing."""
+
+RAMP = 1.6
+"""Residual of a flat colour from which on a ramp is tried [levels], besides noise."""
+
+GAIN = 0.6
+"""What a ramp must leave of a flat colour's residual to be worth it."""
+
+
+@dataclass(frozen=True)
+class Coloring:
+    """What a region is painted with: premultiplied, 0..255."""
+
+    color: Floats
+    """Mean, shape (4,)."""
+    ramp: Ramp | None = None
+
+    @property
+    def clear(self) -> bool:
+        """Whether nothing is painted."""
+        return float(self.color[3]) < CLEAR
+
+
+@dataclass(frozen=True)
+class Regions:
+    """A picture cut up: each region is connected."""
+
+    labels: Ints
+    """The region of each pixel, shape (height, width)."""
+    pure: Floats
+    """What the pixel would be if its region filled it, shape (height, width, 4)."""
+    paint: Ints
+    """The colouring of each region, shape (region,)."""
+    colorings: list[Coloring]
+    noise: float
+    """How much flat regions vary [levels]."""
+
+
+def find_regions(image: Floats) -> Regions:
+    """Cut a picture up into regions.
+
+    Args:
+        image: premultiplied sRGB with opacity, 0..255, shape (height, width, 4).
+    """
+    noise = noise_of(image)
+    if noise < 0.5:
+        noise = 0.0
+    calm = image if noise == 0 else _calmed(image, noise)
+    noise = min(noise, 12.0)
+    count, labels = find_seeds(calm, min(noise, 3.0))
+    pure = calm.astype(np.float32).copy()
+    labels = _without_coincidences(calm, labels, pure, count, noise)
+    labels, paint, colorings = _palette(calm, labels, noise)
+    _flatten(pure, labels, paint, colorings)
+    labels, paint, colorings = _thin_parts(calm, labels, pure, paint, colorings, noise)
+    seeds = labels != NOBODY
+    _assign(calm, labels, pure)
+    painted = paint[_fill(labels, pure)]
+    _adopt(calm, painted, pure, seeds)
+    _prune(calm, painted, pure, noise)
+    regions = components(painted, image)
+    return Regions(regions, pure, _paint_of(regions, painted), colorings, noise)
+
+
+def _slack(noise: float) -> float:
+    """Share of their contrast by which mixtures may be off."""
+    return SLACK if noise else 0.0
+
+
+def _calmed(image: Floats, noise: float) -> Floats:
+    """Without what JPEG leaves beside edges."""
+    calm = np.ascontiguousarray(image, np.float32)
+    for _ in range(3):
+        for channels in (slice(0, 3), slice(3, 4)):
+            part = np.ascontiguousarray(calm[..., channels])
+            calm[..., channels] = cv2.bilateralFilter(part, 7, CALM + 6 * noise, 2.5).reshape(part.shape)
+    return calm
+
+
+def _without_coincidences(image: Floats, labels: Ints, pure: Floats, count: int, noise: float) -> Ints:
+    """Small and thin parts that are mixtures of the large ones are no seeds."""
+    if count == 0:
+        return labels
+    sizes = np.bincount(labels[labels >= 0], minlength=count)
+    wide = np.zeros(count, np.bool_)
+    wide[np.unique(labels[_inner(labels)])] = True
+    small = ~wide | (sizes < NARROW)
+    small[sizes == sizes.max()] = False
+    doubtful = (labels >= 0) & small[labels]
+    rows, columns = np.nonzero(doubtful)
+    if not len(rows):
+        return labels
+    large = np.where(doubtful, NOBODY, labels).astype(np.int32)
+    result = explain(image, large, pure, rows, columns, _slack(noise))
+    mixed = (result.residual <= MIXED + noise) & (result.share < 0.99)
+    owners = labels[rows, columns]
+    explained = np.bincount(owners, mixed, count)
+    drop = small & (explained >= 0.7 * sizes)
+    return np.where(doubtful & drop[labels], NOBODY, labels).astype(np.int32)
+
+
+def _inner(labels: Ints) -> Bools:
+    """Pixels all of whose neighbours are of the same part."""
+    same = labels >= 0
+    padded = np.pad(labels, 1, mode="edge")
+    height, width = labels.shape
+    for dy in range(3):
+        for dx in range(3):
+            same &= padded[dy : dy + height, dx : dx + width] == labels
+    return np.asarray(same)
+
+
+def _modes(image: Floats, labels: Ints, count: int) -> Floats:
+    """The most frequent colour of each part, shape (count, channel)."""
+    inside = labels >= 0
+    levels = np.round(image[inside]).astype(np.int64)
+    packed = labels[inside].astype(np.int64)
+    for channel in range(levels.shape[1]):
+        packed = packed * 256 + levels[:, channel]
+    keys, times = np.unique(packed, return_counts=True)
+    owner = keys >> 8 * levels.shape[1]
+    order = np.lexsort((times, owner))
+    last = order[np.flatnonzero(np.diff(np.append(owner[order], count)) != 0)]
+    shifts = 8 * np.arange(levels.shape[1])[::-1]
+    colors = np.zeros((count, levels.shape[1]))
+    colors[owner[last]] = (keys[last][:, None] >> shifts) & 255
+    return colors
+
+
+def _sums(values: Floats, labels: Ints, count: int) -> Floats:
+    inside = labels >= 0
+    return np.stack(
+        [
+            np.bincount(labels[inside], values[inside][:, c], count).astype(np.float64)
+            for c in range(values.shape[2])
+        ],
+        axis=1,
+    )
+
+
+def _palette(image: Floats, labels: Ints, noise: float) -> tuple[Ints, Ints, list[Coloring]]:
+    """Colours of the parts: labels, the colouring of each part, the colourings."""
+    count = int(labels.max()) + 1
+    if count <= 0:
+        count, labels = 1, np.zeros(labels.shape, np.int32)
+    sizes = np.maximum(np.bincount(labels[labels >= 0], minlength=count), 1)
+    means = _sums(image, labels, count) / sizes[:, None]
+    modes = _modes(image, labels, count)
+    inside = labels >= 0
+    off = np.zeros(labels.shape, np.float32)
+    off[inside] = np.abs(image[inside] - modes[labels[inside]]).max(axis=1)
+    square = np.bincount(labels[inside], off[inside].astype(np.float64) ** 2, count) / sizes
+    uneven = np.sqrt(square) > RAMP + 3 * noise
+    flat_colors = modes if noise == 0 else means
+    paint = np.full(count, NOBODY, np.int32)
+    colorings: list[Coloring] = []
+    for part in np.flatnonzero(uneven & (sizes >= (NARROW if noise == 0 else WIDE))).tolist():
+        ramp = _ramp_of(image, labels, part, float(np.sqrt(square[part])), noise)
+        if ramp is not None:
+            paint[part] = len(colorings)
+            colorings.append(Coloring(means[part], ramp))
+    _join_flats(paint, colorings, flat_colors, sizes, noise)
+    return labels, paint, colorings
+
+
+def _ramp_of(image: Floats, labels: Ints, part: int, flat: float, noise: float) -> Ramp | None:
+    rows, columns = _box(labels, part)
+    mask = labels[rows, columns] == part
+    ramp = fit_ramp(image[rows, columns], mask, columns.start, rows.start)
+    return ramp if ramp is not None and ramp.residual < GAIN * flat else None
+
+
+def _box(labels: Ints, part: int) -> tuple[slice, slice]:
+    where = labels == part
+    rows, columns = np.flatnonzero(where.any(axis=1)), np.flatnonzero(where.any(axis=0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def _join_flats(paint: Ints, colorings: list[Coloring], colors: Floats, sizes: Ints, noise: float) -> None:
+    """Give parts of nearly one colour one colouring, that of the largest."""
+    first = len(colorings)
+    known = np.zeros((0, colors.shape[1]))
+    alike = ALIKE + min(BLURRED * noise, 24.0)
+    for part in np.argsort(-sizes, kind="stable").tolist():
+        if paint[part] != NOBODY:
+            continue
+        color = colors[part]
+        if color[3] < CLEAR:
+            color = np.zeros_like(color)
+        elif color[3] > 255 - CLEAR:
+            color = np.append(color[:3], 255.0)
+        off = np.abs(known - color).max(axis=1) if len(known) else np.array([np.inf])
+        near = int(off.argmin())
+        if off[near] > alike:
+            near = len(known)
+            known = np.concatenate([known, color[None]])
+            colorings.append(Coloring(np.round(color)))
+        paint[part] = first + near
+
+
+def _flatten(pure: Floats, labels: Ints, paint: Ints, colorings: list[Coloring]) -> None:
+    """Flat parts get their colour all over."""
+    flat = np.array([coloring.ramp is None for coloring in colorings])
+    colors = np.array([coloring.color for coloring in colorings])
+    inside = (labels >= 0) & flat[paint[labels]]
+    pure[inside] = colors[paint[labels[inside]]]
+
+
+def _assign(image: Floats, labels: Ints, pure: Floats) -> None:
+    """Give the pixels between the seeds to the regions that have most of them."""
+    rows, columns = np.nonzero(labels == NOBODY)
+    result = explain(image, labels, pure, rows, columns)
+    known = result.label != NOBODY
+    labels[rows[known], columns[known]] = result.label[known]
+    pure[rows[known], columns[known]] = result.color[known]
+
+
+def _adopt(image: Floats, painted: Ints, pure: Floats, seeds: Bools) -> None:
+    """Parts without a sure pixel are chance: each of their pixels goes to the neighbour nearest in colour."""
+    regions = components(painted, image)
+    sure = np.zeros(int(regions.max()) + 1, np.bool_)
+    sure[regions[seeds]] = True
+    orphan = ~sure[regions]
+    height, width = painted.shape
+    for _ in range(4):
+        rows, columns = np.nonzero(orphan)
+        best = np.full(len(rows), np.inf)
+        source = rows * width + columns
+        for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+            y, x = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
+            off = np.abs(image[rows, columns] - pure[y, x]).max(axis=1)
+            better = ~orphan[y, x] & (off < best)
+            best[better], source[better] = off[better], (y * width + x)[better]
+        found = np.isfinite(best)
+        painted[rows, columns] = painted.reshape(-1)[source]
+        pure[rows, columns] = pure.reshape(-1, pure.shape[2])[source]
+        orphan[rows[found], columns[found]] = False
+
+
+def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
+    """Give up small regions that are seen as little more than mixtures of what is around them."""
+    regions = components(painted, image)
+    small = np.bincount(regions.reshape(-1)) <= SMALL
+    doubtful = small[regions]
+    rows, columns = np.nonzero(doubtful)
+    if not len(rows) or doubtful.all():
+        return
+    large = np.where(doubtful, NOBODY, painted).astype(np.int32)
+    result = explain(image, large, pure, rows, columns, _slack(noise))
+    seen = np.maximum(result.residual - (MIXED + noise), 0)
+    energy = np.bincount(regions[rows, columns], seen, len(small))
+    gone = energy[regions[rows, columns]] <= UNSEEN
+    rows, columns = rows[gone], columns[gone]
+    painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
+
+
+def _thin_parts(
+    image: Floats, labels: Ints, pure: Floats, paint: Ints, colorings: list[Coloring], noise: float
+) -> tuple[Ints, Ints, list[Coloring]]:
+    """Seeds in lines and dots that are too thin to have any: pixels that no mixture explains."""
+    rows, columns = np.nonzero(labels == NOBODY)
+    result = explain(image, labels, pure, rows, columns, _slack(noise))
+    limit = MIXED + noise
+    strange = np.zeros(labels.shape, np.float32)
+    strange[rows, columns] = np.where(np.isfinite(result.residual), result.residual, 256)
+    bases = np.zeros_like(pure)
+    bases[rows, columns] = result.base
+    odd = strange > limit
+    count, parts = cv2.connectedComponents(odd.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    if count <= 1:
+        return labels, paint, colorings
+    rows, columns = np.nonzero(odd)
+    owner = parts[rows, columns] - 1
+    order = np.argsort(owner, kind="stable")
+    bounds = np.searchsorted(owner[order], np.arange(count))
+    sizes = np.diff(bounds)
+    labels, paint_list = labels.copy(), paint.tolist()
+    colorings = list(colorings)
+    by_size = np.argsort(-sizes, kind="stable")[:MOST_THIN]
+    for part in by_size.tolist():
+        index = order[bounds[part] : bounds[part + 1]]
+        y, x = rows[index], columns[index]
+        near = _near(labels, paint, y, x, colorings)
+        if len(y) <= SPECK and _is_mixed(image[y, x], [colorings[i].color for i in near], limit):
+            continue
+        if len(y) <= SPECK and strange[y, x].max() < FAINT:
+            continue
+        chosen = _thin_color(image[y, x], strange[y, x], bases[y, x], colorings, near, limit)
+        if chosen == NOBODY:
+            continue
+        if chosen == len(colorings):
+            colorings.append(Coloring(_extreme(image[y, x], strange[y, x])))
+        color = colorings[chosen].color
+        toward = color - bases[y, x]
+        share = ((image[y, x] - bases[y, x]) * toward).sum(axis=1) / np.maximum((toward**2).sum(axis=1), 1)
+        mine = share >= min(THIN, 0.8 * float(share.max()))
+        labels[y[mine], x[mine]] = len(paint_list)
+        pure[y[mine], x[mine]] = color
+        paint_list.append(chosen)
+    return labels, np.asarray(paint_list, np.int32), colorings
+
+
+def _extreme(pixels: Floats, strange: Floats) -> Floats:
+    """The colour of a thin part: that of its pixels that are least mixed."""
+    top = strange >= np.quantile(strange, 0.75)
+    return np.round(np.median(pixels[top], axis=0))
+
+
+def _near(labels: Ints, paint: Ints, y: Ints, x: Ints, colorings: list[Coloring]) -> list[int]:
+    """Flat colourings that occur beside some pixels."""
+    rows = slice(max(int(y.min()) - BESIDE, 0), int(y.max()) + BESIDE + 1)
+    columns = slice(max(int(x.min()) - BESIDE, 0), int(x.max()) + BESIDE + 1)
+    seen = labels[rows, columns]
+    seen = seen[(seen != NOBODY) & (seen < len(paint))]
+    return [i for i in np.unique(paint[seen]).tolist() if colorings[i].ramp is None]
+
+
+def _is_mixed(pixels: Floats, colors: list[Floats], limit: float) -> bool:
+    """Whether all pixels are mixtures of some three of the colours, and mostly of one of them."""
+    done = np.zeros(len(pixels), np.bool_)
+    for a, b, c in itertools.combinations(colors[:8], 3):
+        sides = np.stack([b - a, c - a], axis=1)
+        shares = (pixels - a) @ np.linalg.pinv(sides).T
+        off = np.abs(pixels - a - shares @ sides.T).max(axis=1)
+        inside = (shares > -0.05).all(axis=1) & (shares.sum(axis=1) < 1.05)
+        done |= (off <= limit) & inside
+    return bool(done.all())
+
+
+def _thin_color(
+    pixels: Floats,
+    strange: Floats,
+    bases: Floats,
+    colorings: list[Coloring],
+    near: list[int],
+    limit: float,
+) -> int:
+    """Which colouring a thin part has; one more than there are for a new one, NOBODY for none.
+
+    A colour of the palette, if all its pixels lie between what is beside them and that colour. A faint
+    mixture with a colour that is beside them is that colour's tip, too small to show.
+    """
+    flat = [i for i, coloring in enumerate(colorings) if coloring.ramp is None]
+    if not flat:
+        return len(colorings)
+    colors = np.array([colorings[i].color for i in flat])
+    top = strange >= np.quantile(strange, 0.5)
+    pixel, base = pixels[top][:, None], bases[top][:, None]
+    toward = colors[None] - base
+    square = (toward**2).sum(axis=2)
+    share = ((pixel - base) * toward).sum(axis=2) / np.maximum(square, 1)
+    off = np.abs(pixel - base - np.clip(share, 0, 1)[..., None] * toward).max(axis=2)
+    fits = np.quantile(off, 0.8, axis=0) <= limit
+    clear = fits & (share.max(axis=0) >= 0.4)
+    if clear.any():
+        return flat[int(np.where(clear, share.max(axis=0), -np.inf).argmax())]
+    return NOBODY if any(fits[flat.index(i)] for i in near) else len(colorings)
+
+
+def _fill(labels: Ints, pure: Floats) -> Ints:
+    """Pixels that are far from all seeds get the nearest one's region."""
+    empty = labels == NOBODY
+    if not empty.any():
+        return labels
+    _, nearest = cv2.distanceTransformWithLabels(
+        empty.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    rows, columns = np.nonzero(~empty)
+    source = np.zeros(int(nearest.max()) + 1, np.int64)
+    source[nearest[rows, columns]] = rows * labels.shape[1] + columns
+    take = source[nearest[empty]]
+    filled = labels.copy()
+    filled[empty] = labels.reshape(-1)[take]
+    pure[empty] = pure.reshape(-1, pure.shape[2])[take]
+    return filled
+
+
+def _paint_of(regions: Ints, painted: Ints) -> Ints:
+    paint = np.zeros(int(regions.max()) + 1, np.int32)
+    paint[regions.reshape(-1)] = painted.reshape(-1)
+    return paint
+
+
+def components(painted: Ints, image: Floats) -> Ints:
+    """Connected parts of one colouring; where two cross on a diagonal, the one that the picture shows more
+    of there goes on.
+    """
+    inside = np.ones(painted.shape, np.bool_)
+    count, parts = linked_parts(painted[:, 1:] == painted[:, :-1], painted[1:] == painted[:-1], inside)
+    sets = Sets(count)
+    rows, columns = np.nonzero(crossings(painted))
+    wins = main_diagonal(image, rows, columns)
+    for y, x, main in zip(rows.tolist(), columns.tolist(), wins.tolist(), strict=True):
+        if main:
+            sets.join(int(parts[y, x]), int(parts[y + 1, x + 1]))
+        else:
+            sets.join(int(parts[y, x + 1]), int(parts[y + 1, x]))
+    return sets.numbers()[parts]
+
+
+def crossings(labels: Ints) -> Bools:
+    """Corners of four pixels where two labels meet as on a chess board, shape (height - 1, width - 1)."""
+    a, b, c, d = labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]
+    return np.asarray((a == d) & (b == c) & (a != b))
+
+
+def main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
+    """Whether upper left and lower right are the connected ones: they differ less from the four's mean."""
+    a, b = image[rows, columns], image[rows, columns + 1]
+    c, d = image[rows + 1, columns], image[rows + 1, columns + 1]
+    mean = (a + b + c + d) / 4
+    main = np.maximum(np.abs(a - mean).max(axis=1), np.abs(d - mean).max(axis=1))
+    other = np.maximum(np.abs(b - mean).max(axis=1), np.abs(c - mean).max(axis=1))
+    return np.asarray(main <= other)

@@ -1,0 +1,191 @@
+"""What a picture shows, from its statistics: which way of vectorizing suits it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from warpsplat.scene import FloatArray
+from warpsplat.trace.grids import Bools, Floats, Ints
+
+Subject = Literal["photo", "drawing", "line", "pixel"]
+
+LARGEST = 1024
+"""Longer side of what is looked at [px]; of a larger picture the middle."""
+
+STEP = 24
+"""Step between neighbours from which on there is an edge [levels]."""
+
+EVEN = 0.7
+"""Share of even pixels, paper and edges aside, from which on a picture is drawn."""
+
+FEW = 0.945
+"""Share of pixels in FEW_COLORS colours from which on one with noise is."""
+
+FEW_COLORS = 10
+SAMPLES = 60_000
+"""Pixels that colours are counted in."""
+
+NEAR = 6
+"""How far a pixel may be from such a colour [levels]."""
+
+RESTLESS = 0.25
+"""Share of pixels on strong edges from which on a picture is dithered."""
+
+PAPER = 0.7
+"""Least share of paper in a line drawing."""
+
+THIN = 0.006
+"""Half the width of a line over the longer side of the picture, at most, if it is more than LINE."""
+
+LINE = 2.5
+"""Half the width of a line in a small picture [px]."""
+
+CELLS = (8, 256)
+"""Fewest and most cells on a side of pixel art."""
+
+SMALL = 128
+"""Longer side of a picture whose pixels may each be a cell [px]."""
+
+PIXEL_COLORS = 64
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What a picture shows."""
+
+    subject: Subject
+    why: str
+    """Half a sentence."""
+
+
+def guess_subject(image: FloatArray) -> Guess:
+    """Tell photographs, drawings, line art and pixel art apart.
+
+    Args:
+        image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
+    """
+    levels = np.round(np.asarray(image) * 255).astype(np.int16)
+    part = _middle(levels)
+    colors, counts = _colors(part)
+    cell = _cell(levels, counts)
+    if cell is not None:
+        return Guess("pixel", f"{len(counts)} colours in cells of {cell}x{cell} px")
+    step = _step(part)
+    edges = step > STEP
+    if (step > 2 * STEP).mean() > RESTLESS:
+        return Guess("photo", f"{(step > 2 * STEP).mean():.0%} of the pixels are edges")
+    if _is_line_art(part):
+        return Guess("line", "thin ink on paper")
+    paper = (part == colors[counts.argmax()]).all(axis=2)
+    evenness = _evenness(part, step, paper, edges)
+    if evenness >= EVEN:
+        return Guess("drawing", f"{evenness:.0%} of what is no edge is even")
+    few = _few_colors(part, edges)
+    if few >= FEW:
+        return Guess("drawing", f"{few:.0%} of what is no edge has one of {FEW_COLORS} colours")
+    return Guess("photo", f"{evenness:.0%} of what is no edge is even")
+
+
+def _colors(levels: Ints) -> tuple[Ints, Ints]:
+    """The colours of a picture and how many pixels have each."""
+    packed = np.zeros(levels.shape[:2], np.int64)
+    for channel in range(levels.shape[2]):
+        packed = packed * 256 + levels[..., channel]
+    keys, counts = np.unique(packed.reshape(-1), return_counts=True)
+    shifts = 8 * np.arange(levels.shape[2])[::-1]
+    return (keys[:, None] >> shifts) & 255, counts
+
+
+def _middle(levels: Ints) -> Ints:
+    height, width = levels.shape[:2]
+    top, left = max(0, height - LARGEST) // 2, max(0, width - LARGEST) // 2
+    return levels[top : top + LARGEST, left : left + LARGEST]
+
+
+def _step(levels: Ints) -> Ints:
+    """Largest step to any of the four neighbours, over the channels, shape (height, width)."""
+    right = np.abs(np.diff(levels, axis=1)).max(axis=2)
+    below = np.abs(np.diff(levels, axis=0)).max(axis=2)
+    step = np.zeros(levels.shape[:2], np.int16)
+    step[:, 1:], step[:, :-1] = right, np.maximum(step[:, :-1], right)
+    step[:, 1:] = np.maximum(step[:, 1:], right)
+    step[1:] = np.maximum(step[1:], below)
+    step[:-1] = np.maximum(step[:-1], below)
+    return step
+
+
+def _cell(levels: Ints, counts: Ints) -> int | None:
+    """Side of the cells that pixel art is made of [px]; None for other pictures."""
+    height, width = levels.shape[:2]
+    if len(counts) > PIXEL_COLORS or len(counts) < 2:
+        return None
+    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
+    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
+    cell = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
+    across, down = width // cell, height // cell
+    if cell > 1:
+        return cell if CELLS[0] <= min(across, down) and max(across, down) <= CELLS[1] else None
+    # Antialiasing makes many colours of few pixels each.
+    frequent = counts[counts >= max(3, 0.002 * width * height)].sum()
+    return 1 if max(width, height) <= SMALL and frequent >= 0.97 * width * height else None
+
+
+def _is_line_art(levels: Ints) -> bool:
+    """Whether there is little but thin dark lines on light paper."""
+    flat = levels[..., :3].astype(np.int32)
+    if levels.shape[2] == 4:
+        flat = flat + 255 - levels[..., 3:].astype(np.int32)
+    grey = flat.min(axis=2).astype(np.uint8)
+    histogram = np.bincount(grey.reshape(-1), minlength=256)
+    paper = int(np.convolve(histogram, np.ones(9), "same").argmax())
+    darkest = float(np.percentile(grey, 0.2))
+    if paper < 160 or paper - darkest < 80:
+        return False
+    ink = grey < 0.5 * (paper + darkest)
+    blank = np.abs(grey.astype(np.int32) - paper) <= 24
+    if blank.mean() < PAPER or ink.mean() < 0.002:
+        return False
+    beside = cv2.dilate(ink.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    if (~blank & ~beside).mean() > max(0.005, 0.1 * ink.mean()):
+        return False
+    depth = cv2.distanceTransform(np.pad(ink, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    widest = max(LINE, THIN * max(grey.shape))
+    return bool(np.quantile(depth[ink], 0.97) <= widest)
+
+
+def _evenness(levels: Ints, step: Ints, paper: Bools, edges: Bools) -> float:
+    """Share of flat or evenly changing pixels among those that are neither paper nor beside an edge."""
+    bend = np.zeros(levels.shape[:2], np.int16)
+    bend[:, 1:-1] = np.abs(np.diff(levels, n=2, axis=1)).max(axis=2)
+    bend[1:-1] = np.maximum(bend[1:-1], np.abs(np.diff(levels, n=2, axis=0)).max(axis=2))
+    rest = ~paper & (cv2.dilate(edges.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
+    if rest.sum() < 0.002 * rest.size:
+        return 1.0  # paper and edges only
+    return float(max((step[rest] <= 1).mean(), (bend[rest] <= 1).mean()))
+
+
+def _few_colors(levels: Ints, edges: Bools) -> float:
+    """Share of the pixels that lie near one of few colours, edges aside: what JPEG leaves of a drawing."""
+    calm = cv2.medianBlur(np.ascontiguousarray(levels.astype(np.uint8)), 5)
+    rest: Floats = calm[~edges].astype(np.float32)
+    rest = rest[:: max(1, len(rest) // SAMPLES)]
+    if not len(rest):
+        return 0.0
+    total, covered = len(rest), 0
+    for _ in range(FEW_COLORS):
+        if not len(rest):
+            break
+        coarse = (rest // 8).astype(np.int64)
+        key = np.zeros(len(rest), np.int64)
+        for channel in range(rest.shape[1]):
+            key = key * 32 + coarse[:, channel]
+        _, which, counts = np.unique(key, return_inverse=True, return_counts=True)
+        center = np.median(rest[which == counts.argmax()], axis=0)
+        near = np.abs(rest - center).max(axis=1) <= NEAR
+        covered += int(near.sum())
+        rest = rest[~near]
+    return covered / total
