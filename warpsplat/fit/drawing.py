@@ -134,6 +134,7 @@ def start(
     state.keeper = keeper
     every = np.ones(len(drawing.scene), np.bool_)
     state.parameters.hold("opacities", every)
+    state.parameters.hold("stop_opacities", np.ones(len(drawing.scene.stop_opacities), np.bool_))
     if how.colors == "held":
         state.parameters.hold("colors", every)
     height, width = target.shape[:2]
