@@ -172,6 +172,8 @@ class Settings:
     colour, ``#rrggbb``, that shows through as well."""
     title: str = ""
     """Of the picture, in the file; empty: none."""
+    ids: bool = False
+    """Whether paths have identifiers, by their colours, in the file."""
     minify: bool = False
     """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None
@@ -237,7 +239,7 @@ class Settings:
                 raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
         if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
             raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
-        switches = ("through_scales", "viewer", "mixed", "minify", "opaque")
+        switches = ("through_scales", "viewer", "mixed", "ids", "minify", "opaque")
         for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")

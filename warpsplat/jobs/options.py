@@ -102,6 +102,7 @@ OPTIONS = (
         "COLOR",
     ),
     Option("title", str, "Title of the picture, in the file.", metavar="TEXT"),
+    Option("ids", bool, "Name paths by their colours, for editors."),
     Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from warpsplat.fit.constraints import Drawing
-from warpsplat.fit.drawing import Refinement
+from warpsplat.fit.drawing import Refinement, matching
 from warpsplat.fit.loop import Fit, Progress
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.rounding import finest
@@ -81,5 +81,5 @@ def limited(scene: Scene, settings: Settings) -> Scene:
 
 def _made(scene: Scene, per_pixel: float, target: FloatArray, backend: Backend, *, interrupted: bool) -> Fit:
     """With the figure of the render, for want of a training's."""
-    shown = psnr(255 * render(scene, backend=backend), 255 * target)
+    shown = psnr(255 * render(scene, backend=backend), 255 * matching(target, scene.canvas))
     return Fit(scene, per_pixel, shown, shown, 0, interrupted)
