@@ -68,7 +68,8 @@ def refine_drawing(
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Scene:
-    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes are opaque and stay.
+    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes and their opacities
+    stay.
 
     Args:
         target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height, width,
@@ -89,10 +90,9 @@ def refine_drawing(
         ValueError: ``joints`` or ``same`` do not fit the scene, or its shapes are no fills of cubics.
     """
     how = how or Refinement()
-    opaque = replace(scene, opacities=np.ones_like(scene.opacities))
-    drawing = Drawing(opaque, joints, same)
+    drawing = Drawing(scene, joints, same)
     if not len(scene):
-        return opaque
+        return scene
     target = matching(target, scene.canvas)
     step = start(target, drawing, backend, how, held)
     best, least = _look(step)

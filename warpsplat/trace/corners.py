@@ -23,6 +23,9 @@ FAR = 4.0
 NEAR = 1.2
 """The same of one with short sides."""
 
+BLUNT, SHARP = 3.5, 3.0
+"""Length of outline between two corners that may be one [px], and how far that one may be from its middle."""
+
 Corner = tuple[float, Floats]
 """Where along the polyline, and the point."""
 
@@ -58,15 +61,17 @@ def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corne
         if reach < 1.2:
             continue
         turn = _turns(points, along, closed, here, reach)
-        beside = 0.5 * (
-            np.abs(_turns(points, along, closed, here - reach, reach))
-            + np.abs(_turns(points, along, closed, here + reach, reach))
+        way = np.sign(turn)
+        # The other way, the next corner of a stair turns.
+        beside = sum(
+            np.maximum(way * _turns(points, along, closed, here + off, reach), 0) for off in (-reach, reach)
         )
-        excess = np.abs(turn) - beside
+        excess = np.abs(turn) - 0.5 * beside
         if not closed:
             excess[(here < reach * 0.6) | (here > total - reach * 0.6)] = 0
         strength = np.maximum(strength, excess / least)
-    return _located(points, along, closed, _peaks(strength, here, total, closed))
+    corners = _located(points, along, closed, _peaks(strength, here, total, closed))
+    return _blunted(points, along, closed, corners)
 
 
 def _turns(points: Floats, along: Floats, closed: bool, where: Floats, reach: float) -> Floats:
@@ -88,6 +93,29 @@ def _peaks(strength: Floats, here: Floats, total: float, closed: bool) -> list[i
         if not len(gaps) or gaps.min() > 2.0:
             found.append(i)
     return sorted(found)
+
+
+def _blunted(points: Floats, along: Floats, closed: bool, corners: list[Corner]) -> list[Corner]:
+    """Two corners that antialiasing made of one sharp one are one again: their outer sides meet near them."""
+    total = float(along[-1])
+    result = list(corners)
+    number = 0
+    while number < len(result) - (not closed) and len(result) > 2:
+        after = (number + 1) % len(result)
+        low, high = result[number][0], result[after][0] + (total if after < number + 1 else 0.0)
+        if high - low < BLUNT:
+            before, beyond = low - SIDE, high + SIDE
+            if not closed:
+                before, beyond = max(before, 0.0), min(beyond, total)
+            middle = at_length(points, along, closed, np.array([(low + high) / 2]))[0]
+            one = _side(points, along, closed, before, low - 0.5)
+            point = _meeting(one, _side(points, along, closed, high + 0.5, beyond), middle, SHARP)
+            if point is not middle:
+                result[number] = ((low + high) / 2 % total if closed else (low + high) / 2, point)
+                del result[after]
+                continue
+        number += 1
+    return sorted(result, key=lambda corner: corner[0])
 
 
 def _located(points: Floats, along: Floats, closed: bool, corners: list[int]) -> list[Corner]:

@@ -15,10 +15,10 @@ from warpsplat.trace.grids import Bools, Floats, Ints
 SAMPLES = 16
 """Points that a candidate is measured at."""
 
-KNOTS = 36
+KNOTS = 48
 """The most places of a span where one curve may end and the next begin."""
 
-SPACING = 2.5
+SPACING = 1.5
 """Least distance of two of these [px]."""
 
 WINDOW = 4.0

@@ -41,7 +41,13 @@ class Explained:
 
 
 def explain(
-    image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints, slack: float = 0.0
+    image: Floats,
+    labels: Ints,
+    pure: Floats,
+    rows: Ints,
+    columns: Ints,
+    slack: float = 0.0,
+    reach: int = REACH,
 ) -> Explained:
     """Find for each pixel the two neighbouring regions that it is nearest to a mixture of.
 
@@ -53,9 +59,10 @@ def explain(
         columns: shape (pixel,).
         slack: how far a mixture may be off for the difference of its two colours: JPEG blurs hues more than
             lightness.
+        reach: how far neighbours are looked for [px].
     """
     parts = [
-        _explain(image, labels, pure, rows[i : i + CHUNK], columns[i : i + CHUNK], slack)
+        _explain(image, labels, pure, rows[i : i + CHUNK], columns[i : i + CHUNK], slack, reach)
         for i in range(0, max(len(rows), 1), CHUNK)
     ]
     return Explained(
@@ -63,7 +70,7 @@ def explain(
     )
 
 
-def _neighbours(labels: Ints, rows: Ints, columns: Ints) -> tuple[Ints, Ints, Floats]:
+def _neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Ints, Ints, Floats]:
     """The nearest sure pixel each way: its region, its index, its distance; shape (way, pixel)."""
     height, width = labels.shape
     found = np.full((len(WAYS), len(rows)), NOBODY, np.int32)
@@ -71,7 +78,7 @@ def _neighbours(labels: Ints, rows: Ints, columns: Ints) -> tuple[Ints, Ints, Fl
     distance = np.full((len(WAYS), len(rows)), np.inf, np.float32)
     for way, (down, right) in enumerate(WAYS):
         length = np.hypot(down, right)
-        for reach in range(1, REACH + 1):
+        for reach in range(1, most + 1):
             y, x = rows + reach * down, columns + reach * right
             near = (y >= 0) & (y < height) & (x >= 0) & (x < width) & (found[way] == NOBODY)
             y, x = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
@@ -82,8 +89,10 @@ def _neighbours(labels: Ints, rows: Ints, columns: Ints) -> tuple[Ints, Ints, Fl
     return found, index, distance
 
 
-def _explain(image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints, slack: float) -> Explained:
-    found, index, distance = _neighbours(labels, rows, columns)
+def _explain(
+    image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints, slack: float, reach: int
+) -> Explained:
+    found, index, distance = _neighbours(labels, rows, columns, reach)
     colors = pure.reshape(-1, pure.shape[2])[index]
     pixel = image[rows, columns]
     count, each = np.arange(len(rows)), len(WAYS)

@@ -72,7 +72,9 @@ def trends(loops: Loops) -> Floats:
     size, base = np.repeat(sizes, sizes), np.repeat(loops.first[:-1], sizes)
     total = steps.copy()
     for away in range(1, TREND + 1):
-        total += steps[base + (position + away) % size] + steps[base + (position - away) % size]
+        # The outermost count half: on a diagonal, horizontal and vertical ones are then as many.
+        share = 0.5 if away == TREND else 1.0
+        total += share * (steps[base + (position + away) % size] + steps[base + (position - away) % size])
     return np.asarray(total)
 
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, Sets, linked_parts
-from warpsplat.trace.mixtures import explain
+from warpsplat.trace.mixtures import REACH, explain
 from warpsplat.trace.ramps import Ramp, fit_ramp
 from warpsplat.trace.seeds import find_seeds, noise_of
 
@@ -27,6 +27,9 @@ SLACK = 0.2
 
 CALM = 12.0
 """Steps that are smoothed in a noisy picture [levels], besides noise."""
+
+AROUND = 5
+"""Side of the square that tells what is a line where two colours cross [px]."""
 
 CLEAR = 2.5
 """Opacity below which a region is not painted [levels]."""
@@ -49,13 +52,18 @@ SPECK = 8
 BESIDE = 5
 """How far from a thin part the colours are looked for that it may be mixed of [px]."""
 
-SMALL = 60
-"""Pixels of the largest region that may be given up."""
+SMALL = ((60, REACH), (12, 2 * REACH))
+"""Pixels of the largest region that may be given up, and how far away it may find what it is mixed of [px]:
+the tips of stars are long.
+"""
 
 UNSEEN = 120.0
 """How far all the pixels of a region may be from mixtures of what is around it, taken together, for that
 [levels].
 """
+
+UNSEEN_EACH = 40.0
+"""The same for each pixel of a speck [levels]."""
 
 MOST_THIN = 4000
 """Thin parts that are looked at; a picture with more is no drawing."""
@@ -299,19 +307,22 @@ def _adopt(image: Floats, painted: Ints, pure: Floats, seeds: Bools) -> None:
 
 def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
     """Give up small regions that are seen as little more than mixtures of what is around them."""
-    regions = components(painted, image)
-    small = np.bincount(regions.reshape(-1)) <= SMALL
-    doubtful = small[regions]
-    rows, columns = np.nonzero(doubtful)
-    if not len(rows) or doubtful.all():
-        return
-    large = np.where(doubtful, NOBODY, painted).astype(np.int32)
-    result = explain(image, large, pure, rows, columns, _slack(noise))
-    seen = np.maximum(result.residual - (MIXED + noise), 0)
-    energy = np.bincount(regions[rows, columns], seen, len(small))
-    gone = energy[regions[rows, columns]] <= UNSEEN
-    rows, columns = rows[gone], columns[gone]
-    painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
+    for most, reach in SMALL:
+        regions = components(painted, image)
+        small = np.bincount(regions.reshape(-1)) <= most
+        doubtful = small[regions]
+        rows, columns = np.nonzero(doubtful)
+        if not len(rows) or doubtful.all():
+            continue
+        large = np.where(doubtful, NOBODY, painted).astype(np.int32)
+        result = explain(image, large, pure, rows, columns, _slack(noise), reach)
+        seen = np.maximum(result.residual - (MIXED + noise), 0)
+        owner = regions[rows, columns]
+        energy = np.bincount(owner, seen, len(small))
+        pixels = np.bincount(owner, minlength=len(small))
+        gone = (energy <= np.maximum(UNSEEN, UNSEEN_EACH * np.minimum(pixels, SPECK)))[owner]
+        rows, columns = rows[gone], columns[gone]
+        painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
 
 
 def _thin_parts(
@@ -442,9 +453,7 @@ def _paint_of(regions: Ints, painted: Ints) -> Ints:
 
 
 def components(painted: Ints, image: Floats) -> Ints:
-    """Connected parts of one colouring; where two cross on a diagonal, the one that the picture shows more
-    of there goes on.
-    """
+    """Connected parts of one colouring; where two cross on a diagonal, what there is less of goes on."""
     inside = np.ones(painted.shape, np.bool_)
     count, parts = linked_parts(painted[:, 1:] == painted[:, :-1], painted[1:] == painted[:-1], inside)
     sets = Sets(count)
@@ -465,10 +474,12 @@ def crossings(labels: Ints) -> Bools:
 
 
 def main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
-    """Whether upper left and lower right are the connected ones: they differ less from the four's mean."""
+    """Whether upper left and lower right are the connected ones of four pixels: what there is less of around
+    is, as lines are.
+    """
     a, b = image[rows, columns], image[rows, columns + 1]
     c, d = image[rows + 1, columns], image[rows + 1, columns + 1]
-    mean = (a + b + c + d) / 4
-    main = np.maximum(np.abs(a - mean).max(axis=1), np.abs(d - mean).max(axis=1))
-    other = np.maximum(np.abs(b - mean).max(axis=1), np.abs(c - mean).max(axis=1))
-    return np.asarray(main <= other)
+    soft = cv2.blur(np.ascontiguousarray(image, np.float32), (AROUND, AROUND))
+    mean = sum(soft[rows + down, columns + right] for down in (0, 1) for right in (0, 1)) / 4
+    main, other = np.abs((a + d) / 2 - mean).max(axis=1), np.abs((b + c) / 2 - mean).max(axis=1)
+    return np.asarray(main >= other)

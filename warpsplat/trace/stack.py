@@ -8,6 +8,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from warpsplat.trace.curves import Pieces, Run, straight
@@ -33,6 +34,9 @@ MARGIN = 0.7
 DOT = 8
 """Cracks of the largest loop that is a dot, whose shape cannot be told."""
 
+STRAIGHT = 0.05
+"""How far the joint of two lines may be from their common straight way [px]."""
+
 STILL = 0.02
 """Offset below which a crack is where the pixels say [px]."""
 
@@ -57,6 +61,8 @@ class Tracer:
     layers: Layers
     see_through: Bools
     """Regions under which nothing may lie, shape (region,)."""
+    holed: Bools
+    """Regions that have something of these in them, shape (region,)."""
     points: Floats
     """Sub-pixel places of the cracks, shape (crack, 2)."""
     good: Bools
@@ -74,11 +80,11 @@ class Tracer:
         region = int(self.loops.region[loop])
         others = self.loops.others[low:high]
         kinds = self._kinds(region, others)
-        if self.loops.is_hole[loop] and self.see_through[others].any():
-            kinds[:] = SEEN
         if (kinds == HIDDEN).all():
-            if self.loops.is_hole[loop]:
+            if self.loops.is_hole[loop] and not self.holed[others].any():
                 return []
+            if self.loops.is_hole[loop]:
+                return [self._under(region, low, high)]
             kinds[:] = SEEN
         if (kinds == kinds[0]).all():
             if kinds[0] == SEEN:
@@ -109,6 +115,14 @@ class Tracer:
         self.runs.append(Run(points, closed=True))
         return Outline([len(self.runs) - 1])
 
+    def _under(self, region: int, low: int, high: int) -> Outline:
+        """A hole that must be left open, a little smaller than what lies over it."""
+        cracks = np.arange(low, high)
+        middles = self._middles(region, cracks)
+        kept = self._points(cracks, closed=True, of=0.5 * (self.points[cracks] + middles))
+        self.runs.append(Run(kept, closed=True))
+        return Outline([len(self.runs) - 1])
+
     def _dot(self, low: int, high: int) -> Outline:
         """A circle of the loop's area about its middle."""
         vertices = self.loops.vertices[low:high].astype(np.float64)
@@ -137,8 +151,11 @@ class Tracer:
             turned[0] = True
         return self.loops.vertices[low:high][turned].astype(np.float64)
 
-    def _points(self, cracks: Ints, *, closed: bool) -> Floats:
-        """The good points of a stretch, without those where three regions meet."""
+    def _points(self, cracks: Ints, *, closed: bool, of: Floats | None = None) -> Floats:
+        """The good points of a stretch, or those of others in their place, without those where three regions
+        meet.
+        """
+        places = self.points[cracks] if of is None else of
         others = self.loops.others[cracks]
         change = others != np.roll(others, 1)
         if not closed:
@@ -147,7 +164,7 @@ class Tracer:
         good = self.good[cracks]
         clean = good & ~mixed
         keep = clean if clean.sum() >= max(4, 0.5 * good.sum()) else good
-        return self.points[cracks[keep]] if keep.any() else self.points[cracks]
+        return places[keep] if keep.any() else places
 
     def _chain(self, region: int, stretches: list[Stretch]) -> Outline:
         """A loop that is seen in parts."""
@@ -227,6 +244,7 @@ class Tracer:
 
     def _hidden(self, region: int, cracks: Ints, start: Floats, end: Floats) -> Floats:
         """Corners of a way from ``start`` to ``end`` under what lies above the region."""
+        holed = bool(self.holed[self.loops.others[cracks]].any())
         goals = np.concatenate([start[None], self._middles(region, cracks), end[None]])
         vertices = self.loops.vertices[np.append(cracks, cracks[-1])].astype(np.float64)
         ahead = np.concatenate([vertices, vertices[-1:]])
@@ -237,7 +255,9 @@ class Tracer:
             # Cutting short must not cut off the region itself, which lies on the right.
             way = ahead[j], goals[j], goals[i], ahead[i]
             beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(way))
-            return beside <= 2 * ASIDE and self._is_free(region, goals[i], goals[j])
+            if beside > 2 * ASIDE or not self._is_free(region, goals[i], goals[j]):
+                return False
+            return not holed or self._is_filled(region, np.concatenate([ahead[i : j + 1], goals[[j, i]]]))
 
         at, found = 0, []
         while at < len(goals) - 1:
@@ -258,6 +278,16 @@ class Tracer:
         straight_out = np.stack([steps[:, 1], -steps[:, 0]], axis=1)
         near = middle + NEAR * straight_out
         return np.where(reach[:, None] > NEAR, middle + 0.5 * reach[:, None] * outward, near)
+
+    def _is_filled(self, region: int, polygon: Floats) -> bool:
+        """Whether all of a polygon is hidden from the region; pixels on its edge may be the region's."""
+        low = np.floor(polygon.min(axis=0)).astype(np.intp)
+        width, height = np.ceil(polygon.max(axis=0)).astype(np.intp) - low + 1
+        mask = np.zeros((height, width), np.uint8)
+        cv2.fillPoly(mask, [np.round(polygon - low - 0.5).astype(np.int32)], 1)
+        rows, columns = np.nonzero(cv2.erode(mask, np.ones((3, 3), np.uint8)))
+        inside = np.stack([columns, rows], axis=1) + low + 0.5
+        return bool(self._covered(region, inside).all())
 
     def _is_free(self, region: int, start: Floats, end: Floats) -> bool:
         """Whether a straight line is hidden, its ends aside."""
@@ -313,4 +343,29 @@ def assembled(outline: Outline, fitted: list[Pieces]) -> Pieces | None:
         if np.hypot(*(goal - last)) > 1e-3:
             cubics.append(straight(last, goal))
             lines.append(True)
-    return Pieces(np.asarray(cubics), np.asarray(lines, np.bool_))
+    return _joined(np.asarray(cubics), lines)
+
+
+def _joined(cubics: Floats, lines: list[bool]) -> Pieces:
+    """Lines that go on in the same direction are one."""
+    kept: list[Floats] = []
+    straight_kept: list[bool] = []
+    for cubic, line in zip(cubics, lines, strict=True):
+        if line and kept and straight_kept[-1] and _goes_on(kept[-1], cubic):
+            kept[-1] = straight(kept[-1][0], cubic[3])
+        else:
+            kept.append(cubic)
+            straight_kept.append(line)
+    if len(kept) > 2 and straight_kept[0] and straight_kept[-1] and _goes_on(kept[-1], kept[0]):
+        kept[0] = straight(kept.pop()[0], kept[0][3])
+        straight_kept.pop()
+    return Pieces(np.asarray(kept), np.asarray(straight_kept, np.bool_))
+
+
+def _goes_on(one: Floats, other: Floats) -> bool:
+    """Whether the joint of two lines is on the straight way from the first's start to the second's end."""
+    way, here = other[3] - one[0], one[3] - one[0]
+    size = float(np.hypot(*way))
+    if size < 1e-6 or here @ way < 0 or (other[3] - one[3]) @ way < 0:
+        return False
+    return bool(abs(here[0] * way[1] - here[1] * way[0]) <= STRAIGHT * size)

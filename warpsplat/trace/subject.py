@@ -52,6 +52,9 @@ SMALL = 128
 
 PIXEL_COLORS = 64
 
+MIXED = 0.2
+"""Share of mixtures among the pixels at edges from which on a picture is antialiased."""
+
 
 @dataclass(frozen=True)
 class Guess:
@@ -131,7 +134,22 @@ def _cell(levels: Ints, counts: Ints) -> int | None:
         return cell if CELLS[0] <= min(across, down) and max(across, down) <= CELLS[1] else None
     # Antialiasing makes many colours of few pixels each.
     frequent = counts[counts >= max(3, 0.002 * width * height)].sum()
-    return 1 if max(width, height) <= SMALL and frequent >= 0.97 * width * height else None
+    if max(width, height) > SMALL or frequent < 0.97 * width * height:
+        return None
+    return None if _antialiased(levels) else 1
+
+
+def _antialiased(levels: Ints) -> bool:
+    """Whether many of the pixels at edges are mixtures of their neighbours on opposite sides."""
+    mixed = np.zeros(levels.shape[:2], np.bool_)
+    for part, seen in ((levels, mixed), (levels.swapaxes(0, 1), mixed.swapaxes(0, 1))):
+        before, here, after = (part[:, i : part.shape[1] - 2 + i].astype(np.float32) for i in range(3))
+        between = after - before
+        share = ((here - before) * between).sum(axis=2) / np.maximum((between**2).sum(axis=2), 1)
+        off = np.abs(here - before - share[..., None] * between).max(axis=2)
+        contrast = np.abs(between).max(axis=2) > STEP
+        seen[:, 1:-1] |= contrast & (off < NEAR) & (np.abs(share - 0.5) < 0.4)
+    return bool(mixed.sum() > MIXED * max(1, (_step(levels) > STEP).sum()))
 
 
 def _is_line_art(levels: Ints) -> bool:

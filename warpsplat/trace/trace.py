@@ -11,6 +11,7 @@ from warpsplat.alpha import straight as straight_color
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import IntArray, starts_of
 from warpsplat.trace.curves import Pieces, fit_runs
+from warpsplat.trace.fewer import fewer_regions
 from warpsplat.trace.grids import Bools, Floats, Ints
 from warpsplat.trace.joints import ALONE, CORNER, FREE, LINE_HANDLE, SMOOTH
 from warpsplat.trace.order import Layers, Tree, bare_ground, find_layers, find_tree, over_clear
@@ -33,6 +34,9 @@ NOISY = 0.02
 
 BENT = 8.0
 """Angle between handles up to which they lie on one line [degrees]."""
+
+MOST_REGIONS = 3000
+"""Of any picture; one with more is no drawing."""
 
 MERGED = 1500
 """Shapes among which those of one colour are looked for."""
@@ -69,8 +73,15 @@ def trace(image: FloatArray, *, most: int | None = None) -> Traced:
     levels = np.asarray(image, np.float32) * 255
     if levels.shape[2] == 3:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
-    regions = find_regions(levels)
-    return trace_regions(levels, regions)
+    regions = fewer_regions(find_regions(levels), MOST_REGIONS)
+    traced = trace_regions(levels, regions)
+    target = len(regions.paint)
+    while most is not None and len(traced.scene) > most and target > 2:
+        # Regions of one colour may be one path, so that there may be more of them than paths.
+        target = max(2, min(target - 1, int(target * most / len(traced.scene))))
+        regions = fewer_regions(regions, target)
+        traced = trace_regions(levels, regions)
+    return traced
 
 
 def trace_regions(image: Floats, regions: Regions) -> Traced:
@@ -88,8 +99,19 @@ def trace_regions(image: Floats, regions: Regions) -> Traced:
     sizes = np.bincount(regions.labels.reshape(-1), minlength=len(regions.paint))
     layers = find_layers(loops, tree, sizes, unpainted)
     opacity = np.array([coloring.color[3] for coloring in regions.colorings])[regions.paint]
-    see_through = over_clear(tree, opacity < OPAQUE) | unpainted
-    tracer = Tracer(loops, regions.labels, layers, see_through, points, good, offsets, trends(loops), [])
+    see_through = (opacity < OPAQUE) | unpainted
+    tracer = Tracer(
+        loops,
+        regions.labels,
+        layers,
+        see_through,
+        over_clear(tree, opacity < OPAQUE),
+        points,
+        good,
+        offsets,
+        trends(loops),
+        [],
+    )
     outlines = _outlines(tracer, layers, loops)
     fitted = fit_runs(tracer.runs, tolerance_of(offsets, loops, regions.noise))
     shapes = []
