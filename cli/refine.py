@@ -26,6 +26,7 @@ from warpsplat.jobs.options import BY_NAME
 @flag(BY_NAME["time-budget"])
 @flag(BY_NAME["precision"])
 @flag(BY_NAME["title"])
+@flag(BY_NAME["ids"])
 @flag(BY_NAME["minify"])
 @flag(BY_NAME["background"])
 @click.option(

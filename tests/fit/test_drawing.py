@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.fit.drawings import WHITE, logo, seam
+from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Joint
 from warpsplat.fit.drawing import Refinement, own_colors, refine_drawing
@@ -109,3 +110,27 @@ def test_a_picture_without_shapes(device: str) -> None:
     none = made.scene.take(np.zeros(0, np.intp))
     empty = np.zeros(0, np.int32)
     assert len(refine_drawing(np.ones((64, 64, 3), np.float32), none, empty, empty, Backend.on(device))) == 0
+
+
+def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
+    """The picture counts as opaque; what shines through the seam bounds how near shapes side by side come."""
+    backend = Backend.on(device)
+    exact = seam()
+    scene = replace(exact.scene, canvas=replace(exact.scene.canvas, background=None))
+    target = render(exact.scene, backend=backend)
+    start, same = seam(spread=0.3), exact.same
+    off = replace(scene, points=start.scene.points)
+    found = refine_drawing(target, off, exact.joints, same, backend, QUICK)
+    whole = np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
+    assert psnr(found, whole, backend) > psnr(off, whole, backend) + 3
+
+
+def test_gradients_are_fitted_and_stay_as_opaque_as_they_are(device: str) -> None:
+    backend = Backend.on(device)
+    exact = logo()
+    ramps = with_gradients(exact.scene)
+    target = render(ramps, backend=backend)
+    off = replace(ramps, frames=ramps.frames + np.float32(0.7) * (ramps.frames != 0))
+    fitted = refine_drawing(target, off, exact.joints, exact.same, backend, QUICK)
+    assert psnr(fitted, target, backend) > psnr(replace(off, opacities=fitted.opacities), target, backend)
+    np.testing.assert_array_equal(fitted.stop_opacities, ramps.stop_opacities)

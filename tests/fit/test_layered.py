@@ -14,9 +14,10 @@ from warpsplat.errors import UsageError
 from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import levels_of, make_settings, parse_levels
+from warpsplat.fit.settings import levels_of, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
+from warpsplat.fit.texts import parse_levels
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import score_svg
 from warpsplat.render.backend import Backend

@@ -10,9 +10,8 @@ from warpsplat.fit.settings import (
     PRESETS,
     Settings,
     make_settings,
-    parse_bytes,
-    parse_duration,
 )
+from warpsplat.fit.texts import parse_bytes, parse_duration
 from warpsplat.scene import Basis, Kind
 
 

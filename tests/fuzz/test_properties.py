@@ -23,7 +23,8 @@ from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
 from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
-from warpsplat.fit.settings import Settings, make_settings, parse_bytes, parse_duration
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.texts import parse_bytes, parse_duration
 from warpsplat.jobs.plan import KEYS, load_jobs
 from warpsplat.metrics import psnr
 from warpsplat.svg.read import load_scene

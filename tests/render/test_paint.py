@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.helpers import compare, renderer_for
-from tests.scenes import disc, mixed_scene, random_scene, with_gradients
+from tests.scenes import disc, mixed_scene, random_scene, with_gradients, with_two_stops
+from warpsplat.render.tiles import from_tiles
 from warpsplat.scene import Canvas, Kind, Paint, Scene, Spread
 
 
@@ -35,6 +36,33 @@ def test_spread(device: str, paint: Paint, spread: Spread) -> None:
     both = {"paint": paint, "spread": spread}
     traits = {name: np.where(scene.paint > 0, value, 0).astype(np.int32) for name, value in both.items()}
     compare(replace(scene, **traits), device)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("clear", [False, True])
+def test_ramps(device: str, lanes: int, clear: bool) -> None:
+    """Two ascending stops, padded, from a circle's centre: the way for these is a shorter one."""
+    scene = with_two_stops(random_scene(Kind.FILL, 6, seed=10), seed=11)
+    compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
+
+
+def test_what_is_seen_is_what_colours_are_multiplied_with(device: str) -> None:
+    scene = with_two_stops(mixed_scene(seed=4), seed=5)
+    scene.opacities[:] = 0.6
+    before = renderer_for(scene, device)
+    visible = before.visible()
+    step = 0.125
+    for shape in range(len(scene)):
+        own = np.arange(len(scene)) == shape
+        stops = np.repeat(own, np.diff(scene.stop_first))[:, None]
+        brighter = replace(
+            scene, colors=scene.colors + step * own[:, None], stop_colors=scene.stop_colors + step * stops
+        )
+        grown = renderer_for(brighter, device).read_image() - before.read_image()
+        tiles = np.zeros((before.viewport.tile_count, 1, 16, 16), np.float32)
+        tiles[visible.tile[visible.shape == shape], 0] = visible.share[visible.shape == shape]
+        seen = from_tiles(tiles, before.viewport.width, before.viewport.height)
+        np.testing.assert_allclose(grown, step * np.broadcast_to(seen, grown.shape), atol=1e-6)
 
 
 def test_stops_out_of_order(device: str) -> None:

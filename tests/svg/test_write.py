@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.scenes import disc, mixed_scene, random_scene, started_alike
+from tests.scenes import disc, mixed_scene, random_scene, started_alike, with_gradients
 from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
@@ -293,6 +293,10 @@ def test_black_need_not_be_said() -> None:
         colors = scene.colors.copy()
         colors[1] = 0
         scene = replace(scene, colors=colors)
+        black = replace(scene, canvas=replace(scene.canvas, background=np.zeros(3, np.float32)))
+        assert '<rect width="4000" height="3600"/>' in write_svg(black)
+        read = load_scene(write_svg(black), 40, 36, "a.svg")[0].canvas.background
+        assert read is not None and not read.any()
         text = write_svg(scene)
         assert ("#000" in text) == (kind == Kind.STROKE)
         back, _ = load_scene(text, 40, 36, "a.svg")
@@ -318,3 +322,21 @@ def test_neighbours_of_one_colour_share_a_group() -> None:
         np.testing.assert_allclose(back.colors, held.colors, atol=1e-6)
         np.testing.assert_allclose(back.widths, held.widths, atol=1e-5)
         assert write_svg(back, per_pixel=5) == text
+
+
+def test_paths_are_named_by_their_colours() -> None:
+    """Each once; the picture is the same, and what is read as well."""
+    scene = mixed_scene(seed=3)
+    colors = scene.colors.copy()
+    colors[:3] = [[0, 0, 0.5], [0.01, 0, 0.52], [1, 0.84, 0]]
+    scene = replace(scene, colors=colors)
+    text = write_svg(scene, per_pixel=5, ids=True)
+    names = re.findall(r' id="([^"]*)"', text)
+    assert len(names) == len(set(names)) == len(scene)
+    assert names[:3] == ["navy", "navy-2", "gold"]
+    plain = write_svg(scene, per_pixel=5)
+    assert re.sub(r' id="[^"]*"', "", text) == plain
+    back, _ = load_scene(text, 40, 36, "a.svg")
+    assert write_svg(back, per_pixel=5) == plain
+    ramps = write_svg(with_gradients(random_scene(Kind.FILL, 3)), ids=True)
+    assert ' id="gradient"' in ramps and ' id="g0"' in ramps

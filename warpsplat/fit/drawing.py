@@ -16,7 +16,7 @@ from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.render.backend import Backend
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import Canvas, FloatArray, Scene
 
 Colors = Literal["held", "fitted"]
 
@@ -68,7 +68,8 @@ def refine_drawing(
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Scene:
-    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes are opaque and stay.
+    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes and their opacities
+    stay.
 
     Args:
         target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height, width,
@@ -89,10 +90,10 @@ def refine_drawing(
         ValueError: ``joints`` or ``same`` do not fit the scene, or its shapes are no fills of cubics.
     """
     how = how or Refinement()
-    opaque = replace(scene, opacities=np.ones_like(scene.opacities))
-    drawing = Drawing(opaque, joints, same)
+    drawing = Drawing(scene, joints, same)
     if not len(scene):
-        return opaque
+        return scene
+    target = matching(target, scene.canvas)
     step = start(target, drawing, backend, how, held)
     best, least = _look(step)
     for done in range(1, how.steps + 1):
@@ -112,6 +113,13 @@ def refine_drawing(
     return best
 
 
+def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
+    """``target`` with opacity, shape (height, width, 4), where the canvas is transparent."""
+    if canvas.background is None and target.shape[2] == 3:
+        return np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
+    return target
+
+
 def start(
     target: FloatArray,
     drawing: Drawing,
@@ -126,6 +134,7 @@ def start(
     state.keeper = keeper
     every = np.ones(len(drawing.scene), np.bool_)
     state.parameters.hold("opacities", every)
+    state.parameters.hold("stop_opacities", np.ones(len(drawing.scene.stop_opacities), np.bool_))
     if how.colors == "held":
         state.parameters.hold("colors", every)
     height, width = target.shape[:2]

@@ -18,7 +18,12 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
         scene = as_paths(scene, settings.softness)
     plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
     return write_svg(
-        scene, per_pixel=per_pixel, metadata=metadata, opacity_scale=plateau, title=settings.title
+        scene,
+        per_pixel=per_pixel,
+        metadata=metadata,
+        opacity_scale=plateau,
+        title=settings.title,
+        ids=settings.ids,
     )
 
 

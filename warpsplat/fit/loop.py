@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
+from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.schedule import (
@@ -101,6 +102,9 @@ def fit(
     rng = np.random.default_rng(settings.seed)
     grows = scene is None
     start = below or scene or grid_scene(settings, image, shapes_at(settings, 0), rng)
+    palette = Palette.of(settings, image)
+    if palette:
+        start = replace(start, canvas=palette.canvas(start.canvas))
     state = FitState.start(start, backend, rng, begin, len(below) if below else 0)
     budget = Budget(seconds) if seconds is not None else None
     if budget:
@@ -120,6 +124,8 @@ def fit(
             step = Step(state, settings, Target(image, phase, weights))
             step = operate(step, grows=True) if first else step
         step.advance()
+        if palette and not rounding:
+            palette.choose(state)
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:
             step.make_room()
@@ -136,6 +142,8 @@ def fit(
             if not rounding:
                 state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
                 rounding = True
+                if palette:
+                    palette.hold(state)
             hold_stage(step, stage)
         exact = settings.renderer == "exact"
         if finish and exact and not settled and done >= max(opacities_at(settings), begin + 1):

@@ -9,6 +9,7 @@ import warp as wp
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.units import Units
 from warpsplat.kernels import adam
+from warpsplat.kernels.paint import ramp
 from warpsplat.render.backend import buffer
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
@@ -34,6 +35,8 @@ def record_adam(
     """
     if parameters.has_twins:
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
+    if parameters.has_circles:
+        program.launch(ramp.tie_circles, parameters.shape_count, parameters.arrays)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import CLEAR, on, straight
 from warpsplat.fit.settings import Settings, solid_color
-from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
 OPACITY = 0.98
 """Opacity of a new shape: it hides what it should replace, and may still become translucent."""
@@ -154,7 +154,7 @@ def place(
         points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
     else:
         points = circle_splines(centres, np.sqrt(areas / np.pi), settings.spline_points)
-    return _opaque(Kind.FILL, settings.basis, canvas, points, np.zeros(len(centres)), colors)
+    return _new(settings, Kind.FILL, canvas, points, np.zeros(len(centres)), colors)
 
 
 def place_strokes(
@@ -171,20 +171,25 @@ def place_strokes(
     if settings.basis == Basis.CUBIC:
         count = 3 * STROKE_CUBICS + 1
     points = stroke_outlines(centres, np.maximum(lengths, 2.0), angles, count)
-    return _opaque(Kind.STROKE, settings.basis, canvas, points, widths, colors)
+    return _new(settings, Kind.STROKE, canvas, points, widths, colors)
 
 
-def _opaque(
-    kind: Kind, basis: Basis, canvas: Canvas, points: FloatArray, widths: Floats, colors: npt.NDArray[Any]
+def _new(
+    settings: Settings,
+    kind: Kind,
+    canvas: Canvas,
+    points: FloatArray,
+    widths: Floats,
+    colors: npt.NDArray[Any],
 ) -> Scene:
-    """New shapes, all but opaque."""
+    """New shapes, opaque or nearly so."""
     return Scene.uniform(
         kind,
         canvas,
         points,
-        basis,
+        settings.basis,
         colors=np.asarray(colors, np.float32).reshape(len(points), 3),
-        opacities=np.full(len(points), OPACITY, np.float32),
+        opacities=np.full(len(points), OPACITY_RANGE[1] if settings.opaque else OPACITY, np.float32),
         widths=np.asarray(widths, np.float32),
     )
 

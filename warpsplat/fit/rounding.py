@@ -113,6 +113,8 @@ def hold_opacities(step: Step) -> None:
     D (1 - o)^2 / o^2 if it is made opaque: the error is quadratic in the opacity.
     """
     parameters = step.state.parameters
+    if step.settings.opaque:
+        return
     step.renderer.forward_complete()
     worth = step.renderer.removal_costs(step.aim.target, step.aim.importance)
     scene = parameters.scene()

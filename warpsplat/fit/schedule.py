@@ -22,6 +22,9 @@ LOOK_FROM = 0.75
 LOOK_INTERVAL = 50
 """Steps between two looks at the file as a viewer shows it."""
 
+REPAINT_SHARE = 0.1
+"""Of a run, from one look for gradients to the next: a look takes as long as several steps."""
+
 
 @dataclass(frozen=True)
 class Phase:
@@ -91,6 +94,15 @@ def shapes_at(settings: Settings, step: int) -> int:
         return round(most * density.surplus ** -min(done, 1.0))
     missing = 1.0 - step / (density.grown * steps) if density.grown > 0 else 0.0
     return max(1, round(most * (density.start / density.surplus) ** max(missing, 0.0)))
+
+
+def repaints_at(settings: Settings, step: int) -> bool:
+    """Whether the turn at ``step`` looks for gradients: one each REPAINT_SHARE of the run, and the last."""
+    density = settings.density
+    if step + density.interval >= density.stop * settings.iterations:
+        return True
+    share = REPAINT_SHARE * settings.iterations
+    return step // share > (step - density.interval) // share
 
 
 def mean_points_at(settings: Settings, step: int) -> float:

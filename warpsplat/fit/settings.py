@@ -14,12 +14,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from warpsplat.errors import UsageError
+from warpsplat.fit.texts import parse_bytes, parse_duration, parse_levels, parse_palette
 from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Renderer = Literal["exact", "splat", "gaussian"]
+Painting = Literal["flat", "linear", "radial", "auto"]
 
 
 FRACTION = (0.0, 1.0)
@@ -138,6 +140,8 @@ class Settings:
     renderer: Renderer = "exact"
     """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
     look like the paths, or the paper's own soft ones."""
+    paint: Painting = "flat"
+    """Of each shape: a colour, a gradient of one kind, or a gradient where it is worth its bytes."""
     softness: float = 0.6
     """Standard deviation that soft Gaussians have at least [px of the canvas]."""
     gaussian_density: float = 0.5
@@ -174,6 +178,8 @@ class Settings:
     """Format of the sheet in whose middle the picture lies, as ``a4``; empty: none."""
     units: str = ""
     """In which the file says its size; empty: pixels, millimetres of a sheet."""
+    ids: bool = False
+    """Whether paths have identifiers, by their colours, in the file."""
     minify: bool = False
     """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None
@@ -186,6 +192,12 @@ class Settings:
     """Size the run to end within this time [s], start of the program not included."""
     max_bytes: int | None = None
     """The best file that has no more [bytes]; ``curves`` as for ``target_psnr``."""
+    colors: int | None = None
+    """Most different colours that the file may have; its fills are opaque then."""
+    palette: tuple[str, ...] = ()
+    """The only colours that the file may have, ``#rrggbb``; its fills are opaque then."""
+    opaque: bool = False
+    """Whether no shape is translucent."""
     levels: tuple[int, ...] = ()
     """Numbers of shapes, ascending: the first so many are a picture of their own (``fit.layered``)."""
     level_weight: float = 0.3
@@ -233,11 +245,17 @@ class Settings:
                 raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
         if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
             raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
-        switches = ("through_scales", "viewer", "mixed", "minify")
+        switches = ("through_scales", "viewer", "mixed", "ids", "minify", "opaque")
         for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
             if not isinstance(given, bool):
                 raise UsageError(f"{name} must be true or false, not {given!r}")
         self._check_levels()
+        if self.colors is not None:
+            check_whole("colors", self.colors, 1, MOST_COLORS)
+        if len(self.palette) > MOST_COLORS:
+            raise UsageError(f"palette has {len(self.palette)} colours, more than {MOST_COLORS}")
+        if (self.opaque or self.is_limited) and self.renderer == "gaussian":
+            raise UsageError("opaque fills and the renderer gaussian do not go together")
         fitted = self.fitted_options()
         if self.subject not in {"auto", "photo"} and fitted:
             raise UsageError(f"subject {self.subject} and {fitted[0]} do not go together")
@@ -245,6 +263,7 @@ class Settings:
             ("subject", self.subject, get_args(Subject)),
             ("order", self.order, get_args(Order)),
             ("renderer", self.renderer, get_args(Renderer)),
+            ("paint", self.paint, get_args(Painting)),
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
@@ -256,12 +275,18 @@ class Settings:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether the file may have some colours only."""
+        return self.colors is not None or bool(self.palette)
+
     def fitted_options(self) -> list[str]:
         """Options that say something of fitted shapes only, as they are given."""
         given = {
             "open": self.kind == Kind.STROKE,
             "mixed": self.mixed,
             "levels": bool(self.levels),
+            f"paint {self.paint}": self.paint != "flat",
             f"renderer {self.renderer}": self.renderer != "exact",
             "target-psnr": self.target_psnr is not None,
             "max-bytes": self.max_bytes is not None,
@@ -291,6 +316,9 @@ class Settings:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+MOST_COLORS = 256
+"""Of a palette."""
+
 MAX_TITLE = 1000
 """Characters: a title is a line."""
 
@@ -304,59 +332,11 @@ def solid_color(background: str) -> FloatArray | None:
     return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
 
 
-DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
-SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
-UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
-BYTES = {
-    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
-    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
-}
-MAX_DIGITS = 15
-"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
-
-
-def parse_duration(value: str | float) -> float:
-    """``60``, ``60s``, ``2m`` or ``1.5h`` -> seconds.
-
-    Raises:
-        UsageError: none of these.
-    """
-    found = DURATION.fullmatch(str(value).strip())
-    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
-        raise UsageError(f"not a time: {value!r}; write 60s or 2m")
-    return float(found[1]) * UNITS[(found[2] or "s").lower()]
-
-
-def parse_bytes(value: str | int) -> int:
-    """``100000``, ``100KB`` or ``1MiB`` -> bytes.
-
-    Raises:
-        UsageError: none of these.
-    """
-    found = SIZE.fullmatch(str(value).strip())
-    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
-        raise UsageError(f"not a size: {value!r}; write 100KB, 1MB or 1GB")
-    return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
-
-
 LEVEL_FACTOR = 4
 """Shapes of a level over those of the one before, where only ``layered`` is asked for."""
 
 LEAST_LEVEL = 8
 """Shapes of the first of these levels, at the least."""
-
-
-def parse_levels(value: object) -> tuple[int, ...]:
-    """``64,256,1024`` -> numbers.
-
-    Raises:
-        UsageError: something else.
-    """
-    parts = value if isinstance(value, (list, tuple)) else str(value).split(",")
-    try:
-        return tuple(int(str(part)) for part in parts)
-    except ValueError as error:
-        raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {value!r}") from error
 
 
 def levels_of(curves: int) -> tuple[int, ...]:
@@ -416,12 +396,23 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         given["time_budget"] = parse_duration(given["time_budget"])
     if "max_bytes" in given:
         given["max_bytes"] = parse_bytes(given["max_bytes"])
+    if "palette" in given:
+        given["palette"] = parse_palette(given["palette"])
+    if given.get("paint", "flat") != "flat" and (given.get("colors") or given.get("palette")):
+        raise UsageError(f"paint {given['paint']} and a palette do not go together")
+    if given.get("colors") or given.get("palette"):
+        given["opaque"] = True
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     if given.get("renderer") in ("splat", "gaussian"):
         preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
         preset = replace(preset, **(GAUSSIAN if given["renderer"] == "gaussian" else {}))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
+    if given.get("opaque"):
+        preset = replace(preset, rates={**preset.rates, "opacities": 0.0})
+    if given.get("paint", "flat") != "flat":
+        # They have bytes for what colours and frames can say as well.
+        preset = replace(preset, rates={**preset.rates, "stop_opacities": 0.0, "stop_offsets": 0.0})
     if "rates" in given:
         given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
     if isinstance(given.get("density"), Mapping):
@@ -435,6 +426,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     settings = replace(preset, **given)
     if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
         raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
+    if settings.renderer == "gaussian" and settings.paint != "flat":
+        raise UsageError("renderer gaussian needs the paint flat")
     return settings
 
 

@@ -86,8 +86,11 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
         if group.basis != Basis.SPLINE or number <= LEAST_POINTS:
             continue
         moved, area = without(group.points, group.closed)
-        cost = area * worth[group.shapes][:, None]
-        for i in np.flatnonzero(np.isfinite(worth[group.shapes])).tolist():
+        known = np.isfinite(worth[group.shapes])
+        free = np.isfinite(area)  # the ends of a stroke are not
+        cost = np.where(free, area, 0.0) * np.where(known, worth[group.shapes], 0.0)[:, None]
+        cost[~free] = np.inf
+        for i in np.flatnonzero(known).tolist():
             first = int(scene.starts[group.contours[i]])
             chosen = _apart(cost[i], (number - LEAST_POINTS + 1) // 2)
             found += [(float(cost[i, k]), first, k, number, moved[i, k]) for k in chosen]

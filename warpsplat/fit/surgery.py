@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.fit.density import densify, least_seen, prune_mask
-from warpsplat.fit.schedule import mean_points_at, shapes_at
+from warpsplat.fit.paints import choose_paints
+from warpsplat.fit.schedule import mean_points_at, repaints_at, shapes_at
 from warpsplat.fit.simplify import simplify
 from warpsplat.fit.split import faded, split
 from warpsplat.fit.step import Step
@@ -22,9 +23,11 @@ def operate(step: Step, *, grows: bool) -> Step:
     """
     settings, state = step.settings, step.state
     step.renderer.forward_complete()
+    seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
+    if settings.paint != "flat" and repaints_at(settings, state.step):
+        choose_paints(step)
     scene = state.scene()
     doomed = prune_mask(scene, settings.density, state.step / settings.iterations)
-    seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
     doomed[: state.base] = False
     wanted = state.base + shapes_at(settings, state.step) if grows else len(scene)
     replaced = 0 if wanted < len(scene) else round(settings.density.replace * (len(scene) - state.base))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
-from warpsplat.fit.drawing import Refinement, refine_drawing
+from warpsplat.fit.drawing import Refinement, matching, refine_drawing
 from warpsplat.fit.nodes import CELL, Edit, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
@@ -19,7 +19,7 @@ from warpsplat.render.backend import Backend, Viewport
 from warpsplat.render.models import EXACT
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.renderer import Renderer
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 ROUNDS = 16
@@ -28,12 +28,18 @@ ROUNDS = 16
 REFIT = Refinement(steps=50, point_rate=0.1)
 """After each round."""
 
+LARGE = 100_000
+"""Pixels from which on half of these steps do: with as many more pixels, outlines have fewer that matter."""
+
 LEAST_ERROR = 3e-5
 """Mean squared error below which a picture is as good as another: 45 dB. A drawing can have much more, at the
 price of nodes that nobody would miss."""
 
 USUAL_GRID = 10.0
 """Units a pixel, where the grid is not known yet."""
+
+WORTHWHILE = 0.004
+"""Share of the file's bytes that a round has to spare for another one to follow."""
 
 MENDED = 10.0
 """How much more a candidate may cost before it is fitted anew."""
@@ -78,6 +84,7 @@ def finish_drawing(
         fields = (drawing.scene, drawing.joints, drawing.same)
         return replace(drawing, scene=refine_drawing(target, *fields, backend, how, held=held, stop=stop))
 
+    target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
         return Finished(drawing, min(USUAL_GRID, finest))
     drawing = tidied(target, refined(drawing, how), backend, stop)
@@ -99,11 +106,12 @@ def tidied(target: FloatArray, drawing: Drawing, backend: Backend, stop: Stop | 
     around it, and where some cost too much, the others are made alone.
     """
     refused: set[tuple[object, ...]] = set()
+    how = replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
     errors = error_map(target, drawing, backend)
 
     def refitted(edits: Sequence[Edit]) -> tuple[Drawing, Floats]:
         made = applied(drawing, edits)
-        scene = refine_drawing(target, made.scene, made.joints, made.same, backend, REFIT, stop=stop)
+        scene = refine_drawing(target, made.scene, made.joints, made.same, backend, how, stop=stop)
         made = replace(made, scene=scene)
         return made, error_map(target, made, backend)
 
@@ -111,7 +119,8 @@ def tidied(target: FloatArray, drawing: Drawing, backend: Backend, stop: Stop | 
         edits = apart([e for e in Outlines(drawing).edits() if e.key not in refused])
         if not edits or (stop and stop()):
             break
-        worth = worth_of(errors, drawing.scene)
+        size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
+        worth = worth_of(errors, size)
         growth = error_map(target, applied(drawing, edits), backend) - errors
         left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
@@ -124,6 +133,8 @@ def tidied(target: FloatArray, drawing: Drawing, backend: Backend, stop: Stop | 
             refused |= {e.key for e in left} - {e.key for e in taken}
             left = taken
         drawing = turned(drawing)
+        if sum(e.saved for e in left) < WORTHWHILE * size:
+            break
     return drawing
 
 
@@ -146,9 +157,8 @@ def within(errors: Floats, edit: Edit) -> float:
     return float(sum(cell.sum() for cell in cells))
 
 
-def worth_of(errors: Floats, scene: Scene) -> float:
-    """What a byte is worth of the mean squared error."""
-    size = len(write_svg(scene, per_pixel=USUAL_GRID))
+def worth_of(errors: Floats, size: int) -> float:
+    """What a byte is worth of the mean squared error, in a file of ``size`` bytes."""
     return byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
 
 
@@ -166,7 +176,7 @@ def apart(edits: Sequence[Edit]) -> list[Edit]:
 def drawing_grid(target: FloatArray, drawing: Drawing, backend: Backend, finest: float) -> float:
     """Units a pixel of the grid that costs least: in error, of which refitting mends most, and in bytes."""
     errors = error_map(target, drawing, backend)
-    worth = worth_of(errors, drawing.scene)
+    worth = worth_of(errors, len(write_svg(drawing.scene, per_pixel=USUAL_GRID)))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(drawing, scene=rounded(drawing.scene, grid))

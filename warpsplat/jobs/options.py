@@ -8,12 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, get_args
 
-from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Renderer, Settings, Subject, make_settings
+from warpsplat.errors import UsageError, printable
+from warpsplat.fit.settings import (
+    DEFAULT_QUALITY,
+    QUALITIES,
+    Painting,
+    Renderer,
+    Settings,
+    Subject,
+    make_settings,
+)
 from warpsplat.scene import Kind
 
 _defaults = Settings()
+
+PALETTE_BYTES = 10_000
+"""Most that is read of a file with colours."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +77,18 @@ OPTIONS = (
         _defaults.renderer,
         choices=get_args(Renderer),
     ),
+    Option(
+        "paint",
+        str,
+        "A colour for each shape, a gradient for each, or whichever is worth its bytes.",
+        _defaults.paint,
+        choices=get_args(Painting),
+    ),
     Option("layered", bool, "Groups from coarse to fine, each with those before it a picture of its own."),
     Option("levels", str, "Shapes up to the end of each of these groups, as 64,256,1024.", metavar="N,N"),
+    Option("colors", int, "Most different colours; the fills are opaque then.", metavar="N"),
+    Option("palette", str, "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS"),
+    Option("opaque", bool, "No translucent shapes."),
     Option("iterations", int, "Steps; overrides the effort's number.", metavar="N"),
     Option("target-psnr", float, "Smallest file that has this.", metavar="DB"),
     Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
@@ -82,6 +105,7 @@ OPTIONS = (
     Option("size", str, "Size that the picture fills, for plotters: 200x150mm.", metavar="WxH"),
     Option("page", str, "Sheet that it fills but for margins: a3, a4, a5, letter.", metavar="NAME"),
     Option("units", str, "Units of the file's size: mm, cm, in, pt, px.", metavar="UNIT"),
+    Option("ids", bool, "Name paths by their colours, for editors."),
     Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
@@ -92,6 +116,19 @@ KINDS: Mapping[str, Kind] = {o.name: o.kind for o in OPTIONS if o.kind is not No
 """What flags and keys call the kinds of shapes."""
 
 
+def read_palette(path: Path) -> str:
+    """The colours in a text file.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    try:
+        return path.read_bytes()[:PALETTE_BYTES].decode("ascii")
+    except (OSError, ValueError) as error:
+        cause = "no text" if isinstance(error, ValueError) else error.strerror
+        raise UsageError(f"palette {printable(str(path))}: {cause}; colours begin with #") from error
+
+
 def settings_from(given: Mapping[str, Any]) -> Settings:
     """Settings from keywords of ``make_settings``; those that are None come from the preset.
 
@@ -99,4 +136,7 @@ def settings_from(given: Mapping[str, Any]) -> Settings:
         UsageError: a value is out of range.
     """
     values = dict(given)
+    palette = values.get("palette")
+    if isinstance(palette, str) and "#" not in palette:
+        values["palette"] = read_palette(Path(palette))
     return make_settings(values.pop("quality", None) or DEFAULT_QUALITY, **values)

@@ -80,7 +80,9 @@ def refine(
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
         refined = clear_empty(refined, target, settings, backend, made.per_pixel)
-    svg = write_svg(refined, per_pixel=made.per_pixel, background=has_background, title=settings.title)
+    svg = write_svg(
+        refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
+    )
     svg = minified(svg) if settings.minify else svg
     eyes = has_time_for_eyes(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from warpsplat.fit.constraints import Drawing
-from warpsplat.fit.drawing import Refinement
+from warpsplat.fit.drawing import Refinement, matching
 from warpsplat.fit.loop import Fit, Progress
+from warpsplat.fit.palette import Palette
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.tidy import finish_drawing
@@ -57,13 +58,15 @@ def draw(
 
     if settings.subject == "pixel":
         scene, per_pixel = trace_pixels(target, solid_color(settings.background))
+        scene = limited(scene, settings)
         return _made(scene, per_pixel, target, backend, interrupted=False)
     if settings.subject == "line":
         return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop)
     traced = trace(target, most=None if settings.simplify else settings.curves)
+    scene = limited(traced.scene, settings)
     finished = finish_drawing(
         target,
-        Drawing(traced.scene, traced.joints, traced.same),
+        Drawing(scene, traced.joints, traced.same),
         backend,
         Refinement(),
         finest=finest(settings),
@@ -73,7 +76,13 @@ def draw(
     return _made(scene, per_pixel, target, backend, interrupted=bool(stop and stop()))
 
 
+def limited(scene: Scene, settings: Settings) -> Scene:
+    """``scene`` in the colours that the settings allow."""
+    palette = Palette.of_scene(settings, scene)
+    return palette.limited(scene) if palette else scene
+
+
 def _made(scene: Scene, per_pixel: float, target: FloatArray, backend: Backend, *, interrupted: bool) -> Fit:
     """With the figure of the render, for want of a training's."""
-    shown = psnr(255 * render(scene, backend=backend), 255 * target)
+    shown = psnr(255 * render(scene, backend=backend), 255 * matching(target, scene.canvas))
     return Fit(scene, per_pixel, shown, shown, 0, interrupted)

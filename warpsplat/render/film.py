@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import composite, composite_paint, constants
+from warpsplat.kernels import composite, composite_paint, constants, visibility
 from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.bins import Bins
@@ -103,5 +103,20 @@ class Film:
             target=target,
             importance=self.buffers.inside if importance is None else importance,
             slot_cost=slot_cost,
+            split=True,
+        )
+
+    def visibility(
+        self, program: Program, bins: Bins, coverage: Coverage, paint: Painting, seen: wp.array
+    ) -> None:
+        """Record what each pixel of a slot shows of its shape."""
+        program.launch(
+            visibility.visibility,
+            self._dim,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            seen=seen,
             split=True,
         )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient, picture
+from warpsplat.kernels.paint import flat, gradient, picture, ramp
 from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport, buffer
 from warpsplat.render.bins import Bins
@@ -65,13 +65,14 @@ class Painting:
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         if self.has_gradients:
-            program.launch(
-                gradient.gradient_forward,
-                (self._slots, self._backend.lanes),
-                *self._sources,
-                lane_columns=self._backend.lane_size,
-                split=True,
-            )
+            for kernel in (ramp.ramp_forward, gradient.gradient_forward):
+                program.launch(
+                    kernel,
+                    (self._slots, self._backend.lanes),
+                    *self._sources,
+                    lane_columns=self._backend.lane_size,
+                    split=True,
+                )
         if self._pictures:
             program.launch(
                 picture.picture_forward,
@@ -90,7 +91,8 @@ class Painting:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
         if self.has_gradients:
             shapes = self._parameters.shape_count
-            program.launch(gradient.gradient_backward, shapes, *self._sources, split=True)
+            for kernel in (ramp.ramp_backward, gradient.gradient_backward):
+                program.launch(kernel, shapes, *self._sources, split=True)
         program.launch(
             flat.flat_backward,
             self._parameters.shape_count,

@@ -91,6 +91,10 @@ class Parameters:
         self.has_twins = bool(scene.twin.any())
         if self.has_twins:
             self.arrays["point_twin"] = self._ints(_twins(scene))
+        circular = _circular(scene)
+        self.has_circles = bool(circular.any())
+        if self.has_circles:
+            self.arrays["circular"] = self._ints(circular)
         self.parts = tuple(np.unique(parts).tolist())
         """Of exact coverage, that there are shapes of."""
         if constants.STYLED in self.parts:
@@ -210,6 +214,26 @@ class Parameters:
         self._upload(scene, (kept("moment1"), kept("moment2")), self.arrays["ages"].numpy())
         self.revision += 1
 
+    def repaint(self, scene: Scene) -> None:
+        """Take ``scene``, the same shapes with other paints; stops of shapes that change begin anew. As after
+        ``rearrange``, launches must be recorded again.
+        """
+        before = self._scene
+        kept = np.flatnonzero((before.paint == scene.paint) & (np.diff(scene.stop_first) > 0))
+        stops = next(a for a in ATTRIBUTES if a.per == "stop")
+
+        def carried(field: str) -> dict[str, FloatArray]:
+            old = self._download(field)
+            for a in ATTRIBUTES:
+                if a.per == "stop":
+                    fresh = np.zeros(scene.shape_of(a), np.float32)
+                    fresh[scene.rows(stops, kept)] = old[a.name][before.rows(stops, kept)]
+                    old[a.name] = fresh
+            return old
+
+        self._upload(scene, (carried("moment1"), carried("moment2")), self.arrays["ages"].numpy())
+        self.revision += 1
+
     def assign(self, scene: Scene) -> None:
         """Take the values of ``scene``, which has the same shapes."""
         for name, group in self.groups.items():
@@ -244,6 +268,13 @@ def _parts(scene: Scene) -> np.ndarray:
     """Which part of exact coverage each shape belongs to."""
     plain = (scene.cap == Cap.ROUND) & (scene.join == Join.ROUND) & (scene.dash == NO_DASHES)
     return np.where((scene.kind == Kind.STROKE) & ~plain, constants.STYLED, scene.kind)
+
+
+def _circular(scene: Scene) -> np.ndarray:
+    """Whether each shape has a radial gradient whose second axis is the first one, turned."""
+    along, across = scene.frames[:, 2:4], scene.frames[:, 4:]
+    turned = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    return (scene.paint == Paint.RADIAL) & (across == turned).all(axis=1)
 
 
 def _twins(scene: Scene) -> IndexArray:

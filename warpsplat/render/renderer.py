@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import warp as wp
 
 from warpsplat.errors import CapacityError
+from warpsplat.kernels import constants
+from warpsplat.kernels.tile import column
 from warpsplat.render.backend import Backend, Viewport
 from warpsplat.render.bins import Bins
 from warpsplat.render.film import Film
@@ -16,7 +19,8 @@ from warpsplat.render.paint import Painting
 from warpsplat.render.parameters import Parameters
 from warpsplat.render.program import Program
 from warpsplat.render.tiles import from_tiles, to_tiles
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
+from warpsplat.scene.scene import IntArray
 
 GROWTH = 1.5
 """Capacity over need when an array has to grow, so that a growing scene seldom does."""
@@ -35,6 +39,21 @@ class Capacity:
     samples: int
     """Vertices or Gaussians."""
     slots: int
+
+
+class Visible(NamedTuple):
+    """What compositing multiplies the shapes' colours with, in the tiles where they are seen."""
+
+    shape: IntArray
+    """Shape (slot,)."""
+    tile: IntArray
+    """Shape (slot,)."""
+    share: FloatArray
+    """By column and row of the tile, in [0, 1], shape (slot, TILE, TILE)."""
+    colored: IndexArray
+    """The slots of gradients, ascending, shape (colored,)."""
+    color: FloatArray
+    """Theirs, shape (colored, 3, TILE, TILE)."""
 
 
 class Renderer:
@@ -143,6 +162,24 @@ class Renderer:
             minlength=self.parameters.shape_count,
         )
         return np.asarray(totals / (3 * self.viewport.pixel_count), np.float32)
+
+    def visible(self) -> Visible:
+        """What is seen of each shape, after ``forward``. Allocates and copies to the host: for use between
+        steps.
+        """
+        seen = self.backend.array(column, self.capacity.slots, constants.TILE)
+        program = self.backend.program()
+        self.film.visibility(program, self.bins, self.coverage, self.paint, seen)
+        program.run()
+        shapes, shares = self.bins.buffers.slot_shape.numpy(), seen.numpy()
+        rows = np.flatnonzero((shapes >= 0) & shares.any(axis=(1, 2)))
+        tiles = self.bins.buffers.slot_tile.numpy()
+        colored, colors = np.zeros(0, np.intp), np.zeros((0, 3, constants.TILE, constants.TILE), np.float32)
+        if self.paint.has_gradients:
+            paint = self.parameters.arrays["paint"].numpy()[shapes[rows]]
+            colored = np.flatnonzero(np.isin(paint, GRADIENTS))
+            colors = self.paint.buffers.paint_columns.numpy()[rows[colored], :3]
+        return Visible(shapes[rows], tiles[rows], shares[rows], colored, colors)
 
     def make_room(self) -> bool:
         """Whether the passes since the last call ran out of capacity; if so, the arrays are now larger and

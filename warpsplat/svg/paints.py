@@ -13,7 +13,7 @@ from warpsplat.svg.numbers import hex_colors, number
 Floats = npt.NDArray[np.float64]
 
 PLACE_DECIMALS = 2
-"""Of a place in units of the view box, which are finer than pixels."""
+"""Of a place in units of the view box that are coarser than pixels, or that periods are counted in."""
 
 SHARE_DECIMALS = 3
 """Of an offset, and of what is in the unit space of a gradient: a thousandth of its extent."""
@@ -47,10 +47,12 @@ def _gradient(scene: Scene, shape: int, per_pixel: float) -> str:
     """The element without its identifier."""
     frame = scene.frames[shape].astype(np.float64) * per_pixel
     origin, axes = frame[:2], frame[2:].reshape(2, 2)
+    # As outlines, ramps lie on whole units.
+    decimals = 0 if per_pixel >= 1 and scene.spread[shape] == Spread.PAD else PLACE_DECIMALS
     if scene.paint[shape] == Paint.LINEAR:
-        tag, place = "linearGradient", _line(origin, axes)
+        tag, place = "linearGradient", _line(origin, axes, decimals)
     else:
-        tag, place = "radialGradient", _circle(origin, axes, scene.focus[shape].astype(np.float64))
+        tag, place = "radialGradient", _circle(origin, axes, scene.focus[shape].astype(np.float64), decimals)
     spread = SPREADS[Spread(int(scene.spread[shape]))]
     return f'<{tag} gradientUnits="userSpaceOnUse"{place}{spread}>{_stops(scene, shape)}</{tag}>'
 
@@ -59,7 +61,7 @@ def _attributes(values: dict[str, float], decimals: int) -> str:
     return "".join(f' {name}="{number(value, decimals)}"' for name, value in values.items())
 
 
-def _line(origin: Floats, axes: Floats) -> str:
+def _line(origin: Floats, axes: Floats, decimals: int) -> str:
     """From where t is 0 to where it is 1, straight across the lines of equal colour."""
     along, across = axes
     normal = np.array([across[1], -across[0]])
@@ -67,10 +69,10 @@ def _line(origin: Floats, axes: Floats) -> str:
     square = float(normal @ normal)
     way = normal * reach / square if square > 0 else along
     (x1, y1), (x2, y2) = origin, origin + way
-    return _attributes({"x1": x1, "y1": y1, "x2": x2, "y2": y2}, PLACE_DECIMALS)
+    return _attributes({"x1": x1, "y1": y1, "x2": x2, "y2": y2}, decimals)
 
 
-def _circle(origin: Floats, axes: Floats, focus: Floats) -> str:
+def _circle(origin: Floats, axes: Floats, focus: Floats, decimals: int) -> str:
     """A circle where the frame is one, else the unit circle under the frame's map."""
     along, across = axes
     length = float(np.linalg.norm(along))
@@ -82,7 +84,7 @@ def _circle(origin: Floats, axes: Floats, focus: Floats) -> str:
             place["fx"], place["fy"] = origin + fx * along + fy * across
         if fr:
             place["fr"] = fr * length
-        return _attributes(place, PLACE_DECIMALS)
+        return _attributes(place, decimals)
     unit = {"cx": 0.0, "cy": 0.0, "r": 1.0}
     if fx or fy:
         unit |= {"fx": fx, "fy": fy}

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
+from warpsplat.svg.names import path_names
 from warpsplat.svg.nest import Path, nested
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
@@ -66,6 +67,9 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
     )
 
 
+BLACK = "#000"
+"""Of fills, it holds where nothing is said."""
+
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
@@ -110,8 +114,7 @@ def _path(
     if kind == Kind.STROKE:
         return Path(data, (opacity, paint, _line(scene, shape, per_pixel, in_group=in_group)), rest)
     rule = ' fill-rule="evenodd"' if scene.rule[shape] == Rule.EVENODD else ""
-    # Black is what holds where nothing is said.
-    return Path(data, (opacity, "" if color == "#000" else paint, ""), rule + rest)
+    return Path(data, (opacity, "" if color == BLACK else paint, ""), rule + rest)
 
 
 def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
@@ -166,7 +169,9 @@ def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
     return f'<g transform="scale({across:.9g} {down:.9g})">{picture.markup}</g>'
 
 
-def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float) -> Iterator[str]:
+def _groups(
+    scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float, ids: bool
+) -> Iterator[str]:
     """Layers are groups with their names; those without, where there are several, say how many shapes they
     complete. In them strokes that are neighbours share a group, and neighbours that say the same of
     themselves where that is shorter. Twins are one path, pictures what they are.
@@ -176,6 +181,8 @@ def _groups(scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_sc
     has_twin = np.append(scene.twin[1:], 0).tolist()
     strokes = (scene.kind == Kind.STROKE).tolist()
     rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
+    if ids:
+        rest = [f' id="{name}"{more}' for name, more in zip(path_names(scene), rest, strict=True)]
     both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
     pictures = (scene.paint == Paint.PICTURE).tolist()
     ends = level_ends(scene)
@@ -212,6 +219,7 @@ def write_svg(
     opacity_scale: float = 1.0,
     background: bool = True,
     title: str = "",
+    ids: bool = False,
 ) -> str:
     """The scene as an SVG document: a background and one path a shape, in painter's order.
 
@@ -225,16 +233,18 @@ def write_svg(
         background: whether to write it, if the canvas has one; without, the picture is transparent where no
             shape is.
         title: of the picture; empty: none.
+        ids: whether paths have identifiers, by their colours.
     """
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
     behind = ""
     if background and canvas.background is not None:
         fill = hex_colors(canvas.background[None])[0]
-        behind = f'<rect width="{width}" height="{height}" fill="{fill}"/>'
+        paint = "" if fill == BLACK else f' fill="{fill}"'
+        behind = f'<rect width="{width}" height="{height}"{paint}/>'
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
-    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale))
+    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale, ids))
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
         f'viewBox="0 0 {width} {height}">{MARK}{" " if metadata else ""}{metadata}-->\n'

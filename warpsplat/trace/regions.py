@@ -125,7 +125,8 @@ def find_regions(image: Floats) -> Regions:
     _assign(calm, labels, pure)
     painted = paint[_fill(labels, pure)]
     _adopt(calm, painted, pure, seeds)
-    _prune(calm, painted, pure, noise)
+    given_up = _prune(calm, painted, pure, noise)
+    _adopt(calm, painted, pure, ~given_up)
     regions = components(painted, image)
     return Regions(regions, pure, _paint_of(regions, painted), colorings, noise)
 
@@ -305,8 +306,13 @@ def _adopt(image: Floats, painted: Ints, pure: Floats, seeds: Bools) -> None:
         orphan[rows[found], columns[found]] = False
 
 
-def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
-    """Give up small regions that are seen as little more than mixtures of what is around them."""
+def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> Bools:
+    """Give up small regions that are seen as little more than mixtures of what is around them.
+
+    Returns:
+        the pixels of these, shape (height, width).
+    """
+    given_up = np.zeros(painted.shape, np.bool_)
     for most, reach in SMALL:
         regions = components(painted, image)
         small = np.bincount(regions.reshape(-1)) <= most
@@ -323,6 +329,8 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> None:
         gone = (energy <= np.maximum(UNSEEN, UNSEEN_EACH * np.minimum(pixels, SPECK)))[owner]
         rows, columns = rows[gone], columns[gone]
         painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
+        given_up[rows, columns] = True
+    return given_up
 
 
 def _thin_parts(

@@ -1,0 +1,243 @@
+"""The usual gradients, column by column: two ascending stops, padded, linear or from a circle's centre.
+
+What ``gradient`` computes of these, as vector arithmetic: along a column of pixels both coordinates in unit
+space go by constant steps, and the share of the second stop is a clamped linear function of t.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.paint.gradient import (
+    frame,
+    is_gradient,
+    is_ramp,
+    pixel_place,
+    to_unit,
+    to_unit_adjoint,
+)
+from warpsplat.kernels.tile import column, total
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+LINEAR = wp.constant(constants.LINEAR)
+TILE = wp.constant(constants.TILE)
+COVERED = wp.constant(constants.COVERED)
+HIDDEN = wp.constant(constants.HIDDEN)
+STEEP = wp.constant(1.0e9)  # makes a step of a clamped share
+TINY = wp.constant(1.0e-12)
+
+
+@wp.func
+def rows() -> column:
+    """Numbers of a column's pixels."""
+    result = column(0.0)
+    for i in range(TILE):
+        result[i] = float(i)
+    return result
+
+
+@wp.func
+def roots(squares: column) -> column:
+    """Square root of each element."""
+    result = column(0.0)
+    for i in range(TILE):
+        result[i] = wp.sqrt(squares[i])
+    return result
+
+
+@wp.func
+def share_of_second(t: column, start: wp.float32, width: wp.float32) -> column:
+    """Of the second stop, at parameters ``t``."""
+    linear = (t - column(start)) / width
+    return wp.min(wp.max(linear, column(0.0)), column(1.0))
+
+
+@wp.kernel
+def ramp_forward(
+    # In:
+    offset: wp.int32,
+    lane_columns: wp.int32,  # columns of a tile that a thread handles
+    tiles_x: wp.int32,
+    scale: wp.float32,
+    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+    slot_tile: wp.array[wp.int32],  # [slot_capacity]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    paint: wp.array[wp.int32],  # [shape_count]
+    spread: wp.array[wp.int32],  # [shape_count]
+    frames: wp.array[frame],  # [shape_count]
+    focus: wp.array[wp.vec3],  # [shape_count]
+    stop_first: wp.array[wp.int32],  # [shape_count + 1]
+    stop_offsets: wp.array[wp.float32],  # [stop_count]
+    stop_colors: wp.array[wp.vec3],  # [stop_count]
+    stop_opacities: wp.array[wp.float32],  # [stop_count]
+    # Out:
+    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
+):
+    """One thread a slot and lane; slots of other shapes and such as are not seen are left out."""
+    i, lane = wp.tid()
+    slot = offset + i
+    shape = slot_shape[slot]
+    if shape < 0:
+        return
+    state = slot_state[slot]
+    if not is_gradient(paint[shape]) or state & COVERED == 0 or state & HIDDEN != 0:
+        return
+    first = stop_first[shape]
+    if not is_ramp(spread[shape], focus[shape], stop_offsets, first, stop_first[shape + 1]):
+        return
+    start = stop_offsets[first]
+    width = stop_offsets[first + 1] - start
+    low = stop_colors[first]
+    high = stop_colors[first + 1]
+    low_opacity = stop_opacities[first]
+    high_opacity = stop_opacities[first + 1]
+    f = frames[shape]
+    linear = paint[shape] == LINEAR
+    down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
+    row = rows()
+    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+        top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+        t = column(top[0]) + down[0] * row
+        if not linear:
+            v = column(top[1]) + down[1] * row
+            t = roots(wp.cw_mul(t, t) + wp.cw_mul(v, v))
+        share = share_of_second(t, start, width)
+        paint_columns[slot, 0, x] = column(low[0]) + (high[0] - low[0]) * share
+        paint_columns[slot, 1, x] = column(low[1]) + (high[1] - low[1]) * share
+        paint_columns[slot, 2, x] = column(low[2]) + (high[2] - low[2]) * share
+        paint_columns[slot, 3, x] = column(low_opacity) + (high_opacity - low_opacity) * share
+
+
+@wp.kernel
+def ramp_backward(
+    # In:
+    offset: wp.int32,
+    tiles_x: wp.int32,
+    scale: wp.float32,
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_tile: wp.array[wp.int32],  # [slot_capacity]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    paint: wp.array[wp.int32],  # [shape_count]
+    spread: wp.array[wp.int32],  # [shape_count]
+    frames: wp.array[frame],  # [shape_count]
+    focus: wp.array[wp.vec3],  # [shape_count]
+    stop_first: wp.array[wp.int32],  # [shape_count + 1]
+    stop_offsets: wp.array[wp.float32],  # [stop_count]
+    stop_colors: wp.array[wp.vec3],  # [stop_count]
+    stop_opacities: wp.array[wp.float32],  # [stop_count]
+    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] written
+    stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
+    stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
+    stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
+):
+    """One thread a shape sums its visible slots in a fixed order: the same bits on every run."""
+    shape = offset + wp.tid()
+    first = stop_first[shape]
+    if not is_gradient(paint[shape]) or not is_ramp(
+        spread[shape], focus[shape], stop_offsets, first, stop_first[shape + 1]
+    ):
+        return
+    start = stop_offsets[first]
+    width = stop_offsets[first + 1] - start
+    between = stop_colors[first + 1] - stop_colors[first]
+    opacity_between = stop_opacities[first + 1] - stop_opacities[first]
+    f = frames[shape]
+    linear = paint[shape] == LINEAR
+    down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
+    row = rows()
+    zero = column(0.0)
+    one = column(1.0)
+    red = zero
+    green = zero
+    blue = zero
+    opacity = zero
+    red_high = zero
+    green_high = zero
+    blue_high = zero
+    opacity_high = zero
+    by_t = zero
+    by_t_high = zero
+    # Of the place in unit space, and that times each coordinate.
+    by_u = zero
+    by_v = zero
+    u_by_u = zero
+    u_by_v = zero
+    v_by_u = zero
+    v_by_v = zero
+    columns = int(TILE)  # a loop that is not unrolled, which takes long to compile
+    for slot in range(slot_first[shape], slot_last[shape]):
+        state = slot_state[slot]
+        if state & COVERED != 0 and state & HIDDEN == 0:
+            for x in range(columns):
+                top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                u = column(top[0]) + down[0] * row
+                v = column(top[1]) + down[1] * row
+                t = u
+                if not linear:
+                    t = roots(wp.cw_mul(u, u) + wp.cw_mul(v, v))
+                share = share_of_second(t, start, width)
+                g_red = paint_columns[slot, 0, x]
+                g_green = paint_columns[slot, 1, x]
+                g_blue = paint_columns[slot, 2, x]
+                g_opacity = paint_columns[slot, 3, x]
+                red = red + g_red
+                green = green + g_green
+                blue = blue + g_blue
+                opacity = opacity + g_opacity
+                red_high = red_high + wp.cw_mul(share, g_red)
+                green_high = green_high + wp.cw_mul(share, g_green)
+                blue_high = blue_high + wp.cw_mul(share, g_blue)
+                opacity_high = opacity_high + wp.cw_mul(share, g_opacity)
+                step = between[0] * g_red + between[1] * g_green + between[2] * g_blue
+                step = (step + opacity_between * g_opacity) / width
+                # Beyond the stops nothing changes with t.
+                step = wp.cw_mul(step, wp.min(STEEP * share, one))
+                step = wp.cw_mul(step, wp.min(STEEP * (one - share), one))
+                by_t = by_t + step
+                by_t_high = by_t_high + wp.cw_mul(share, step)
+                if linear:
+                    by_u = by_u + step
+                    u_by_u = u_by_u + wp.cw_mul(u, step)
+                    v_by_u = v_by_u + wp.cw_mul(v, step)
+                else:
+                    step = wp.cw_div(step, wp.max(t, column(TINY)))
+                    to_u = wp.cw_mul(u, step)
+                    to_v = wp.cw_mul(v, step)
+                    by_u = by_u + to_u
+                    by_v = by_v + to_v
+                    u_by_u = u_by_u + wp.cw_mul(u, to_u)
+                    u_by_v = u_by_v + wp.cw_mul(u, to_v)
+                    v_by_u = v_by_u + wp.cw_mul(v, to_u)
+                    v_by_v = v_by_v + wp.cw_mul(v, to_v)
+    high = wp.vec3(total(red_high), total(green_high), total(blue_high))
+    stop_colors_grad[first] = wp.vec3(total(red), total(green), total(blue)) - high
+    stop_colors_grad[first + 1] = high
+    stop_opacities_grad[first] = total(opacity) - total(opacity_high)
+    stop_opacities_grad[first + 1] = total(opacity_high)
+    stop_offsets_grad[first] = total(by_t_high) - total(by_t)
+    stop_offsets_grad[first + 1] = -total(by_t_high)
+    # A frame that moves takes the place in unit space the other way.
+    origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
+    along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
+    across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
+    frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+
+
+@wp.kernel
+def tie_circles(
+    # In:
+    offset: wp.int32,
+    circular: wp.array[wp.int32],  # [shape_count] 1 where the frame is a circle's
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] updated
+):
+    """A circle stays one: its second axis is the first one, turned by a right angle."""
+    i = offset + wp.tid()
+    if circular[i] == 1:
+        g = frames_grad[i]
+        x = g[2] + g[5]
+        y = g[3] - g[4]
+        frames_grad[i] = frame(g[0], g[1], x, y, -y, x)

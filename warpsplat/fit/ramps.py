@@ -1,0 +1,239 @@
+"""Linear and radial ramps that the error asks for: least squares on what is seen of each shape.
+
+Where d(p) is added to a shape's colour, the image changes by seen(p) d(p), so that the squared error is
+quadratic in the numbers of d. Of all d in the span of 1, x, y and x^2 + y^2 that go along one line of
+colours, the best is a singular vector of moments, sums over pixels. Without the square it is a linear ramp;
+with it, it says around which point a radial one lies, whose colours are then found by sums along the radius.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.fit.step import Step
+from warpsplat.kernels import constants
+from warpsplat.scene import GRADIENTS, FloatArray
+from warpsplat.scene.geometry import bounds
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+TILE = constants.TILE
+
+REACH = 2.0
+"""From the middle of a ramp to its ends, over the standard deviation of what is seen along it: what is spread
+evenly ends at sqrt(3)."""
+
+FAR = 4.0
+"""A radial ramp's centre is no further from the middle of its shape's box than this, in halves of the box's
+longer side: beyond, a linear one does."""
+
+RIDGE = 1e-6
+"""Added to variances in the same unit: a shape of one pixel has no ramp."""
+
+SLOTS_AT_ONCE = 4096
+"""Bounds the memory to some 40 MB."""
+
+
+@dataclass(frozen=True)
+class Ramps:
+    """A ramp of two stops for each shape."""
+
+    gain: Floats
+    """What the mean squared error falls by, beyond what the best flat colour does, shape (shape,)."""
+    frames: FloatArray
+    """As ``Scene.frames``, shape (shape, 6)."""
+    offsets: FloatArray
+    """Of the stops, shape (shape, 2)."""
+    colors: FloatArray
+    """Of the stops, sRGB in [0, 1], shape (shape, 2, 3)."""
+
+
+@dataclass(frozen=True)
+class Slots:
+    """What the sums are taken over: pixels of slots, by column and row of the tile."""
+
+    shape: npt.NDArray[np.int32]
+    """Shape (slot,)."""
+    x: Floats
+    """Of the columns, from the middle of the shape's box in halves of its longer side, shape (slot, TILE)."""
+    y: Floats
+    """Of the rows, likewise."""
+    weight: FloatArray
+    """Importance x seen^2, shape (slot, TILE, TILE)."""
+    pull: FloatArray
+    """Importance x seen x what the image lacks, shape (slot, 3, TILE, TILE)."""
+    color: FloatArray
+    """Of gradients, shape (slot, 3, TILE, TILE); 0 of flat shapes."""
+
+
+class Survey:
+    """What is seen of each shape of a step's scene, and what the image lacks there.
+
+    Everything counts as if each gradient had its mean colour, so that flat shapes and gradients compare.
+    """
+
+    def __init__(self, step: Step) -> None:
+        """Right after ``forward_complete`` of the step's renderer."""
+        renderer = step.renderer
+        self.scene = step.state.scene()
+        self._viewport = renderer.viewport
+        self._visible = renderer.visible()
+        self._gradient = np.isin(self.scene.paint, GRADIENTS)
+        lacking = step.aim.target.numpy() - renderer.film.buffers.image.numpy()
+        if lacking.shape[1] == 4:  # the error is the mean of those on black and on white
+            lacking = lacking[:, :3] - 0.5 * lacking[:, 3:]
+        self._lacking = lacking
+        weights = step.aim.importance if step.aim.weighted else renderer.film.buffers.inside
+        self._importance = weights.numpy()
+        boxes = bounds(self.scene).astype(np.float64)
+        self._middle = 0.5 * (boxes[:, :2] + boxes[:, 2:])
+        self._half = np.maximum(0.5 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1), 0.5)
+        self._values = 3 * self._viewport.pixel_count
+        self._measure()
+
+    def _slots(self, shapes: Bools) -> Iterator[Slots]:
+        """Those of ``shapes``, some at a time."""
+        seen, scale = self._visible, self._viewport.scale
+        at = np.arange(TILE) + 0.5
+        chosen = np.flatnonzero(shapes[seen.shape])
+        for rows in np.split(chosen, range(SLOTS_AT_ONCE, len(chosen), SLOTS_AT_ONCE)):
+            shape, tile = seen.shape[rows], seen.tile[rows]
+            across, down = tile % self._viewport.tiles_x, tile // self._viewport.tiles_x
+            x, y = (
+                ((TILE * index[:, None] + at) / scale - self._middle[shape, k, None])
+                / self._half[shape, None]
+                for k, index in enumerate((across, down))
+            )
+            share, importance = seen.share[rows], self._importance[tile]
+            color = np.zeros((len(rows), 3, TILE, TILE), np.float32)
+            bent = self._gradient[shape]
+            color[bent] = seen.color[np.searchsorted(seen.colored, rows[bent])]
+            weighted = importance * share
+            yield Slots(shape, x, y, weighted * share, weighted[:, None] * self._lacking[tile], color)
+
+    def _measure(self) -> None:
+        """Moments of what is seen, by powers of x and y, and of what pulls at it."""
+        count = len(self.scene)
+        moments = np.zeros((count, 5, 5))
+        pulls, colors = np.zeros((count, 3, 3, 3)), np.zeros((count, 3, 3, 3))
+        lost, squares = np.zeros(count), np.zeros((count, 3))
+        for slots in self._slots(np.ones(count, np.bool_)):
+            x, y = (p[..., None] ** np.arange(5) for p in (slots.x, slots.y))
+            np.add.at(moments, slots.shape, np.swapaxes(x, 1, 2) @ slots.weight @ y)
+            x, y = np.swapaxes(x[:, None, :, :3], 2, 3), y[:, None, :, :3]
+            np.add.at(pulls, slots.shape, x @ slots.pull @ y)
+            if self._gradient[slots.shape].any():
+                weighted = slots.weight[:, None] * slots.color
+                np.add.at(colors, slots.shape, x @ weighted @ y)
+                np.add.at(lost, slots.shape, 2 * (slots.pull * slots.color).sum(axis=(1, 2, 3)))
+                np.add.at(squares, slots.shape, (weighted * slots.color).sum(axis=(2, 3)))
+        gram, pull, colored = _gram(moments), _by_basis(pulls), _by_basis(colors)
+        weight = np.maximum(gram[:, 0, :1], 1e-12)
+        gradient = self._gradient[:, None]
+        self.mean: Floats = np.where(gradient, colored[:, 0] / weight, self.scene.colors)
+        """Mean colour of what is seen of each shape, (shape, 3)."""
+        # With the mean m in place of c, the image lacks seen (c - m) more.
+        lost += (squares - self.mean**2 * weight - 2 * self.mean * pull[:, 0]).sum(axis=1)
+        lost -= (pull[:, 0] ** 2 / weight).sum(axis=1)
+        self.flattening: Floats = np.where(self._gradient, lost, 0) / self._values
+        """What the mean squared error grows by where a gradient becomes its best flat colour, (shape,)."""
+        missing = colored - gram[:, 0, :, None] * self.mean[:, None]
+        pull += np.where(gradient[..., None], missing, 0)
+        self._weight, self._pull = weight[:, 0], pull[:, 0]
+        self._place = gram[:, 0, 1:] / weight
+        """Mean of x, y, x^2 + y^2."""
+        spread = gram[:, 1:, 1:] / weight[..., None] - self._place[:, :, None] * self._place[:, None]
+        self._spread = spread + RIDGE * np.eye(3)
+        self._slope = pull[:, 1:] - self._place[..., None] * pull[:, :1]
+        self.flat: Floats = self.mean + pull[:, 0] / weight
+        """Best flat colour, (shape, 3)."""
+
+    def _steepest(self, size: int) -> tuple[Floats, Floats, Floats]:
+        """The best change of colour along one line of them, of the first ``size`` of x, y, x^2 + y^2.
+
+        Returns:
+            how the way along the line depends on these, shape (shape, size), in units of its standard
+            deviation; the colours of such a unit, shape (shape, 3); the gain, shape (shape,).
+        """
+        lower = np.linalg.cholesky(self._spread[:, :size, :size])
+        left, sizes, right = np.linalg.svd(np.linalg.solve(lower, self._slope[:, :size]))
+        along = np.linalg.solve(np.swapaxes(lower, 1, 2), left[:, :, :1])[..., 0]
+        tints = (sizes[:, 0] / self._weight)[:, None] * right[:, 0]
+        return along, tints, sizes[:, 0] ** 2 / (self._weight * self._values)
+
+    def linear(self) -> Ramps:
+        """The best linear ramp of each shape."""
+        along, tints, gain = self._steepest(2)
+        # The axis goes through the middle of what is seen, REACH units of the way to either side.
+        unit = along / np.maximum((along**2).sum(axis=1), 1e-12)[:, None]
+        start = self._middle + self._half[:, None] * (self._place[:, :2] - REACH * unit)
+        axis = self._half[:, None] * 2 * REACH * unit
+        frames = np.concatenate([start, axis, _turned(axis)], axis=1)
+        return _ramps(gain, frames, np.zeros(len(gain)), self.flat - REACH * tints, self.flat + REACH * tints)
+
+    def radial(self, least: float) -> Ramps:
+        """The best radial ramp of each shape where its gain may be over ``least``; other gains are 0."""
+        along, _, promise = self._steepest(3)
+        bend = np.where(np.abs(along[:, 2]) > 1e-9, along[:, 2], 1e-9)
+        centre = -along[:, :2] / (2 * bend[:, None])
+        chosen = (np.linalg.norm(centre, axis=1) < FAR) & (promise > least)
+        count = len(chosen)
+        gain, radii, slope = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
+        for slots in self._slots(chosen):
+            x, y = slots.x - centre[slots.shape, :1], slots.y - centre[slots.shape, 1:]
+            r = np.hypot(x[:, :, None], y[:, None])
+            weighted = slots.weight * r
+            sums = [weighted.sum(axis=(1, 2)), (weighted * r).sum(axis=(1, 2))]
+            np.add.at(radii, slots.shape, np.stack(sums, axis=1))
+            lacking = slots.pull + slots.weight[:, None] * _off(slots, self._gradient, self.mean)
+            np.add.at(slope, slots.shape, (lacking * r[:, None]).sum(axis=(2, 3)))
+        middle = radii[:, 0] / self._weight
+        spread = np.maximum(radii[:, 1] / self._weight - middle**2, 0) + RIDGE
+        slope -= middle[:, None] * self._pull
+        gain[chosen] = ((slope**2).sum(axis=1) / (self._weight * spread * self._values))[chosen]
+        slope /= (self._weight * spread)[:, None]
+        reach = REACH * np.sqrt(spread)
+        first, last = np.maximum(middle - reach, 0), middle + reach
+        ends = (self.flat + (end - middle)[:, None] * slope for end in (first, last))
+        axis = np.stack([self._half * last, np.zeros(count)], axis=1)
+        place = self._middle + self._half[:, None] * centre
+        return _ramps(gain, np.concatenate([place, axis, _turned(axis)], axis=1), first / last, *ends)
+
+
+def _off(slots: Slots, gradient: Bools, mean: Floats) -> Floats:
+    """Colours of gradients less their mean, else 0; (slot, 3, TILE, TILE)."""
+    away = slots.color - mean[slots.shape][:, :, None, None]
+    return np.where(gradient[slots.shape][:, None, None, None], away, 0)
+
+
+def _turned(axis: Floats) -> Floats:
+    return np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+
+
+def _ramps(gain: Floats, frames: Floats, first: Floats, low: Floats, high: Floats) -> Ramps:
+    """``first``: offset of the first stop, shape (shape,); the other is at 1."""
+    offsets = np.stack([first, np.ones(len(first))], axis=1)
+    colors = np.clip(np.stack([low, high], axis=1), 0, 1)
+    return Ramps(gain, *(np.asarray(values, np.float32) for values in (frames, offsets, colors)))
+
+
+BASIS = (((0, 0),), ((1, 0),), ((0, 1),), ((2, 0), (0, 2)))
+"""1, x, y, x^2 + y^2 as sums of powers of x and y."""
+
+
+def _by_basis(sums: Floats) -> Floats:
+    """Sums by colour and powers, (shape, 3, power, power) -> by basis and colour, (shape, 4, 3)."""
+    return np.stack([sum(sums[:, :, i, j] for i, j in terms) for terms in BASIS], axis=1)
+
+
+def _gram(moments: Floats) -> Floats:
+    """Sums by powers, (shape, power, power) -> of products of the basis, (shape, 4, 4)."""
+    products = [
+        sum(moments[:, i + k, j + m] for i, j in one for k, m in other) for one in BASIS for other in BASIS
+    ]
+    return np.stack(products, axis=1).reshape(-1, 4, 4)
