@@ -13,6 +13,9 @@ from warpsplat.trace.grids import Bools, Floats, Ints
 LOOK_AHEAD = 1500
 """Strokes of the tour among which a part of it may be turned round."""
 
+FEW, BEGINS = 200, 8
+"""Strokes up to which tours from several places are tried, and how many places."""
+
 MANY = 1500
 """Strokes from which on a tour is improved once, by turning parts alone."""
 
@@ -39,13 +42,10 @@ def toured(scene: Scene) -> Scene:
     here = np.zeros(2)
     for layer in np.unique(scene.layer).tolist():
         index = np.flatnonzero(scene.layer == layer)
-        tours = (
-            _improved(starts[index], ends[index], *first)
-            for first in (
-                _greedy(starts[index], ends[index], here),
-                (np.arange(len(index)), np.zeros(len(index), np.bool_)),
-            )
-        )
+        begins = [here, *starts[index[:: max(1, -(-len(index) // BEGINS))]]] if len(index) <= FEW else [here]
+        first = [_greedy(starts[index], ends[index], begin) for begin in begins]
+        first.append((np.arange(len(index)), np.zeros(len(index), np.bool_)))
+        tours = [_improved(starts[index], ends[index], *tour) for tour in first]
         tour, turned = min(tours, key=lambda found: _lifted(starts[index], ends[index], *found))
         order += index[tour].tolist()
         backwards += turned.tolist()
