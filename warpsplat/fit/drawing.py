@@ -33,6 +33,10 @@ COLOR_RATE = 0.004
 """Learning rate of colours: a level."""
 
 
+GAIN, PATIENCE = 0.005, 40
+"""Where the error has not fallen by this share in so many steps, the rest is not worth its time."""
+
+
 @dataclass(frozen=True)
 class Refinement:
     """How to fit a drawing."""
@@ -96,15 +100,19 @@ def refine_drawing(
     target = matching(target, scene.canvas)
     step = start(target, drawing, backend, how, held)
     best, least = _look(step)
+    gained = 0
+    """Steps at the last gain that counts."""
     for done in range(1, how.steps + 1):
         step.advance()
         if done % CHECK_INTERVAL == 0 or done == how.steps:
             found, error = _look(step)
+            if error < (1 - GAIN) * least:
+                gained = done
             if error < least:
                 best, least = found, error
             if report:
                 report(Progress(done, how.steps, step.psnr(), 0.0, done / how.steps, True))
-        if stop and stop():
+        if done - gained >= PATIENCE or (stop and stop()):
             break
     if how.colors == "fitted":
         snapped = replace(best, colors=own_colors(best, target))
