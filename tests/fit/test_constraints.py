@@ -158,3 +158,18 @@ def test_arrays_that_do_not_fit(field: str) -> None:
     arrays[field] = arrays[field][:-1]
     with pytest.raises(ValueError, match=field):
         Drawing(made.scene, **arrays)
+
+
+@pytest.mark.parametrize(("line", "bound"), [(10.0, True), (1.0, False)])
+def test_a_line_of_no_length_says_no_direction(line: float, bound: bool) -> None:
+    """The rounding of its end would turn a handle twenty times as long by pixels."""
+    points = np.array(
+        [[10, 10], [10, 10], [10, 10], [12, 12], [26, 24], [40, 20], [50, 50], [40, 50], [20, 40]]
+    )
+    outline = points.astype(float)
+    outline[3] = outline[0] + line * np.array([0.6, 0.8])
+    outline[1:3] = outline[0] + np.outer([1 / 3, 2 / 3], outline[3] - outline[0])
+    outline[4] = outline[3] + 20 * np.array([0.6, 0.8])
+    kinds = [Joint.CORNER, *2 * [Joint.LINE_HANDLE], Joint.SMOOTH, *2 * [Joint.FREE], Joint.CORNER]
+    made = drawing(Canvas(64, 64, None), ((0, 0, 0), [(outline, [*kinds, *2 * [Joint.FREE]])]))
+    assert (Constraints.of(made).joint_point.tolist() == [3]) is bound

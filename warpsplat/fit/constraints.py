@@ -22,6 +22,10 @@ Links = npt.NDArray[np.intp]
 EQUAL = 1e-3
 """Coordinates that differ by less [canvas units] are one, as those of the ends of an upright line."""
 
+LEVER = 8.0
+"""Length of a handle over that of a line up to which the line says where it points: the rounding of its ends
+turns a shorter one."""
+
 BEFORE, AFTER = 1, 2
 """Which neighbours of a smooth joint are free handles; the other one is the far end of a line."""
 
@@ -172,6 +176,9 @@ def _smooth_joints(
         keys = {int(places[handle]) for handle in handles}
         if not handles or keys & bound:
             continue
+        ends = [int(end) for end in (line_start[p], line_end[p]) if end != NONE]
+        if ends and _reach(points, p, handles) > LEVER * _reach(points, p, ends):
+            continue
         bound |= keys
         before = handles[0] if free & BEFORE else int(line_start[p])
         after = p + 1 if free & AFTER else int(line_end[p])
@@ -182,6 +189,11 @@ def _smooth_joints(
         else:
             joints.append((p, before, after, free))
     return joints
+
+
+def _reach(points: FloatArray, p: int, others: list[int]) -> float:
+    """How far from ``p`` the furthest of ``others`` lies."""
+    return float(np.linalg.norm(points[others] - points[p], axis=1).max())
 
 
 def _handles(before: int, after: int, free: int) -> list[int]:

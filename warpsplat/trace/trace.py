@@ -32,6 +32,9 @@ COARSE = 0.62
 NOISY = 0.02
 """What a level of noise adds to it [px]."""
 
+MOVED = 0.6
+"""How far a handle may be from that line [px]."""
+
 BENT = 8.0
 """Angle between handles up to which they lie on one line [degrees]."""
 
@@ -189,7 +192,12 @@ def _joints(contour: Pieces) -> Ints:
     arriving, leaving = before[:, 3] - before[:, 2], cubics[:, 1] - cubics[:, 0]
     cross = arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0]
     angle = np.degrees(np.abs(np.arctan2(cross, (arriving * leaving).sum(axis=1))))
-    smooth = (angle < BENT) & ~(lines & straight_before)
+    # What bends a long handle by a small angle moves a curve by pixels.
+    length, length_before = (np.linalg.norm(way, axis=1) for way in (leaving, arriving))
+    length, length_before = np.where(lines, np.inf, length), np.where(straight_before, np.inf, length_before)
+    reach = np.minimum(length, length_before)
+    moved = np.where(np.isinf(reach), 0, reach) * np.sin(np.radians(np.minimum(angle, 90)))
+    smooth = (angle < BENT) & (moved < MOVED) & ~(lines & straight_before)
     joints = np.full((len(cubics), 3), FREE, np.int32)
     joints[:, 0] = np.where(smooth, SMOOTH, CORNER)
     joints[lines, 1:] = LINE_HANDLE
