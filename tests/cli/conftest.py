@@ -9,7 +9,10 @@ from PIL import Image
 
 @pytest.fixture
 def image(tmp_path: Path) -> Path:
+    """With grain, so that it is taken for a photograph."""
     path = tmp_path / "photo.png"
     y, x = np.mgrid[:40, :60]
-    Image.fromarray(np.stack([4 * x, 6 * y, 0 * x + 90], axis=2).astype(np.uint8)).save(path)
+    smooth = np.stack([4 * x, 6 * y, 0 * x + 90], axis=2)
+    grain = np.random.default_rng(0).normal(0, 4, smooth.shape)
+    Image.fromarray(np.clip(smooth + grain, 0, 255).astype(np.uint8)).save(path)
     return path

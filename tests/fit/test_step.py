@@ -25,7 +25,7 @@ from warpsplat.metrics import psnr
 from warpsplat.render.backend import Backend
 from warpsplat.render.renderer import Capacity
 from warpsplat.render.tiles import from_tiles
-from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Picture, Scene
+from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Paint, Picture, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.viewer import on_white, render_svg
 
@@ -80,7 +80,7 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
 
 def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     """All that the package has, found by walking it: a graph can hold it, and something launches it."""
-    launched = {"removal_cost"}  # between steps
+    launched = {"removal_cost", "visibility"}  # between steps
     for renderer in get_args(Renderer):
         settings = make_settings(renderer=renderer, iterations=50, xing=0.01)
         scene = mixed_scene(64, 48, splines=renderer == "exact")
@@ -101,7 +101,10 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     tied = start(np.ones((32, 48, 3), np.float32), seam(), Backend.on(device, 1), Refinement())
     assert tied._graph is not None
     launched |= {launch.name for program in tied.programs for launch in program.launches}
-    layered = mixed_scene(64, 48)
+    layered = with_gradients(mixed_scene(64, 48))
+    unit = np.array([30, 20, 9, 0, 0, 9], np.float32)  # a circle
+    radial = (layered.paint == Paint.RADIAL)[:, None]
+    layered = replace(layered, frames=np.where(radial, unit, layered.frames))
     layered = replace(layered, layer=np.minimum(np.arange(len(layered)), 1).astype(np.int32))
     step = step_for(picture(), make_settings(iterations=50), device, threads=1, scene=layered)
     assert step._graph is not None

@@ -30,7 +30,8 @@ def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixt
     assert (values["made"], values["skipped"], values["failed"]) == (0, 2, 1)
     assert times == {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
 
-    Image.new("RGB", (32, 24), "red").save(folder / "in" / "a.png")  # another image under the old name
+    noise = np.random.default_rng(9).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(folder / "in" / "a.png")  # another image under the old name
     (folder / "in" / "broken.png").unlink()
     assert run("batch", path, "--json") == 0
     assert json.loads(capsys.readouterr().out)["made"] == 1

@@ -39,11 +39,18 @@ def test_image_and_gradients_of_dashes(device: str, cap: Cap, join: Join, dash: 
     compare(styled_scene(cap, join, dash, seed=4).take(np.array([dash % 3])), device)
 
 
+SQUARE = [
+    (cap, join, dash)
+    for cap, join, dash in itertools.product(Cap, Join, range(NO_DASHES, len(DASHES)))
+    if (cap + join + dash) % 3 == 0
+]
+"""Every cap with every join, and each pattern of dashes with every cap and with every join."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("dash", range(NO_DASHES, len(DASHES)))
-@pytest.mark.parametrize(("cap", "join"), list(itertools.product(Cap, Join)))
-@pytest.mark.parametrize("lanes", [1, 16])
-def test_all_styles(device: str, cap: Cap, join: Join, dash: int, lanes: int) -> None:
+@pytest.mark.parametrize(("cap", "join", "dash"), SQUARE)
+def test_all_styles(device: str, cap: Cap, join: Join, dash: int) -> None:
+    lanes = 16 if dash % 2 else 1
     compare(styled_scene(cap, join, dash, seed=6), device, 1.3, lanes=lanes)
 
 

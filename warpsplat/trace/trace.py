@@ -74,31 +74,33 @@ def trace(image: FloatArray, *, most: int | None = None) -> Traced:
         most: the most paths; the regions that are seen least are given up. None: as many as there are.
     """
     levels = np.asarray(image, np.float32) * 255
-    if levels.shape[2] == 3:
+    grounded = levels.shape[2] == 3
+    if grounded:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
     regions = fewer_regions(find_regions(levels), MOST_REGIONS)
-    traced = trace_regions(levels, regions)
+    traced = trace_regions(levels, regions, grounded=grounded)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
         # Regions of one colour may be one path, so that there may be more of them than paths.
         target = max(2, min(target - 1, int(target * most / len(traced.scene))))
         regions = fewer_regions(regions, target)
-        traced = trace_regions(levels, regions)
+        traced = trace_regions(levels, regions, grounded=grounded)
     return traced
 
 
-def trace_regions(image: Floats, regions: Regions) -> Traced:
+def trace_regions(image: Floats, regions: Regions, *, grounded: bool = True) -> Traced:
     """Trace regions that are known.
 
     Args:
         image: premultiplied, 0..255, shape (height, width, 4).
         regions: of the image.
+        grounded: whether the canvas may have a colour, where all is opaque.
     """
     loops = find_loops(regions.labels, image)
     offsets = crack_offsets(loops, image, regions.labels, regions.pure)
     points, good = places(loops, offsets)
     tree = find_tree(loops, len(regions.paint))
-    unpainted, ground = _ground(regions, tree)
+    unpainted, ground = _ground(regions, tree, grounded=grounded)
     sizes = np.bincount(regions.labels.reshape(-1), minlength=len(regions.paint))
     layers = find_layers(loops, tree, sizes, unpainted)
     opacity = np.array([coloring.color[3] for coloring in regions.colorings])[regions.paint]
@@ -135,10 +137,11 @@ def tolerance_of(offsets: Floats, loops: Loops, noise: float) -> float:
     return (COARSE if moved.mean() < 0.1 else TOLERANCE) + NOISY * noise if len(moved) else TOLERANCE
 
 
-def _ground(regions: Regions, tree: Tree) -> tuple[Bools, Coloring | None]:
+def _ground(regions: Regions, tree: Tree, *, grounded: bool) -> tuple[Bools, Coloring | None]:
     """Regions that are not painted, and the colour of the canvas, None if it is transparent."""
     clear = np.array([coloring.clear for coloring in regions.colorings])
-    if clear[regions.paint].any() or any(c.color[3] < OPAQUE for c in regions.colorings):
+    opaque = all(c.color[3] >= OPAQUE for c in regions.colorings)
+    if not grounded or not opaque or clear[regions.paint].any():
         return clear[regions.paint], None
     painted = regions.paint[regions.labels]
     edge = np.concatenate([painted[0], painted[-1], painted[:, 0], painted[:, -1]])
