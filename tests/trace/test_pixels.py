@@ -34,6 +34,14 @@ def test_nothing_is_lost(size: int) -> None:
     assert score.paths == 4, "and the ground"
 
 
+def test_colours_are_those_of_eight_bits() -> None:
+    """An image of 16 bits may have many more."""
+    image = noise(16, 3)
+    finer = image + np.random.default_rng(2).uniform(-0.4, 0.4, image.shape).astype(np.float32) / 255
+    scene, _ = trace_pixels(np.clip(finer, 0, 1).astype(np.float32))
+    assert len(scene) == 2
+
+
 def test_what_is_empty_stays_empty() -> None:
     image = np.concatenate([noise(16, 4), np.ones((16, 16, 1), np.float32)], axis=2)
     image[np.random.default_rng(1).random((16, 16)) < 0.3] = 0

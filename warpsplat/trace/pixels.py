@@ -16,6 +16,9 @@ from warpsplat.trace.grids import Bools, Floats, Ints
 MOST_CELLS = 1 << 18
 """Of pixel art: a picture with more has outlines that nobody would edit."""
 
+SAME = 0.5 / 255
+"""Colours that differ by less are one in 8 bits."""
+
 Point = tuple[int, int]
 
 
@@ -26,7 +29,7 @@ class Cells:
     colors: Ints
     """Number of each cell's colour, shape (row, column)."""
     palette: Floats
-    """The image's values of each colour, shape (color, 3 or 4)."""
+    """sRGB in [0, 1] of each colour, and its opacity if there is one; shape (color, 3 or 4)."""
     size: int
     """Side of a cell [px]."""
 
@@ -40,16 +43,18 @@ def find_cells(image: FloatArray) -> Cells:
     Raises:
         ImageError: there are more than ``MOST_CELLS``.
     """
-    height, width = image.shape[:2]
-    columns = np.flatnonzero((np.diff(image, axis=1) != 0).any(axis=(0, 2))) + 1
-    rows = np.flatnonzero((np.diff(image, axis=0) != 0).any(axis=(1, 2))) + 1
+    height, width, channels = image.shape
+    shown = np.concatenate([straight(image), image[..., 3:]], axis=2)
+    levels = np.round(shown * 255).astype(np.uint8)  # as a file can say them
+    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
+    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
     size = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
-    cells = image[::size, ::size]
+    cells = levels[::size, ::size]
     if cells.shape[0] * cells.shape[1] > MOST_CELLS:
         shape = f"{cells.shape[1]}x{cells.shape[0]}"
         raise ImageError(f"{shape} cells of {size} px, more than pixel art may have ({MOST_CELLS})")
-    palette, colors = np.unique(cells.reshape(-1, image.shape[2]), axis=0, return_inverse=True)
-    return Cells(colors.reshape(cells.shape[:2]), palette, size)
+    palette, colors = np.unique(cells.reshape(-1, channels), axis=0, return_inverse=True)
+    return Cells(colors.reshape(cells.shape[:2]), np.asarray(palette / 255, np.float32), size)
 
 
 def outlines(inside: Bools) -> list[list[Point]]:
@@ -127,9 +132,9 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         seen = cells.palette[:, 3] > 0
     elif background is None:
         ground = int(np.argmax([sum(map(len, ring)) for ring in rings]))
-        seen[ground], background = False, cells.palette[ground]
+        seen[ground], background = False, np.asarray(cells.palette[ground], np.float32)
     else:
-        seen = (cells.palette != background).any(axis=1)
+        seen = (np.abs(cells.palette - background) > SAME).any(axis=1)
     contours = [[_lines(corners, cells.size) for corners in rings[i]] for i in np.flatnonzero(seen)]
     palette = np.asarray(cells.palette[seen], np.float32)
     opacities = palette[:, 3] if image.shape[2] == 4 else np.ones(len(palette), np.float32)
@@ -142,7 +147,7 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         starts=starts_of(np.array([len(points) for points in flat], np.int32)),
         closed=np.ones(len(flat), np.int32),
         points=np.concatenate([*flat, np.empty((0, 2))]).astype(np.float32),
-        colors=straight(palette),
+        colors=palette[:, :3],
         opacities=opacities,
         rule=np.full(len(contours), Rule.EVENODD, np.int32),
     )
