@@ -24,6 +24,7 @@ from warpsplat.render.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
+from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg
 
 
@@ -135,3 +136,14 @@ def test_new_shapes_lie_in_front_of_those_below(device: str) -> None:
     both = fit(picture(), make_settings(curves=7, iterations=30), backend, below=below).scene
     assert len(both) == 12
     np.testing.assert_array_equal(both.layer, np.repeat([0, 1], [5, 7]))
+
+
+def test_levels_are_read_back_and_refined_as_such() -> None:
+    scene = in_layers(mixed_scene(64, 48, seed=1), 2, 5)
+    text = write_svg(scene)
+    read, _ = load_scene(text, 64, 48, "x")
+    np.testing.assert_array_equal(read.layer, scene.layer)
+    result = vectorize(picture(), make_settings(iterations=10), Backend.on("cpu"), scene=read)
+    assert re.findall('<g[^>]* id="([^"]+)"', result.svg) == ["level-2", "level-5", f"level-{len(scene)}"]
+    inner = text.replace('id="level-5"', 'id="mine"')
+    assert not load_scene(inner, 64, 48, "x")[0].layer.any(), "some are in no level"

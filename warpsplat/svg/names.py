@@ -12,6 +12,9 @@ from warpsplat.scene import FloatArray, Paint, Scene
 GRADIENT = "gradient"
 """What a path is called that has no one colour."""
 
+LEVEL_ID = "level-"
+"""What the name of a layer's group begins with; the number of shapes up to its end follows."""
+
 
 def path_names(scene: Scene) -> list[str]:
     """A name for each shape: that of the CSS colour nearest to its own, and a number where others have it."""

@@ -7,7 +7,7 @@ becomes cubics. A path that is filled and stroked becomes two shapes that share 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from warpsplat.scene import (
     Scene,
     Spread,
 )
-from warpsplat.scene.scene import starts_of
+from warpsplat.scene.scene import IntArray, starts_of
 from warpsplat.svg.gradients import Flat, Gradient
 from warpsplat.svg.paths import Points, Subpath, line
 from warpsplat.svg.shapes import Shape, opacity_of
@@ -144,11 +144,20 @@ def scene_of(
         miter_limits=np.array([one.miter_limit if one else 4.0 for one in lines], np.float32),
         dash=np.array([styles[s.dashes] if s and s.dashes else NO_DASHES for s in lines], np.int32),
         dashes=tuple(styles),
+        layer=_layers([shape.level for shape in shapes]),
         colors=np.array(
             [s.paint.color if isinstance(s.paint, Flat) else (0.0, 0.0, 0.0) for s in shapes], np.float32
         ).reshape(-1, 3),
     )
     return _with_pictures(_with_gradients(scene, shapes), shapes), has_background
+
+
+def _layers(names: list[str]) -> IntArray:
+    """Number of each shape's level, where all are in one, in order; else 0."""
+    changes = [a != b for a, b in pairwise(names)]
+    if not all(names) or sum(changes) + 1 != len(set(names)):
+        return np.zeros(len(names), np.int32)
+    return np.concatenate([[0], np.cumsum(changes)]).astype(np.int32)
 
 
 def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:

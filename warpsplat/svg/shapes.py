@@ -57,6 +57,8 @@ class Shape:
     """Whether it shares its subpaths with the one before: a path that is filled and stroked."""
     is_rect: bool = False
     """Whether it is a ``rect`` element with sharp corners."""
+    level: str = ""
+    """Name of the level that it is in, of a layered file."""
     element: Element | None = None
     """That draws it and can be kept in its place; None where it cannot be."""
 

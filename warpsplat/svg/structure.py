@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -24,6 +25,7 @@ from warpsplat.svg.geometry import (
 from warpsplat.svg.gradients import Flat
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
 from warpsplat.svg.kept import Keeping, Part, shapes_of
+from warpsplat.svg.names import LEVEL_ID
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
 from warpsplat.svg.style import DRAWN, ROOT, Style
@@ -40,6 +42,9 @@ REFUSED = {
     "tref",
 }
 """Elements that show what is no shape. Those that nobody knows show nothing."""
+
+LEVEL = re.compile(rf"{LEVEL_ID}\d{{1,9}}")
+"""Names of the groups that are the levels of a layered file."""
 
 CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
 
@@ -72,6 +77,8 @@ class _Context:
     """What a link says of the size of a nested ``svg``."""
     link: _Unit | None = None
     """The outermost link that led here."""
+    level: str = ""
+    """Name of the level, of a layered file."""
 
 
 @dataclass(frozen=True)
@@ -199,12 +206,16 @@ class _Walk:
         if np.linalg.det(matrix[:2, :2]) == 0:
             return
         inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=context.depth + 1)
+        if tag == "g" and context.depth == 1 and LEVEL.fullmatch(element.get("id", "")):
+            inner = replace(inner, level=element.get("id", ""))
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         if tag in DRAWN:
             first = len(self._shapes)
             shapes = element_shapes(element, self._document, Place(style, matrix, viewport, context.paints))
             if self._keep and not context.link:
                 shapes = [replace(shape, element=element) for shape in shapes]
+            if context.level:
+                shapes = [replace(shape, level=context.level) for shape in shapes]
             self._shapes += shapes
             self._end(_End(unit, first, fraction(style["opacity"]), clip))
             return

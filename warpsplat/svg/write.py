@@ -14,7 +14,7 @@ import numpy.typing as npt
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
-from warpsplat.svg.names import path_names
+from warpsplat.svg.names import LEVEL_ID, path_names
 from warpsplat.svg.nest import Path, nested
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
@@ -127,9 +127,6 @@ def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
 
 
 STROKE_FIRST = ' paint-order="stroke"'
-
-LEVEL_ID = "level-"
-"""What the name of a layer's group begins with; the number of shapes up to its end follows."""
 
 
 def _colors(scene: Scene, ramps: Mapping[int, str]) -> list[str]:
