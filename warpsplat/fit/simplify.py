@@ -109,9 +109,12 @@ def _apart(cost: FloatArray, most: int) -> list[int]:
     """
     number = len(cost)
     chosen: list[int] = []
+    near = bytearray(number)
     for k in np.argsort(cost, kind="stable").tolist():
         if len(chosen) == most or not np.isfinite(cost[k]):
             break
-        if all(min((k - i) % number, (i - k) % number) > APART for i in chosen):
+        if not near[k]:
             chosen.append(k)
+            for i in range(k - APART, k + APART + 1):
+                near[i % number] = 1
     return chosen
