@@ -41,6 +41,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "svg",
         "metrics",
     ),
+    "torch": ("errors", "scene", "kernels", "render", "fit", "svg"),
 }
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.
 Those that are not named may import all but ``cli``."""

@@ -1,0 +1,69 @@
+"""A scene as a module with parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.units import Units
+from warpsplat.scene import Scene
+from warpsplat.svg.write import write_svg
+from warpsplat.torch.function import render
+from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, has
+
+
+class Module(torch.nn.Module):
+    """Holds a scene: a parameter for each attribute that some shape of it has."""
+
+    def __init__(self, scene: Scene, *, renderer: Any = "exact", threads: int | None = None) -> None:
+        """``renderer``, ``threads``: see ``render``."""
+        super().__init__()
+        self._layout, self._renderer, self._threads = scene, renderer, threads
+        for name, attribute in TABLE.items():
+            if name not in WITHOUT_GRADIENT and has(scene, attribute):
+                self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
+
+    def tensors(self) -> SceneTensors:
+        """The scene of the parameters; what is done with it has gradients."""
+        return SceneTensors(self._layout, dict(self.named_parameters()))
+
+    def forward(self, width: int | None = None, height: int | None = None) -> torch.Tensor:
+        """See ``render``."""
+        return render(self.tensors(), width, height, renderer=self._renderer, threads=self._threads)
+
+    def parameter_groups(
+        self, settings: Settings | None = None, *, rate: float = 1.0
+    ) -> list[dict[str, Any]]:
+        """What an optimiser takes: each attribute with the learning rate that it has in a run.
+
+        Args:
+            settings: of the run; default: the usual one.
+            rate: what all of them are multiplied by.
+        """
+        settings = settings or Settings()
+        units = Units.of(settings, self._layout.canvas)
+        return [
+            {
+                "params": [parameter],
+                "name": name,
+                "lr": rate * units.resolve(settings.rates[name], TABLE[name].rate_unit),
+            }
+            for name, parameter in self.named_parameters()
+        ]
+
+    @torch.no_grad()
+    def project(self) -> None:
+        """Bring every attribute back within its bounds, as a run does after each step."""
+        units = Units.of(Settings(), self._layout.canvas)
+        for name, parameter in self.named_parameters():
+            parameter.clamp_(units.resolve(*TABLE[name].low), units.resolve(*TABLE[name].high))
+
+    def scene(self) -> Scene:
+        """The scene as it is."""
+        return self.tensors().scene()
+
+    def to_svg(self) -> str:
+        """The scene as an SVG file's text."""
+        return write_svg(self.scene())
