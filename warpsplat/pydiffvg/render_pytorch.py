@@ -1,0 +1,167 @@
+"""DiffVG's rendering function, on our renderer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Any
+
+import torch
+
+from warpsplat.errors import UsageError
+from warpsplat.pydiffvg.arguments import SceneArguments, take_down
+from warpsplat.pydiffvg.assemble import LAYOUTS, assemble, is_opaque, outlines_only
+from warpsplat.pydiffvg.device import get_device
+from warpsplat.pydiffvg.pixel_filter import PixelFilter
+from warpsplat.pydiffvg.shape import Shape, ShapeGroup
+from warpsplat.torch import render
+
+Tensor = torch.Tensor
+
+FAINT = 1e-6
+"""Opacity below which colours are not divided by it."""
+
+_print_timing = False
+
+
+def set_print_timing(val: bool) -> None:
+    """Whether each forward pass prints how long it took."""
+    global _print_timing  # noqa: PLW0603 - DiffVG's interface
+    _print_timing = val
+
+
+class OutputType(IntEnum):
+    """What a picture shows."""
+
+    color = 1
+    sdf = 2
+    """Distances to the nearest outline: not there."""
+
+
+class RenderFunction:
+    """Used as DiffVG's autograd function is: ``RenderFunction.apply(width, ..., *serialize_scene(...))``."""
+
+    @staticmethod
+    def serialize_scene(
+        canvas_width: int,
+        canvas_height: int,
+        shapes: Sequence[Shape],
+        shape_groups: Sequence[ShapeGroup],
+        filter: PixelFilter | None = None,
+        output_type: OutputType = OutputType.color,
+        use_prefiltering: bool = False,
+        eval_positions: Tensor | None = None,
+    ) -> list[Any]:
+        """A scene as further arguments of ``apply``.
+
+        Args:
+            canvas_width: [canvas units]
+            canvas_height: [canvas units]
+            shapes: that the groups name.
+            shape_groups: from the back to the front.
+            filter: default: the one there is.
+            output_type: ``color``.
+            use_prefiltering: not read; pictures are never sampled.
+            eval_positions: none.
+
+        Raises:
+            UsageError: what cannot be rendered.
+        """
+        if output_type != OutputType.color or (eval_positions is not None and len(eval_positions)):
+            raise UsageError("signed distances (OutputType.sdf, eval_positions) are not there, only colours")
+        (filter or PixelFilter()).check()
+        return [take_down(canvas_width, canvas_height, shapes, shape_groups, get_device())]
+
+    @staticmethod
+    def apply(
+        width: int,
+        height: int,
+        num_samples_x: int,
+        num_samples_y: int,
+        seed: int,
+        background_image: Tensor | None,
+        *args: Any,
+    ) -> Tensor:
+        """A picture; gradients flow to all tensors of the scene, and to the background.
+
+        Args:
+            width: [px]
+            height: [px]
+            num_samples_x: not read: a pixel is the mean over its whole area.
+            num_samples_y: the same.
+            seed: not read: nothing is random.
+            background_image: sRGB and opacity, shape (height, width, 4).
+            args: what ``serialize_scene`` gave.
+
+        Returns:
+            sRGB and opacity, float32, shape (height, width, 4); as in DiffVG, each is the pixel's mean of
+            the colours, not premultiplied, of its points, where those without shape are black.
+
+        Raises:
+            UsageError: arguments that are none, a background of another shape.
+        """
+        if len(args) != 1 or not isinstance(args[0], SceneArguments):
+            raise UsageError("RenderFunction.apply takes what RenderFunction.serialize_scene gave, unchanged")
+        return render_scene(args[0], int(width), int(height), background_image)
+
+    @staticmethod
+    def render_grad(*_: Any) -> Tensor:
+        """Not there.
+
+        Raises:
+            UsageError: always.
+        """
+        raise UsageError("RenderFunction.render_grad, gradients by pixel of translation, is not there")
+
+
+def render_scene(scene: SceneArguments, width: int, height: int, background: Tensor | None) -> Tensor:
+    """See ``RenderFunction.apply``."""
+    began = time.perf_counter()
+    device = get_device()
+    if background is not None:
+        background = background.to(device, torch.float32)
+        if tuple(background.shape) != (height, width, 4):
+            raise UsageError(
+                f"background_image has shape {tuple(background.shape)}, not ({height}, {width}, 4)"
+            )
+    size = width, height
+    layout = LAYOUTS.get(scene, size, device)
+    if not layout.rows:
+        return torch.zeros(height, width, 4, device=device) if background is None else background
+    tensors = assemble(scene, layout, size, device)
+    if _print_timing:
+        print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
+        began = time.perf_counter()
+    image = render(tensors, width, height)
+    solid = is_opaque(tensors)
+    if background is None and solid:
+        result = image  # each point has a colour, or none: the mean of colours is what is premultiplied
+    elif background is not None and (solid or bool((background[..., 3] >= 1).all())):
+        result = torch.cat([image[..., :3] + (1 - image[..., 3:]) * background[..., :3], _over(image, background)], 2)
+    else:
+        hit = image[..., 3:] if solid else render(outlines_only(tensors, layout), width, height)[..., 3:]
+        result = _straight(image, hit, background)
+    if _print_timing:
+        print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
+    return result
+
+
+def _over(image: Tensor, background: Tensor) -> Tensor:
+    return image[..., 3:] + (1 - image[..., 3:]) * background[..., 3:]
+
+
+def _straight(image: Tensor, hit: Tensor, background: Tensor | None) -> Tensor:
+    """Means of colours that are not premultiplied.
+
+    Args:
+        image: premultiplied, shape (height, width, 4).
+        hit: which share of a pixel has shapes, shape (height, width, 1).
+        background: shape (height, width, 4).
+    """
+    if background is None:
+        return torch.cat([image[..., :3] * (hit / image[..., 3:].clamp_min(FAINT)), image[..., 3:]], dim=2)
+    seen = image + (hit - image[..., 3:]) * background
+    color = seen[..., :3] * (hit / seen[..., 3:].clamp_min(FAINT))
+    missed = (1 - hit) * background
+    return torch.cat([color + missed[..., :3], seen[..., 3:] + missed[..., 3:]], dim=2)
