@@ -23,3 +23,5 @@ from warpsplat.pydiffvg.shape import Polygon as Polygon
 from warpsplat.pydiffvg.shape import Rect as Rect
 from warpsplat.pydiffvg.shape import ShapeGroup as ShapeGroup
 from warpsplat.pydiffvg.shape import from_svg_path as from_svg_path
+from warpsplat.pydiffvg.parse_svg import svg_to_scene as svg_to_scene
+from warpsplat.pydiffvg.save_svg import save_svg as save_svg

@@ -21,6 +21,8 @@ RING = (2, 2, 2, 2)
 CORNERS = (0, 0, 0, 0)
 """Segments of a rectangle."""
 
+IDENTITY = np.eye(3).tolist()
+
 UNIFORM = 1e-3
 """By how much a map may stretch one direction more than another and strokes still be of one width."""
 
@@ -214,7 +216,7 @@ def _paint(color: Color, name: str, device: torch.device) -> tuple[Color, tuple[
 
 def _matrix(matrix: Tensor, name: str, device: torch.device) -> Tensor | None:
     found = _tensor(matrix, (3, 3), f"shape_to_canvas of {name}", device)
-    if not found.requires_grad and torch.equal(found, torch.eye(3, device=device)):
+    if not found.requires_grad and found.tolist() == IDENTITY:
         return None
     return found
 

@@ -187,18 +187,3 @@ def _gradients(
         "stop_colors": colors[:, :3],
         "stop_opacities": within_one(colors[:, 3]),
     }
-
-
-def is_opaque(tensors: SceneTensors) -> bool:
-    """Whether nothing shows through any shape."""
-    names = ("opacities", "stop_opacities")
-    return all(bool((tensors.values[name] >= 1).all()) for name in names if name in tensors.values)
-
-
-def outlines_only(tensors: SceneTensors, layout: Layout) -> SceneTensors:
-    """The same outlines, all opaque and black."""
-    rows = len(layout.rows)
-    device = tensors.device
-    values = {name: tensors.values[name] for name in ("points", "widths") if name in tensors.values}
-    values |= {"colors": torch.zeros(rows, 3, device=device), "opacities": torch.ones(rows, device=device)}
-    return SceneTensors(layout.union, values)

@@ -46,8 +46,6 @@ class Layout:
     """How tensors of shapes and groups become those of a scene."""
 
     scene: Scene
-    union: Scene
-    """The same outlines, each in one colour."""
     rows: tuple[Row, ...]
     index: Tensor
     """Of the two points that each outline's control point is a mean of, shape (2, point)."""
@@ -154,10 +152,8 @@ def make_layout(
     flat = [blend for contours in outlines for blend in contours]
     index = np.concatenate([blend.index for blend in flat] + [np.zeros((0, 2), np.int64)])
     weight = np.concatenate([blend.weight for blend in flat] + [np.zeros((0, 2), np.float32)])
-    scene = _scene(rows, plans, counts, closed, size)
     return Layout(
-        scene,
-        _union_of(scene),
+        _scene(rows, plans, counts, closed, size),
         tuple(rows),
         _on(np.ascontiguousarray(index.T), device),
         _on(np.ascontiguousarray(weight.T)[:, :, None], device) if (weight[:, 1] != 0).any() else None,
@@ -221,17 +217,3 @@ def _scene(
     )
     # A gradient whose axes are unlike: both of them get gradients of their own.
     return replace(scene, frames=np.tile(np.array([0, 0, 1, 0, 0, 2], np.float32), (len(rows), 1)))
-
-
-def _union_of(scene: Scene) -> Scene:
-    """The same outlines, each in one colour."""
-    return replace(
-        scene,
-        paint=np.zeros(len(scene), np.int32),
-        layer=np.ones(len(scene), np.int32),  # so that it has arrays of its own on the device
-        stop_first=np.zeros(len(scene) + 1, np.int32),
-        stop_offsets=np.zeros(0, np.float32),
-        stop_colors=np.zeros((0, 3), np.float32),
-        stop_opacities=np.zeros(0, np.float32),
-        frames=np.zeros((len(scene), 6), np.float32),
-    )

@@ -11,7 +11,7 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.arguments import SceneArguments, take_down
-from warpsplat.pydiffvg.assemble import LAYOUTS, assemble, is_opaque, outlines_only
+from warpsplat.pydiffvg.assemble import LAYOUTS, assemble
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
@@ -19,8 +19,9 @@ from warpsplat.torch import render
 
 Tensor = torch.Tensor
 
-FAINT = 1e-6
-"""Opacity below which colours are not divided by it."""
+FAINT = 1 / 255
+"""Opacity below which colours are no longer divided by it: they fade to black where nothing is, so that a picture
+does not jump where a shape arrives, and gradients stay finite."""
 
 _print_timing = False
 
@@ -95,8 +96,7 @@ class RenderFunction:
             args: what ``serialize_scene`` gave.
 
         Returns:
-            sRGB and opacity, float32, shape (height, width, 4); as in DiffVG, each is the pixel's mean of
-            the colours, not premultiplied, of its points, where those without shape are black.
+            sRGB, not premultiplied, and opacity: float32, shape (height, width, 4). Where nothing is, 0.
 
         Raises:
             UsageError: arguments that are none, a background of another shape.
@@ -134,34 +134,11 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
         began = time.perf_counter()
     image = render(tensors, width, height)
-    solid = is_opaque(tensors)
-    if background is None and solid:
-        result = image  # each point has a colour, or none: the mean of colours is what is premultiplied
-    elif background is not None and (solid or bool((background[..., 3] >= 1).all())):
-        result = torch.cat([image[..., :3] + (1 - image[..., 3:]) * background[..., :3], _over(image, background)], 2)
-    else:
-        hit = image[..., 3:] if solid else render(outlines_only(tensors, layout), width, height)[..., 3:]
-        result = _straight(image, hit, background)
+    if background is not None:
+        opacity = background[..., 3:]
+        below = torch.cat([opacity * background[..., :3], opacity], dim=2)
+        image = image + (1 - image[..., 3:]) * below
+    result = torch.cat([image[..., :3] / image[..., 3:].clamp_min(FAINT), image[..., 3:]], dim=2)
     if _print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result
-
-
-def _over(image: Tensor, background: Tensor) -> Tensor:
-    return image[..., 3:] + (1 - image[..., 3:]) * background[..., 3:]
-
-
-def _straight(image: Tensor, hit: Tensor, background: Tensor | None) -> Tensor:
-    """Means of colours that are not premultiplied.
-
-    Args:
-        image: premultiplied, shape (height, width, 4).
-        hit: which share of a pixel has shapes, shape (height, width, 1).
-        background: shape (height, width, 4).
-    """
-    if background is None:
-        return torch.cat([image[..., :3] * (hit / image[..., 3:].clamp_min(FAINT)), image[..., 3:]], dim=2)
-    seen = image + (hit - image[..., 3:]) * background
-    color = seen[..., :3] * (hit / seen[..., 3:].clamp_min(FAINT))
-    missed = (1 - hit) * background
-    return torch.cat([color + missed[..., :3], seen[..., 3:] + missed[..., 3:]], dim=2)

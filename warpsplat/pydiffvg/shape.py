@@ -109,7 +109,10 @@ def from_svg_path(
     path_str: str, shape_to_canvas: Tensor | None = None, force_close: bool = False
 ) -> list[Path]:
     """The subpaths of an SVG path's data, arcs as cubics, in coordinates that ``shape_to_canvas`` maps."""
-    paths = [path_of(subpath, force_close=force_close) for subpath in cubics(path_str, keep_dots=False)]
+    paths = [
+        path_of(subpath, is_closed=True if force_close else None)
+        for subpath in cubics(path_str, keep_dots=False)
+    ]
     if shape_to_canvas is not None:
         for path in paths:
             matrix = shape_to_canvas.to(path.points)
@@ -123,12 +126,16 @@ STRAIGHT = 1e-6
 """How far from where a line or quadratic would have them the handles of a cubic may lie, over its size."""
 
 
-def path_of(subpath: Subpath, *, force_close: bool = False) -> Path:
-    """A subpath, with the cubics that are lines or quadratics as such."""
+def path_of(subpath: Subpath, *, is_closed: bool | None = None) -> Path:
+    """A subpath, with the cubics that are lines or quadratics as such.
+
+    Closed where ``is_closed`` says so; where nothing does, where the subpath is or its ends meet.
+    """
     points = subpath.points
     meets = bool(np.abs(points[0] - points[-1]).max() < CLOSE)
     counts, chain = _segments(points)
-    is_closed = subpath.is_closed or force_close or meets
+    if is_closed is None:
+        is_closed = subpath.is_closed or meets
     if is_closed and meets:
         chain = chain[:-1]
     elif is_closed:

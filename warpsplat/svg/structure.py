@@ -93,7 +93,9 @@ class _End:
     """Corners of what is seen of it, shape (4, 2)."""
 
 
-def read_shapes(text: str, width: int, height: int, scale: float | None = None) -> list[Shape]:
+def read_shapes(
+    text: str, width: int, height: int, scale: float | None = None, *, see_through: bool = False
+) -> list[Shape]:
     """The shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
 
     Args:
@@ -101,12 +103,14 @@ def read_shapes(text: str, width: int, height: int, scale: float | None = None) 
         width: of the picture.
         height: of the picture.
         scale: magnification; None: the SVG fills the picture, which has its proportions.
+        see_through: whether the shapes of a translucent group that overlap are faded one by one, so that they
+            are seen through one another, instead of refused.
 
     Raises:
         ImageError: not an SVG, of other proportions, or with something that would be lost. The message says
             what.
     """
-    parts, _ = _read(text, width, height, scale, keep=False)
+    parts, _ = _read(text, width, height, scale, keep=False, see_through=see_through)
     return shapes_of(parts)
 
 
@@ -120,13 +124,14 @@ def read_parts(text: str, width: int, height: int) -> tuple[list[Part], Document
 
 
 def _read(
-    text: str, width: int, height: int, scale: float | None, *, keep: bool
+    text: str, width: int, height: int, scale: float | None, *, keep: bool, see_through: bool = False
 ) -> tuple[list[Part], Document]:
     facts = inspect_svg(text)
     try:
         with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
             document = Document(text)
-            return _Walk(document, keep=keep).parts_in(*_canvas(facts.root, width, height, scale)), document
+            walk = _Walk(document, keep=keep, see_through=see_through)
+            return walk.parts_in(*_canvas(facts.root, width, height, scale)), document
     except (ImageError, MemoryError):
         raise
     except Exception as error:  # arithmetic on absurd numbers overflows in many ways
@@ -158,8 +163,8 @@ class _Walk:
     stack.
     """
 
-    def __init__(self, document: Document, *, keep: bool) -> None:
-        self._document = document
+    def __init__(self, document: Document, *, keep: bool, see_through: bool) -> None:
+        self._document, self._see_through = document, see_through
         self._keep = Keeping(document) if keep else None
         self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
@@ -322,7 +327,8 @@ class _Walk:
             parts = [*clipped(shapes_of(parts), end.clip)]
         if end.opacity < 1:
             shapes = shapes_of(parts)
-            if len(shapes) < len(parts) or (overlap(shapes) and end.opacity > 0):
+            hides = end.opacity > 0 and not self._see_through and overlap(shapes)
+            if len(shapes) < len(parts) or hides:
                 raise ImageError("uses opacity of a group of shapes that overlap, not supported")
             faded = (replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes)
             parts = [*faded] if end.opacity > 0 else []
