@@ -1,7 +1,7 @@
 """DiffVG's Python interface on our renderer: ``import warpsplat.pydiffvg as pydiffvg``.
 
-``python -m warpsplat.pydiffvg SCRIPT ARGUMENTS`` runs a script that says ``import pydiffvg``, unchanged. What is
-there and what is not: docs/pydiffvg.md.
+``python -m warpsplat.pydiffvg SCRIPT ARGUMENTS`` runs a script that says ``import pydiffvg``, unchanged. What
+is there and what is not: docs/pydiffvg.md.
 """
 
 from warpsplat.pydiffvg.color import LinearGradient as LinearGradient
@@ -12,10 +12,14 @@ from warpsplat.pydiffvg.device import set_device as set_device
 from warpsplat.pydiffvg.device import set_use_gpu as set_use_gpu
 from warpsplat.pydiffvg.diffvg import FilterType as FilterType
 from warpsplat.pydiffvg.image import imwrite as imwrite
+from warpsplat.pydiffvg.optimize_svg import OptimizableSvg as OptimizableSvg
+from warpsplat.pydiffvg.optimize_svg import SvgOptimizationSettings as SvgOptimizationSettings
+from warpsplat.pydiffvg.parse_svg import svg_to_scene as svg_to_scene
 from warpsplat.pydiffvg.pixel_filter import PixelFilter as PixelFilter
 from warpsplat.pydiffvg.render_pytorch import OutputType as OutputType
 from warpsplat.pydiffvg.render_pytorch import RenderFunction as RenderFunction
 from warpsplat.pydiffvg.render_pytorch import set_print_timing as set_print_timing
+from warpsplat.pydiffvg.save_svg import save_svg as save_svg
 from warpsplat.pydiffvg.shape import Circle as Circle
 from warpsplat.pydiffvg.shape import Ellipse as Ellipse
 from warpsplat.pydiffvg.shape import Path as Path
@@ -23,5 +27,3 @@ from warpsplat.pydiffvg.shape import Polygon as Polygon
 from warpsplat.pydiffvg.shape import Rect as Rect
 from warpsplat.pydiffvg.shape import ShapeGroup as ShapeGroup
 from warpsplat.pydiffvg.shape import from_svg_path as from_svg_path
-from warpsplat.pydiffvg.parse_svg import svg_to_scene as svg_to_scene
-from warpsplat.pydiffvg.save_svg import save_svg as save_svg

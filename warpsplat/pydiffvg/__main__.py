@@ -21,7 +21,9 @@ def install() -> None:
     sys.modules["pydiffvg"] = package
     for found in pkgutil.iter_modules(package.__path__):
         if found.name != "__main__":
-            sys.modules[f"pydiffvg.{found.name}"] = importlib.import_module(f"{package.__name__}.{found.name}")
+            sys.modules[f"pydiffvg.{found.name}"] = importlib.import_module(
+                f"{package.__name__}.{found.name}"
+            )
     sys.modules["diffvg"] = sys.modules["pydiffvg.diffvg"]
 
 
@@ -41,7 +43,9 @@ def main(arguments: list[str]) -> int:
     except WarpsplatError as error:
         message, code = explain(error)
         frames = traceback.extract_tb(error.__traceback__)
-        place = next((f"{f.filename}:{f.lineno}: " for f in reversed(frames) if Path(f.filename) == script), "")
+        place = next(
+            (f"{f.filename}:{f.lineno}: " for f in reversed(frames) if Path(f.filename) == script), ""
+        )
         print(f"error: {place}{message}", file=sys.stderr)
         return int(code)
     return 0

@@ -115,9 +115,7 @@ def _tensor(value: Tensor, shape: tuple[int, ...], name: str, device: torch.devi
     """
     if not isinstance(value, Tensor):
         raise UsageError(f"{name} is a {type(value).__name__}, not a tensor")
-    fits = value.dim() == len(shape) and all(
-        w in {-1, n} for n, w in zip(value.shape, shape, strict=True)
-    )
+    fits = value.dim() == len(shape) and all(w in {-1, n} for n, w in zip(value.shape, shape, strict=True))
     if not fits:
         wanted = ", ".join("n" if n < 0 else str(n) for n in shape)
         raise UsageError(f"{name} has shape {tuple(value.shape)}, not ({wanted})")
@@ -164,13 +162,13 @@ def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
         counts = tuple(map(int, shape.num_control_points.tolist()))
     wanted = sum(counts) + len(counts) + is_open
     if not counts or not {0, 1, 2}.issuperset(counts) or wanted != points:
-        raise UsageError(f"{name} has {points} points, its num_control_points {list(counts)} ask for {wanted}")
+        raise UsageError(
+            f"{name} has {points} points, its num_control_points {list(counts)} ask for {wanted}"
+        )
     return counts
 
 
-def _group(
-    group: ShapeGroup, name: str, widths: Sequence[int], device: torch.device
-) -> tuple[Plan, Paints]:
+def _group(group: ShapeGroup, name: str, widths: Sequence[int], device: torch.device) -> tuple[Plan, Paints]:
     """``widths``: which tensor is each shape's width."""
     ids = tuple(map(int, group.shape_ids.tolist()))
     for i in ids:
@@ -207,8 +205,8 @@ def _paint(color: Color, name: str, device: torch.device) -> tuple[Color, tuple[
     offsets = _tensor(color.offsets, (-1,), f"offsets of {name}", device)
     colors = _tensor(color.stop_colors, (max(stops, 1), 4), f"stop_colors of {name}", device)
     if isinstance(color, LinearGradient):
-        ends = (_tensor(p, (2,), f"end of {name}", device) for p in (color.begin, color.end))
-        return LinearGradient(*ends, offsets, colors), ("linear", stops)
+        begin, end = (_tensor(p, (2,), f"end of {name}", device) for p in (color.begin, color.end))
+        return LinearGradient(begin, end, offsets, colors), ("linear", stops)
     center = _tensor(color.center, (2,), f"center of {name}", device)
     radius = _tensor(color.radius, (2,), f"radius of {name}", device)
     return RadialGradient(center, radius, offsets, colors), ("radial", stops)

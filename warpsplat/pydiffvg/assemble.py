@@ -28,6 +28,11 @@ STEEP = 1e-3
 """Square of the length of a gradient's axis [canvas units] below which it counts as that long."""
 
 
+FAINT = 1 / 256
+"""Opacity of outlines whose coverages are added. Added, not composited: of two shapes that meet in a pixel
+nothing is left over, which compositing would have for a quarter of it."""
+
+
 class Layouts:
     """A bounded number of layouts, those used last."""
 
@@ -50,7 +55,9 @@ class Layouts:
 LAYOUTS = Layouts()
 
 
-def assemble(scene: SceneArguments, layout: Layout, size: tuple[int, int], device: torch.device) -> SceneTensors:
+def assemble(
+    scene: SceneArguments, layout: Layout, size: tuple[int, int], device: torch.device
+) -> SceneTensors:
     """The scene in pixels of a picture of ``size``, whose layout is ``layout``."""
     scale = size[0] / scene.width, size[1] / scene.height
     values = {"points": _points(scene, layout, scale, device)}
@@ -62,7 +69,9 @@ def assemble(scene: SceneArguments, layout: Layout, size: tuple[int, int], devic
     return SceneTensors(layout.scene, values)
 
 
-def _points(scene: SceneArguments, layout: Layout, scale: tuple[float, float], device: torch.device) -> Tensor:
+def _points(
+    scene: SceneArguments, layout: Layout, scale: tuple[float, float], device: torch.device
+) -> Tensor:
     base = _base(scene, device)
     first = base.index_select(0, layout.index[0])
     points = first
@@ -187,3 +196,12 @@ def _gradients(
         "stop_colors": colors[:, :3],
         "stop_opacities": within_one(colors[:, 3]),
     }
+
+
+def outlines_only(tensors: SceneTensors, layout: Layout) -> SceneTensors:
+    """The same outlines, all black and of opacity ``FAINT``: so faint that their coverages add up."""
+    rows, device = len(layout.rows), tensors.device
+    values = {name: tensors.values[name] for name in ("points", "widths") if name in tensors.values}
+    values["opacities"] = torch.full((rows,), FAINT, device=device)
+    values["colors"] = torch.zeros(rows, 3, device=device)
+    return SceneTensors(layout.outlines, values)

@@ -9,21 +9,29 @@ import torch
 Tensor = torch.Tensor
 
 
-def _zeros(*shape: int) -> Tensor:
-    return field(default_factory=lambda: torch.zeros(shape))  # type: ignore[no-any-return]
+def _point() -> Tensor:
+    return torch.zeros(2)
+
+
+def _offset() -> Tensor:
+    return torch.zeros(1)
+
+
+def _transparent() -> Tensor:
+    return torch.zeros(1, 4)
 
 
 @dataclass(eq=False)
 class LinearGradient:
     """Colours along a line; beyond its ends those of the first and last stop."""
 
-    begin: Tensor = _zeros(2)
+    begin: Tensor = field(default_factory=_point)
     """[canvas units], shape (2,)."""
-    end: Tensor = _zeros(2)
+    end: Tensor = field(default_factory=_point)
     """[canvas units], shape (2,)."""
-    offsets: Tensor = _zeros(1)
+    offsets: Tensor = field(default_factory=_offset)
     """Of the stops, ascending in [0, 1], shape (stop,)."""
-    stop_colors: Tensor = _zeros(1, 4)
+    stop_colors: Tensor = field(default_factory=_transparent)
     """sRGB and opacity in [0, 1], shape (stop, 4)."""
 
 
@@ -31,13 +39,13 @@ class LinearGradient:
 class RadialGradient:
     """Colours from a centre outwards; beyond the ellipse that of the last stop."""
 
-    center: Tensor = _zeros(2)
+    center: Tensor = field(default_factory=_point)
     """[canvas units], shape (2,)."""
-    radius: Tensor = _zeros(2)
+    radius: Tensor = field(default_factory=_point)
     """Along x and y [canvas units], shape (2,)."""
-    offsets: Tensor = _zeros(1)
+    offsets: Tensor = field(default_factory=_offset)
     """Of the stops, ascending in [0, 1], shape (stop,)."""
-    stop_colors: Tensor = _zeros(1, 4)
+    stop_colors: Tensor = field(default_factory=_transparent)
     """sRGB and opacity in [0, 1], shape (stop, 4)."""
 
 

@@ -37,7 +37,10 @@ def imwrite(img: Pixels, filename: str | Path, gamma: float = 2.2, normalize: bo
     pixels = (255 * values + 0.5).astype(np.uint8)
     path = Path(filename)
     path.parent.mkdir(parents=True, exist_ok=True)
-    options = {"compress_level": COMPRESSION} if path.suffix.lower() == ".png" else {}
     if path.suffix.lower() in {".jpg", ".jpeg"}:
         pixels = pixels[:, :, :3]
-    Image.fromarray(pixels.squeeze(2) if pixels.shape[2] == 1 else pixels).save(path, **options)
+    made = Image.fromarray(pixels.squeeze(2) if pixels.shape[2] == 1 else pixels)
+    if path.suffix.lower() == ".png":
+        made.save(path, compress_level=COMPRESSION)
+    else:
+        made.save(path)

@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float32]
 class Blend(NamedTuple):
     """Points as means of two others each."""
 
-    index: npt.NDArray[np.int64]
+    which: npt.NDArray[np.int64]
     """Shape (..., 2)."""
     weight: FloatArray
     """Shape (..., 2)."""
@@ -46,14 +46,16 @@ class Layout:
     """How tensors of shapes and groups become those of a scene."""
 
     scene: Scene
+    outlines: Scene
+    """The same outlines, each in one colour."""
     rows: tuple[Row, ...]
     index: Tensor
     """Of the two points that each outline's control point is a mean of, shape (2, point)."""
     weight: Tensor | None
     """Theirs, shape (2, point, 1); None: each point is the first."""
     rings: tuple[tuple[Tensor, Tensor, bool], ...]
-    """Strokes that are drawn as areas, of equally many segments, all closed or all open: index and weight of the
-    control points of the segments as means of two points, shape (ring, segment, 4, 2), and whether closed."""
+    """Strokes that are drawn as areas, of equally many segments, all closed or all open: index and weight of
+    the control points of the segments as means of two points, shape (ring, segment, 4, 2); whether closed."""
     order: Tensor | None
     """Where each point of the scene is among those of outlines and then of rings; None: the same order."""
     point_group: Tensor
@@ -86,11 +88,13 @@ def segments_of(form: Form, close: bool) -> Blend:
 
 def _contour(form: Form, is_closed: bool) -> Blend:
     """Control points of a contour: a ring, or a chain. Shape (point, 2)."""
-    blend = segments_of(form, is_closed and not form.closed)
-    ring = Blend(*(part[:, :3].reshape(-1, 2) for part in blend))
+    which, weight = segments_of(form, is_closed and not form.closed)
     if is_closed:
-        return ring
-    return Blend(*(np.concatenate([part, whole[-1, 3:]]) for part, whole in zip(ring, blend, strict=True)))
+        return Blend(which[:, :3].reshape(-1, 2), weight[:, :3].reshape(-1, 2))
+    return Blend(
+        np.concatenate([which[:, :3].reshape(-1, 2), which[-1, 3:]]),
+        np.concatenate([weight[:, :3].reshape(-1, 2), weight[-1, 3:]]),
+    )
 
 
 def _rows(forms: tuple[Form, ...], plans: tuple[Plan, ...], uniform: bool) -> list[Row]:
@@ -134,14 +138,14 @@ def make_layout(
             outlines.append([])
             continue
         blends = [(_contour(forms[i], not row.is_stroke or forms[i].closed), first[i]) for i in row.shapes]
-        outlines.append([Blend(blend.index + start, blend.weight) for blend, start in blends])
-    counts = [[len(blend.index) for blend in contours] for contours in outlines]
+        outlines.append([Blend(blend.which + start, blend.weight) for blend, start in blends])
+    counts = [[len(blend.which) for blend in contours] for contours in outlines]
     closed = [[not row.is_stroke or forms[i].closed for i in row.shapes] for row in rows]
     rings, places = [], {}
     at = sum(map(sum, counts))
     for (_, is_closed), numbers in batches.items():
         blends = [(segments_of(forms[rows[n].shapes[0]], False), first[rows[n].shapes[0]]) for n in numbers]
-        index = np.stack([blend.index + start for blend, start in blends])
+        index = np.stack([blend.which + start for blend, start in blends])
         weight = np.stack([blend.weight for blend, _ in blends])
         rings.append((_on(index, device), _on(weight, device), is_closed))
         sizes = [len(part) for part in ring_points(torch.zeros(1, *index.shape[1:3], 2), None, is_closed)]
@@ -150,10 +154,12 @@ def make_layout(
             places[number] = at
             at += sum(sizes)
     flat = [blend for contours in outlines for blend in contours]
-    index = np.concatenate([blend.index for blend in flat] + [np.zeros((0, 2), np.int64)])
+    index = np.concatenate([blend.which for blend in flat] + [np.zeros((0, 2), np.int64)])
     weight = np.concatenate([blend.weight for blend in flat] + [np.zeros((0, 2), np.float32)])
+    scene = _scene(rows, plans, counts, closed, size)
     return Layout(
-        _scene(rows, plans, counts, closed, size),
+        scene,
+        _in_one_color(scene),
         tuple(rows),
         _on(np.ascontiguousarray(index.T), device),
         _on(np.ascontiguousarray(weight.T)[:, :, None], device) if (weight[:, 1] != 0).any() else None,
@@ -217,3 +223,15 @@ def _scene(
     )
     # A gradient whose axes are unlike: both of them get gradients of their own.
     return replace(scene, frames=np.tile(np.array([0, 0, 1, 0, 0, 2], np.float32), (len(rows), 1)))
+
+
+def _in_one_color(scene: Scene) -> Scene:
+    return replace(
+        scene,
+        paint=np.zeros(len(scene), np.int32),
+        layer=np.ones(len(scene), np.int32),  # so that it has arrays of its own on the device
+        stop_first=np.zeros(len(scene) + 1, np.int32),
+        stop_offsets=np.zeros(0, np.float32),
+        stop_colors=np.zeros((0, 3), np.float32),
+        stop_opacities=np.zeros(0, np.float32),
+    )

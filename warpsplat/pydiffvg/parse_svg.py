@@ -15,7 +15,7 @@ import torch
 from warpsplat.errors import ImageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
 from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
-from warpsplat.scene import Cap, Join, Picture, Rule
+from warpsplat.scene import Cap, Join, Rule
 from warpsplat.svg.gradients import Flat, Gradient
 from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size, view_box
 from warpsplat.svg.shapes import Line
@@ -97,17 +97,26 @@ def _color(part: Drawn) -> Color:
     """A fill's or stroke's paint.
 
     Raises:
-        ImageError: a gradient that ``RadialGradient`` and ``LinearGradient`` cannot say.
+        ImageError: none that pydiffvg has.
     """
     paint = part.paint
     if isinstance(paint, Flat):
         return torch.tensor([*paint.color, part.opacity * paint.opacity])
-    if isinstance(paint, Picture) or not isinstance(paint, Gradient):
+    if not isinstance(paint, Gradient):
         raise ImageError("shows a picture, which no paint of pydiffvg is")
+    return gradient_of(paint, part.opacity)
+
+
+def gradient_of(paint: Gradient, opacity: float) -> LinearGradient | RadialGradient:
+    """A gradient as pydiffvg has it, whose stops are ``opacity`` times as opaque.
+
+    Raises:
+        ImageError: it cannot say it.
+    """
     if paint.spread != "pad":
         raise ImageError(f"uses a gradient with spreadMethod {paint.spread}, which pydiffvg has not")
     offsets = torch.tensor(paint.offsets)
-    colors = torch.tensor([[*stop.color, stop.opacity * part.opacity] for stop in paint.stops])
+    colors = torch.tensor([[*stop.color, stop.opacity * opacity] for stop in paint.stops])
     origin, along, across = (paint.frame[:2, column] for column in (2, 0, 1))
     if not paint.is_radial:
         # Lines of one colour run along the second axis: what counts of the first is what is at right angles.

@@ -11,7 +11,7 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.arguments import SceneArguments, take_down
-from warpsplat.pydiffvg.assemble import LAYOUTS, assemble
+from warpsplat.pydiffvg.assemble import FAINT, LAYOUTS, assemble, outlines_only
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
@@ -19,9 +19,8 @@ from warpsplat.torch import render
 
 Tensor = torch.Tensor
 
-FAINT = 1 / 255
-"""Opacity below which colours are no longer divided by it: they fade to black where nothing is, so that a picture
-does not jump where a shape arrives, and gradients stay finite."""
+NOTHING = 1e-6
+"""Opacity below which colours are no longer divided by it."""
 
 _print_timing = False
 
@@ -96,7 +95,8 @@ class RenderFunction:
             args: what ``serialize_scene`` gave.
 
         Returns:
-            sRGB, not premultiplied, and opacity: float32, shape (height, width, 4). Where nothing is, 0.
+            sRGB and opacity, float32, shape (height, width, 4). As in DiffVG a pixel is the mean of colours
+            that are not premultiplied, and black where nothing is: at the edge of what is drawn it fades.
 
         Raises:
             UsageError: arguments that are none, a background of another shape.
@@ -134,11 +134,30 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
         began = time.perf_counter()
     image = render(tensors, width, height)
-    if background is not None:
-        opacity = background[..., 3:]
-        below = torch.cat([opacity * background[..., :3], opacity], dim=2)
-        image = image + (1 - image[..., 3:]) * below
-    result = torch.cat([image[..., :3] / image[..., 3:].clamp_min(FAINT), image[..., 3:]], dim=2)
+    if background is not None and bool((background[..., 3] >= 1).all()):
+        result = image + (1 - image[..., 3:]) * background
+    else:
+        faint = render(outlines_only(tensors, layout), width, height)
+        result = _straight(image, (faint[..., 3:] / FAINT).clamp_max(1.0), background)
     if _print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result
+
+
+def _straight(image: Tensor, hit: Tensor, background: Tensor | None) -> Tensor:
+    """Means over the pixels of colours that are not premultiplied; 0 where there is none.
+
+    Args:
+        image: premultiplied, shape (height, width, 4).
+        hit: which part of a pixel shapes lie on, shape (height, width, 1).
+        background: not premultiplied, shape (height, width, 4).
+    """
+    if background is None:
+        color = image[..., :3] * (hit / image[..., 3:].clamp_min(NOTHING))
+        return torch.cat([color, image[..., 3:]], dim=2)
+    below, opacity = background[..., :3], background[..., 3:]
+    # Of the part that shapes lie on, as if it were all; the background is seen through them there.
+    seen = hit - image[..., 3:]
+    total = image[..., 3:] + seen * opacity
+    color = (image[..., :3] + seen * opacity * below) * (hit / total.clamp_min(NOTHING))
+    return torch.cat([color + (1 - hit) * below, total + (1 - hit) * opacity], dim=2)

@@ -61,9 +61,7 @@ def save_svg(
 def _gamma(definitions: Element) -> None:
     box = {"x": "0", "y": "0", "width": "100%", "height": "100%"}
     found = ElementTree.SubElement(definitions, "filter", {"id": "gamma", **box})
-    transfer = ElementTree.SubElement(
-        found, "feComponentTransfer", {"color-interpolation-filters": "sRGB"}
-    )
+    transfer = ElementTree.SubElement(found, "feComponentTransfer", {"color-interpolation-filters": "sRGB"})
     for channel in "RGBA":
         values = {"type": "gamma", "amplitude": "1", "exponent": str(GAMMA)}
         ElementTree.SubElement(transfer, f"feFunc{channel}", values)
@@ -103,7 +101,9 @@ class _Group:
     def _element(self, shapes: list[Shape], fill: Color, stroke: Color) -> None:
         if not shapes:
             return
-        tag, attributes = _form(shapes[0]) if len(shapes) == 1 else ("path", {"d": "".join(map(_data, shapes))})
+        tag, attributes = (
+            _form(shapes[0]) if len(shapes) == 1 else ("path", {"d": "".join(map(path_data, shapes))})
+        )
         attributes["fill"] = "none"
         if fill is not None:
             attributes |= self._paint(fill, "fill")
@@ -137,7 +137,7 @@ class _Group:
         """A stroke whose width changes, as a fill."""
         scene = take_down(1, 1, [shape], [], torch.device("cpu"))
         blend = segments_of(scene.forms[0], False)
-        index, weight = torch.from_numpy(blend.index), torch.from_numpy(blend.weight)
+        index, weight = torch.from_numpy(blend.which), torch.from_numpy(blend.weight)
         segments = (weight[..., None] * scene.outlines[0].values[0][index]).sum(dim=-2)
         radii = (weight * scene.outlines[0].width[index]).sum(dim=-1)
         data = ""
@@ -148,38 +148,40 @@ class _Group:
 
     def _paint(self, color: Color, name: str) -> dict[str, str]:
         if isinstance(color, Tensor):
-            return {name: _rgb(color), f"{name}-opacity": _text(color[3:].clamp(0, 1))}
+            return {name: rgb_text(color), f"{name}-opacity": _text(color[3:].clamp(0, 1))}
         assert color is not None
         identity = f"shape_{self._number}_{name}"
-        if isinstance(color, LinearGradient):
-            tag = "linearGradient"
-            numbers = dict(zip(("x1", "y1", "x2", "y2"), [*color.begin, *color.end], strict=True))
-            own = np.eye(3)
-        else:
-            # A circle that a transform stretches: SVG's have one radius.
-            tag, numbers = "radialGradient", {name: torch.tensor(v) for name, v in UNIT.items()}
-            own = np.diag([*color.radius.tolist(), 1.0])
-            own[:2, 2] = color.center.tolist()
-        # Gradients lie on the canvas, userSpaceOnUse is the element's space.
-        matrix = np.linalg.pinv(self._matrix) @ own
-        attributes = {key: _text([value]) for key, value in numbers.items()}
-        attributes |= {"id": identity, "gradientUnits": "userSpaceOnUse"}
-        if not np.array_equal(matrix, np.eye(3)):
-            attributes["gradientTransform"] = f"matrix({_text(matrix[:2].T.ravel())})"
-        self._stops(ElementTree.SubElement(self._definitions, tag, attributes), color)
+        self._definitions.append(gradient_element(identity, color, self._matrix))
         return {name: f"url(#{identity})"}
-
-    @staticmethod
-    def _stops(element: Element, color: LinearGradient | RadialGradient) -> None:
-        for offset, stop in zip(color.offsets, color.stop_colors, strict=True):
-            said = {"offset": _text([offset]), "stop-color": _rgb(stop), "stop-opacity": _text(stop[3:].clamp(0, 1))}
-            ElementTree.SubElement(element, "stop", said)
 
 
 UNIT = {"cx": 0.0, "cy": 0.0, "r": 1.0}
 
 
-def _rgb(color: Tensor) -> str:
+def gradient_element(identity: str, color: LinearGradient | RadialGradient, matrix: np.ndarray) -> Element:
+    """A gradient on the canvas as an element, for shapes whose units ``matrix`` maps to the canvas."""
+    if isinstance(color, LinearGradient):
+        tag, own = "linearGradient", np.eye(3)
+        numbers = dict(zip(("x1", "y1", "x2", "y2"), [*color.begin, *color.end], strict=True))
+    else:
+        # The unit circle, which a transform stretches: SVG's gradients have one radius.
+        tag, numbers = "radialGradient", {name: torch.tensor(value) for name, value in UNIT.items()}
+        own = np.diag([*color.radius.tolist(), 1.0])
+        own[:2, 2] = color.center.tolist()
+    placed = np.linalg.pinv(matrix) @ own
+    attributes = {key: _text([value]) for key, value in numbers.items()}
+    attributes |= {"id": identity, "gradientUnits": "userSpaceOnUse"}
+    if not np.array_equal(placed, np.eye(3)):
+        attributes["gradientTransform"] = f"matrix({_text(placed[:2].T.ravel())})"
+    element = ElementTree.Element(tag, attributes)
+    for offset, stop in zip(color.offsets, color.stop_colors, strict=True):
+        said = {"stop-color": rgb_text(stop), "stop-opacity": _text(stop[3:].clamp(0, 1))}
+        ElementTree.SubElement(element, "stop", {"offset": _text([offset]), **said})
+    return element
+
+
+def rgb_text(color: Tensor) -> str:
+    """A colour's value, shape (3,) or (4,), without the opacity."""
     return "rgb({}, {}, {})".format(*(round(255 * value) for value in color[:3].clamp(0, 1).tolist()))
 
 
@@ -187,7 +189,7 @@ def _form(shape: Shape) -> tuple[str, dict[str, str]]:
     """Element of a shape, and what says its form."""
     if isinstance(shape, Circle):
         x, y = shape.center
-        return "circle", {"cx": _text([x]), "cy": _text([y]), "r": _text([shape.radius])}
+        return "circle", {"cx": _text([x]), "cy": _text([y]), "r": _text([float(shape.radius)])}
     if isinstance(shape, Ellipse):
         values = [*shape.center, *shape.radius]
         return "ellipse", {n: _text([v]) for n, v in zip(("cx", "cy", "rx", "ry"), values, strict=True)}
@@ -196,13 +198,13 @@ def _form(shape: Shape) -> tuple[str, dict[str, str]]:
         return "rect", {n: _text([v]) for n, v in zip(("x", "y", "width", "height"), values, strict=True)}
     if isinstance(shape, Polygon):
         return "polygon" if shape.is_closed else "polyline", {"points": _text(shape.points.flatten())}
-    return "path", {"d": _data(shape)}
+    return "path", {"d": path_data(shape)}
 
 
 COMMANDS = "LQC"
 
 
-def _data(shape: Shape) -> str:
+def path_data(shape: Shape) -> str:
     """Path data of a shape."""
     if isinstance(shape, Path):
         points, counts = shape.points.tolist(), shape.num_control_points.tolist()
