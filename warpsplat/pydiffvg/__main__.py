@@ -24,7 +24,11 @@ def install() -> None:
             sys.modules[f"pydiffvg.{found.name}"] = importlib.import_module(
                 f"{package.__name__}.{found.name}"
             )
-    sys.modules["diffvg"] = sys.modules["pydiffvg.diffvg"]
+    for bare in (
+        "diffvg",
+        "optimize_svg",
+    ):  # the latter from DiffVG's own folder, which scripts add to the path
+        sys.modules[bare] = sys.modules[f"pydiffvg.{bare}"]
 
 
 def main(arguments: list[str]) -> int:

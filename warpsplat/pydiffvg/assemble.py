@@ -40,6 +40,9 @@ class Layouts:
         self._kept: OrderedDict[tuple[object, ...], Layout] = OrderedDict()
         self._lock = threading.Lock()
 
+    def __len__(self) -> int:
+        return len(self._kept)
+
     def get(self, scene: SceneArguments, size: tuple[int, int], device: torch.device) -> Layout:
         """The layout of ``scene`` in a picture of ``size``."""
         uniform = scene.width * size[1] == scene.height * size[0]

@@ -10,6 +10,7 @@ from pathlib import Path as FilePath
 from typing import IO, Any
 from xml.etree import ElementTree
 
+import numpy as np
 import torch
 
 from warpsplat.errors import ImageError
@@ -266,7 +267,8 @@ class OptimizableSvg:
             view = view_box_map(root, *size)
             self._view = torch.eye(3) if view is None else torch.tensor(view).float()
             self.settings.global_override(["transforms", "translation_mult"], max(self.canvas))
-            self.root = _Node(self, self.document.root)
+            with np.errstate(all="ignore"):  # what overflows is found where it is used
+                self.root = _Node(self, self.document.root)
         except ImageError as error:
             raise ImageError(f"{path}: {error}") from error
         if verbose:

@@ -1,0 +1,98 @@
+"""SVG files and pictures, read and written by pydiffvg."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from tests.pydiffvg.helpers import SIZE, on_white, png, psnr, render, shown, tensor
+from warpsplat import pydiffvg
+from warpsplat.errors import ImageError
+
+DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 48 48" width="96">
+<style>.a {fill: #3366cc}</style><linearGradient id="l" x1="0" y1="0" x2="1" y2="1">
+<stop offset="0" stop-color="red"/><stop offset="1" stop-color="blue" stop-opacity=".5"/></linearGradient>
+<radialGradient id="r"><stop offset="0.2" stop-color="#fff"/><stop offset="1"/></radialGradient>
+<rect width="48" height="48" fill="#eed"/>
+<g transform="translate(4 3) rotate(5)"><path class="a" d="M2 2h14v12q-6 8 -14 0z" opacity=".8"/></g>
+<ellipse cx="34" cy="12" rx="10" ry="6" fill="url(#l)" stroke="#222" stroke-width="2"/>
+<circle cx="14" cy="34" r="9" fill="url(#r)"/>
+<path d="M26 28L44 30L36 44z M32 32L36 40L40 33z" fill="green" fill-rule="evenodd"/>
+<path d="M4 24C16 18 20 30 44 22" fill="none" stroke="purple" stroke-width="3" stroke-dasharray="5 3"/>
+<g opacity=".5"><circle cx="20" cy="24" r="3"/></g></svg>"""
+
+
+def test_a_drawing_is_read_and_written(tmp_path: Path) -> None:
+    source, saved = tmp_path / "drawing.svg", tmp_path / "new" / "saved.svg"
+    source.write_text(DRAWING, encoding="utf-8")
+    width, height, shapes, groups = pydiffvg.svg_to_scene(source)
+    assert (width, height) == (SIZE, SIZE)
+    assert all(isinstance(shape, pydiffvg.Path) for shape in shapes)
+    image = render(shapes, groups)
+    small = tmp_path / "small.svg"
+    small.write_text(DRAWING.replace('width="96"', 'width="48"'), encoding="utf-8")
+    assert psnr(on_white(image), shown(small)) > 36
+    pydiffvg.save_svg(saved, width, height, shapes, groups)
+    assert psnr(on_white(image), shown(saved)) > 36
+
+
+def test_segments_stay_what_they_are() -> None:
+    (path,) = pydiffvg.from_svg_path("M2 2h14v12q-6 8 -14 0c1 2 3 4 5 6z")
+    assert path.num_control_points.tolist() == [0, 0, 1, 2, 0]
+    assert path.is_closed and len(path.points) == 8
+    (way,) = pydiffvg.from_svg_path("M2 2h14v12", torch.diag(tensor(2, 3, 1)))
+    assert not way.is_closed
+    assert way.points.tolist() == [[4, 6], [32, 6], [32, 42]]
+    (closed,) = pydiffvg.from_svg_path("M2 2h14v12", force_close=True)
+    assert closed.is_closed and closed.num_control_points.tolist() == [0, 0, 0]
+
+
+def test_gamma_of_a_saved_scene(tmp_path: Path) -> None:
+    groups = [pydiffvg.ShapeGroup(torch.tensor([0]), tensor(0.2, 0.2, 0.2, 1.0))]
+    pydiffvg.save_svg(
+        tmp_path / "a.svg", 8, 8, [pydiffvg.Rect(tensor(0, 0), tensor(8, 8))], groups, use_gamma=True
+    )
+    # Filters work in linear light unless each of their parts says otherwise, as DiffVG's does.
+    assert "feFuncA" in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert shown(tmp_path / "a.svg")[4, 4, 0] == pytest.approx(0.2 ** (1 / 2.2), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("body", "cause"),
+    [
+        ("<text>a</text>", "uses <text>"),
+        (
+            '<linearGradient id="g" spreadMethod="repeat"><stop stop-color="red"/><stop offset="1"/>'
+            '</linearGradient><rect width="9" height="9" fill="url(#g)"/>',
+            "spreadMethod repeat",
+        ),
+        (
+            '<radialGradient id="g" fx=".2"><stop stop-color="red"/><stop offset="1"/></radialGradient>'
+            '<rect width="9" height="9" fill="url(#g)"/>',
+            "focus",
+        ),
+    ],
+)
+def test_what_cannot_be_held_is_named(tmp_path: Path, body: str, cause: str) -> None:
+    path = tmp_path / "a.svg"
+    path.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">{body}</svg>', encoding="utf-8"
+    )
+    with pytest.raises(ImageError, match=cause):
+        pydiffvg.svg_to_scene(path)
+
+
+def test_pictures(tmp_path: Path) -> None:
+    image = torch.full((4, 5, 4), 0.25)
+    pydiffvg.imwrite(image, tmp_path / "new" / "a.png")
+    found = png(tmp_path / "new" / "a.png")
+    assert found.shape == (4, 5, 4)
+    assert found[0, 0].tolist() == [136, 136, 136, 64]
+    assert float(image[0, 0, 0]) == 0.25
+    pydiffvg.imwrite(np.array([[1.0, 3.0]]), str(tmp_path / "b.png"), gamma=1.0, normalize=True)
+    assert png(tmp_path / "b.png").tolist() == [[0, 255]]
+    pydiffvg.imwrite(image, tmp_path / "c.jpg", gamma=1.0)
+    assert png(tmp_path / "c.jpg").shape == (4, 5, 3)

@@ -1,0 +1,224 @@
+"""Pictures of DiffVG's classes, and their gradients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from tests.pydiffvg.helpers import SIZE, on_white, psnr, render, scene, shown, tensor
+from warpsplat import pydiffvg
+from warpsplat.errors import UsageError
+from warpsplat.pydiffvg.assemble import LAYOUTS
+from warpsplat.pydiffvg.diffvg import FilterType
+
+Tensor = torch.Tensor
+
+
+def circle(opacity: float = 1.0) -> tuple[pydiffvg.Circle, pydiffvg.ShapeGroup]:
+    group = pydiffvg.ShapeGroup(torch.tensor([0]), tensor(0.2, 0.4, 0.8, opacity))
+    return pydiffvg.Circle(tensor(10.0), tensor(20.5, 22.25)), group
+
+
+def test_area_of_a_circle() -> None:
+    shape, group = circle()
+    image = render([shape], [group])
+    assert image.shape == (SIZE, SIZE, 4)
+    assert float(image[..., 3].sum()) == pytest.approx(math.pi * 100, rel=2e-3)
+
+
+def test_every_kind_looks_as_its_file_does(tmp_path: Path) -> None:
+    shapes, groups = scene()
+    pydiffvg.save_svg(tmp_path / "scene.svg", SIZE, SIZE, shapes, groups)
+    image = render(shapes, groups)
+    assert psnr(on_white(image), shown(tmp_path / "scene.svg")) > 38
+    for left_out in range(1, len(groups)):  # each of them shows
+        rest = groups[:left_out] + groups[left_out + 1 :]
+        assert psnr(on_white(image), on_white(render(shapes, rest))) < 35
+
+
+def test_colors_are_not_premultiplied() -> None:
+    shape, group = circle(0.5)
+    image = render([shape], [group])
+    assert torch.allclose(image[22, 20], tensor(0.2, 0.4, 0.8, 0.5), atol=1e-5)
+    # A pixel that the shape lies on in part: its colour fades as its opacity does.
+    edge = (image[..., 3] > 0.1) & (image[..., 3] < 0.4)
+    assert edge.any()
+    assert torch.allclose(image[edge][:, 2], 0.8 * 2 * image[edge][:, 3], atol=1e-3)
+
+
+def test_seams_of_shapes_that_meet_keep_their_color() -> None:
+    halves = [
+        pydiffvg.Rect(tensor(10, 10), tensor(20.5, 30)),
+        pydiffvg.Rect(tensor(20.5, 10), tensor(30, 30)),
+    ]
+    groups = [pydiffvg.ShapeGroup(torch.tensor([i]), tensor(0.2, 0.4, 0.8, 1.0)) for i in range(2)]
+    image = render(halves, groups)
+    assert torch.allclose(image[20, 20, :3], tensor(0.2, 0.4, 0.8), atol=2e-3)
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_background(opacity: float) -> None:
+    shape, group = circle(0.25)
+    below = torch.cat([torch.full((SIZE, SIZE, 3), 0.6), torch.full((SIZE, SIZE, 1), opacity)], dim=2)
+    below.requires_grad_()
+    image = render([shape], [group], below)
+    shown = image.detach()
+    left = 0.75 * opacity
+    total = 0.25 + left
+    assert float(shown[22, 20, 3]) == pytest.approx(total, abs=1e-5)
+    assert float(shown[22, 20, 2]) == pytest.approx((0.25 * 0.8 + left * 0.6) / total, abs=1e-5)
+    assert torch.allclose(shown[2, 2], below[2, 2], atol=1e-5)
+    (grad,) = torch.autograd.grad(image[22, 20, 2], below)
+    assert float(grad[22, 20, 2]) == pytest.approx(left / total, abs=1e-4)
+
+
+def test_other_size_than_the_canvas() -> None:
+    shapes, groups = scene()
+    large = render(shapes, groups, size=(2 * SIZE, 2 * SIZE))
+    halved = large.reshape(SIZE, 2, SIZE, 2, 4).mean(dim=(1, 3))
+    assert psnr(on_white(halved), on_white(render(shapes, groups))) > 33
+    wide = render(shapes, groups, size=(2 * SIZE, SIZE)).reshape(SIZE, SIZE, 2, 4).mean(dim=2)
+    assert psnr(on_white(wide), on_white(render(shapes, groups))) > 33
+
+
+def test_scenes_of_one_structure_share_a_layout() -> None:
+    shape, group = circle()
+    render([shape], [group])
+    before = len(LAYOUTS)
+    for radius in range(3, 9):
+        render([pydiffvg.Circle(tensor(float(radius)), tensor(20, 20))], [group])
+    assert len(LAYOUTS) == before
+
+
+def test_nothing_to_draw() -> None:
+    assert not render([], []).any()
+
+
+def varied() -> dict[str, tuple[Tensor, Callable[[Tensor], Tensor]]]:
+    """What has gradients: values, and the picture that they make."""
+
+    def one(shape: object, color: object = None, **group: object) -> Tensor:
+        fill = tensor(0.7, 0.3, 0.5, 0.8) if color is None else color
+        return render([shape], [pydiffvg.ShapeGroup(torch.tensor([0]), fill, **group)])  # type: ignore[list-item]
+
+    def stroked(shape: object, **group: object) -> Tensor:
+        made = pydiffvg.ShapeGroup(torch.tensor([0]), None, stroke_color=tensor(0.2, 0.6, 0.1, 0.7), **group)
+        return render([shape], [made])  # type: ignore[list-item]
+
+    disc = pydiffvg.Circle(tensor(12.0), tensor(24.3, 22.1), tensor(2.0))
+    bow = tensor([[8, 30], [14, 8], [30, 44], [40, 16]])
+    cubic = torch.tensor([2])
+    stops = tensor([[0.9, 0.1, 0.2, 0.9], [0.1, 0.8, 0.6, 0.5]])
+    ends = tensor(12, 20, 36, 26)
+    turned = tensor([[0.8, -0.5, 14.0], [0.5, 0.9, -8.0], [0, 0, 1]])
+    offsets = tensor(0.1, 0.8)
+    return {
+        "circle": (tensor(11.3, 23.1, 25.2), lambda v: one(pydiffvg.Circle(v[0], v[1:]))),
+        "ellipse": (tensor(11.3, 6.2, 23.1, 25.2), lambda v: one(pydiffvg.Ellipse(v[:2], v[2:]))),
+        "rect": (tensor(8.3, 9.2, 33.1, 35.2), lambda v: one(pydiffvg.Rect(v[:2], v[2:]))),
+        "polygon": (
+            tensor([[8, 9], [40, 12], [22, 41]]),
+            lambda v: one(pydiffvg.Polygon(v, True)),
+        ),
+        "mixed path": (
+            tensor([[9, 9], [40, 10], [46, 30], [34, 40], [20, 46], [6, 30]]),
+            lambda v: one(pydiffvg.Path(torch.tensor([0, 1, 2]), v, True)),
+        ),
+        "stroke": (bow, lambda v: stroked(pydiffvg.Path(cubic, v, False, tensor(2.5)))),
+        "width": (tensor([2.5]), lambda v: stroked(pydiffvg.Path(cubic, bow, False, v))),
+        "widths": (tensor(3, 1.5, 2, 4), lambda v: stroked(pydiffvg.Path(cubic, bow, False, v))),
+        "tapered points": (bow, lambda v: stroked(pydiffvg.Path(cubic, v, False, tensor(3, 1.5, 2, 4)))),
+        "map": (turned, lambda v: one(disc, shape_to_canvas=v)),
+        "map of a stroke": (turned, lambda v: stroked(disc, shape_to_canvas=v)),
+        "color": (tensor(0.3, 0.5, 0.2, 0.6), lambda v: one(disc, v)),
+        "linear": (ends, lambda v: one(disc, pydiffvg.LinearGradient(v[:2], v[2:], offsets, stops))),
+        "radial": (ends, lambda v: one(disc, pydiffvg.RadialGradient(v[:2], v[2:] / 2, offsets, stops))),
+        "offsets": (
+            tensor(0.2, 0.7),
+            lambda v: one(disc, pydiffvg.LinearGradient(ends[:2], ends[2:], v, stops)),
+        ),
+        "stops": (stops, lambda v: one(disc, pydiffvg.LinearGradient(ends[:2], ends[2:], offsets, v))),
+    }
+
+
+VARIED = varied()
+
+
+@pytest.mark.parametrize("name", VARIED)
+def test_gradients_are_those_of_differences(name: str) -> None:
+    """Of a smooth loss in all four channels, along two directions."""
+    values, draw = VARIED[name]
+    generator = torch.Generator().manual_seed(5)
+    y, x = torch.meshgrid(torch.linspace(0, 3, SIZE), torch.linspace(0, 3, SIZE), indexing="ij")
+    weights = torch.stack(
+        [(a + x).sin() * (b + y).cos() + 0.3 for a, b in ((0, 1), (1, 0), (2, 3), (4, 2))], dim=2
+    )
+
+    def loss(v: Tensor) -> Tensor:
+        return (weights * draw(v)).double().sum()
+
+    at = values.clone().requires_grad_()
+    (gradient,) = torch.autograd.grad(loss(at), at)
+    assert gradient.abs().max() > 0
+    step = 0.03 * float(values.abs().max()) / 10
+    for _ in range(2):
+        direction = torch.randn(values.shape, generator=generator)
+        if "map" in name:
+            direction[2] = 0
+            direction[:2, :2] *= 0.02
+        with torch.no_grad():
+            ahead, behind = (loss(values + sign * step * direction) for sign in (1, -1))
+        expected = float(ahead - behind) / (2 * step)
+        found = float((gradient * direction).sum())
+        assert found == pytest.approx(expected, rel=0.03, abs=0.03 * float(gradient.norm()))
+
+
+def test_what_is_not_there_says_so() -> None:
+    shape, group = circle()
+    serialize = pydiffvg.RenderFunction.serialize_scene
+
+    def refused(message: str, *arguments: object, **more: object) -> None:
+        with pytest.raises(UsageError, match=message) as caught:
+            serialize(SIZE, SIZE, *arguments, **more)
+        assert "\n" not in str(caught.value)
+
+    refused("signed distances", [shape], [group], output_type=pydiffvg.OutputType.sdf)
+    refused("signed distances", [shape], [group], eval_positions=torch.zeros(3, 2))
+    tent = pydiffvg.PixelFilter(FilterType.tent, tensor(1.0))
+    refused("pixel filter tent of radius 1", [shape], [group], filter=tent)
+    refused("group 0 names shape 0, there are 0", [], [group])
+    path = pydiffvg.Path(torch.tensor([2, 2]), torch.zeros(6, 2), False)
+    refused("shape 0 has 6 points, its num_control_points .* ask for 7", [path], [group])
+    refused("center of shape 0 has shape", [pydiffvg.Circle(tensor(1.0), torch.zeros(3))], [group])
+    with pytest.raises(UsageError, match="render_grad"):
+        pydiffvg.RenderFunction.render_grad()
+    with pytest.raises(UsageError, match="background_image has shape"):
+        render([shape], [group], torch.zeros(SIZE, SIZE, 3))
+
+
+def test_a_device_that_is_not_there() -> None:
+    before = pydiffvg.get_device()
+    try:
+        with pytest.warns(UserWarning, match="there is no cuda:9"):
+            pydiffvg.set_device(torch.device("cuda:9"))
+        assert pydiffvg.get_device().type == ("cuda" if torch.cuda.is_available() else "cpu")
+        pydiffvg.set_use_gpu(False)
+        assert not pydiffvg.get_use_gpu()
+    finally:
+        pydiffvg.set_device(before)
+
+
+def test_opacity_that_has_left_its_range_comes_back() -> None:
+    shape, group = circle()
+    color = tensor(0.2, 0.4, 0.8, 1.2).requires_grad_()
+    group.fill_color = color
+    image = render([shape], [group])
+    assert float(image[22, 20, 3].detach()) == pytest.approx(1.0, abs=1e-5)
+    image[..., 3].sum().backward()
+    assert color.grad is not None and float(color.grad[3]) > 100
+    assert np.isfinite(color.grad.numpy()).all()
