@@ -51,6 +51,13 @@ def test_colors_are_not_premultiplied() -> None:
     assert torch.allclose(image[edge][:, 2], 0.8 * 2 * image[edge][:, 3], atol=1e-3)
 
 
+def test_a_shape_that_is_not_seen_changes_nothing() -> None:
+    shape, group = circle()
+    around = pydiffvg.Rect(tensor(2, 2), tensor(46, 46))
+    hidden = pydiffvg.ShapeGroup(torch.tensor([1]), tensor(0.9, 0.9, 0.9, 0.0))
+    assert torch.allclose(render([shape, around], [group, hidden]), render([shape], [group]), atol=1e-6)
+
+
 def test_seams_of_shapes_that_meet_keep_their_color() -> None:
     halves = [
         pydiffvg.Rect(tensor(10, 10), tensor(20.5, 30)),

@@ -32,6 +32,9 @@ FAINT = 1 / 256
 """Opacity of outlines whose coverages are added. Added, not composited: of two shapes that meet in a pixel
 nothing is left over, which compositing would have for a quarter of it."""
 
+SEEN = 0.5 / 255
+"""Opacity from which on something is seen."""
+
 
 class Layouts:
     """A bounded number of layouts, those used last."""
@@ -202,9 +205,11 @@ def _gradients(
 
 
 def outlines_only(tensors: SceneTensors, layout: Layout) -> SceneTensors:
-    """The same outlines, all black and of opacity ``FAINT``: so faint that their coverages add up."""
+    """The same outlines, all black and of opacity ``FAINT``: so faint that their coverages add up. Those that
+    cannot be seen are left out, as no colour shows there.
+    """
     rows, device = len(layout.rows), tensors.device
     values = {name: tensors.values[name] for name in ("points", "widths") if name in tensors.values}
-    values["opacities"] = torch.full((rows,), FAINT, device=device)
+    values["opacities"] = FAINT * (tensors.values["opacities"].detach() > SEEN).float()
     values["colors"] = torch.zeros(rows, 3, device=device)
     return SceneTensors(layout.outlines, values)

@@ -11,16 +11,14 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.arguments import SceneArguments, take_down
-from warpsplat.pydiffvg.assemble import FAINT, LAYOUTS, assemble, outlines_only
+from warpsplat.pydiffvg.assemble import LAYOUTS, assemble, outlines_only
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
+from warpsplat.pydiffvg.straight import Straight, over
 from warpsplat.torch import render
 
 Tensor = torch.Tensor
-
-NOTHING = 1e-6
-"""Opacity below which colours are no longer divided by it."""
 
 _print_timing = False
 
@@ -138,26 +136,7 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
         result = image + (1 - image[..., 3:]) * background
     else:
         faint = render(outlines_only(tensors, layout), width, height)
-        result = _straight(image, (faint[..., 3:] / FAINT).clamp_max(1.0), background)
+        result = Straight.apply(image, faint) if background is None else over(image, faint, background)
     if _print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result
-
-
-def _straight(image: Tensor, hit: Tensor, background: Tensor | None) -> Tensor:
-    """Means over the pixels of colours that are not premultiplied; 0 where there is none.
-
-    Args:
-        image: premultiplied, shape (height, width, 4).
-        hit: which part of a pixel shapes lie on, shape (height, width, 1).
-        background: not premultiplied, shape (height, width, 4).
-    """
-    if background is None:
-        color = image[..., :3] * (hit / image[..., 3:].clamp_min(NOTHING))
-        return torch.cat([color, image[..., 3:]], dim=2)
-    below, opacity = background[..., :3], background[..., 3:]
-    # Of the part that shapes lie on, as if it were all; the background is seen through them there.
-    seen = hit - image[..., 3:]
-    total = image[..., 3:] + seen * opacity
-    color = (image[..., :3] + seen * opacity * below) * (hit / total.clamp_min(NOTHING))
-    return torch.cat([color + (1 - hit) * below, total + (1 - hit) * opacity], dim=2)
