@@ -100,6 +100,11 @@ class Program:
                     if packed is not None:
                         setattr(packed, name, command.params[index + 1])
 
+    def memory(self) -> dict[int, int]:
+        """Bytes of the arrays of all launches, by address."""
+        arrays = (array for arguments in self._arrays for array in arguments if isinstance(array, wp.array))
+        return {array.ptr: array.capacity for array in arrays if array.ptr}
+
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
         """Append a host function that launches device work (a scan, a sort)."""
         self.launches.append(Launch(self.stage, function.__name__, (lambda: function(*arguments),)))

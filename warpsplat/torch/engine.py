@@ -9,7 +9,6 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 import warp as wp
@@ -24,8 +23,14 @@ from warpsplat.render.program import Program
 from warpsplat.render.renderer import Renderer
 from warpsplat.scene import TRAITS, Scene
 
-KEPT = 8
-"""Engines that are kept."""
+KEPT = 32
+"""Engines that are kept at the most."""
+
+KEPT_BYTES = 512 * 2**20
+"""Memory beyond which only the engine used last is kept."""
+
+SENSIBLE = {"opacities": (0.0, 1.0), "stop_opacities": (0.0, 1.0), "widths": (0.0, None)}
+"""Values that mean something; what lies beyond is drawn as the nearest, and has its gradient."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class Engine:
     def __init__(self, picture: Picture) -> None:
         backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
         self._parameters = Parameters(picture.layout, backend)
-        self._renderer = Renderer(self._parameters, picture.viewport, model=picture.model)
+        self._renderer = Renderer(self._parameters, picture.viewport, model=picture.model, opaque=True)
         self._values, self._grads = (
             {
                 name: wp.to_torch(getattr(group, field))
@@ -82,6 +87,8 @@ class Engine:
         self.lock = threading.Lock()
         self.ticket: object = None
         """Of the call whose forward pass the buffers hold."""
+        self.bytes = self._renderer.bytes()
+        self._stream: torch.cuda.Stream | None = None
 
     def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
         film = self._renderer.film
@@ -108,7 +115,18 @@ class Engine:
         self.ticket = None
         for name, own in self._values.items():
             own.copy_(values[name].reshape(own.shape))
-        self._renderer.forward_complete()
+            if name in SENSIBLE:
+                own.clamp_(*SENSIBLE[name])
+        if self._renderer.forward_complete():
+            self.bytes = self._renderer.bytes()
+
+    def follow(self, device: torch.device) -> None:
+        """Work of the last call, on another stream perhaps, comes before that of torch's current one."""
+        if device.type == "cuda":
+            stream = torch.cuda.current_stream(device)
+            if self._stream not in (None, stream):
+                stream.wait_stream(self._stream)
+            self._stream = stream
 
     def show(self, image: torch.Tensor) -> None:
         """Write what was rendered, shape (height, width, 4)."""
@@ -131,8 +149,12 @@ class Engine:
         program.run()
 
 
+_CUDA = threading.Lock()
+"""Calls take turns: Warp has one current stream for all threads."""
+
+
 class Engines:
-    """A bounded number of engines, those used last."""
+    """Engines used last, as many as are allowed."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
@@ -146,7 +168,9 @@ class Engines:
                 start_warp()
                 engine = Engine(picture)
             self._kept[picture.key] = engine
-            while len(self._kept) > KEPT:
+            while len(self._kept) > 1 and (
+                len(self._kept) > KEPT or sum(each.bytes for each in self._kept.values()) > KEPT_BYTES
+            ):
                 self._kept.popitem(last=False)
             return engine
 
@@ -167,16 +191,15 @@ def clear_cache() -> None:
 @contextlib.contextmanager
 def engine_of(picture: Picture) -> Iterator[Engine]:
     """The engine of ``picture``, for this thread alone and on torch's current stream."""
-    with on_stream(picture.device):
+    if picture.device.type == "cpu":
         engine = ENGINES.get(picture)
         with engine.lock:
             yield engine
-
-
-def on_stream(device: torch.device) -> contextlib.AbstractContextManager[Any]:
-    """Have Warp work where torch does."""
-    if device.type == "cpu":
-        return contextlib.nullcontext()
-    if device.type != "cuda":
-        raise UsageError(f"tensors are on {device}, neither on the CPU nor on CUDA")
-    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))
+        return
+    if picture.device.type != "cuda":
+        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
+    start_warp()
+    with _CUDA, wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(picture.device))):
+        engine = ENGINES.get(picture)
+        engine.follow(picture.device)
+        yield engine
