@@ -40,6 +40,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "files",
         "svg",
         "metrics",
+        "torch",
     ),
     "torch": ("errors", "scene", "kernels", "render", "fit", "svg"),
 }

@@ -42,11 +42,13 @@ class Picture:
     model: Model
     device: torch.device
     threads: int
+    opaque: bool
+    """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
         """Equal where the same engine serves."""
-        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads
+        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads, self.opaque
 
 
 STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait.name for trait in TRAITS))
@@ -74,7 +76,9 @@ class Engine:
     def __init__(self, picture: Picture) -> None:
         backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
         self._parameters = Parameters(picture.layout, backend)
-        self._renderer = Renderer(self._parameters, picture.viewport, model=picture.model, opaque=True)
+        self._renderer = Renderer(
+            self._parameters, picture.viewport, model=picture.model, opaque=picture.opaque
+        )
         self._values, self._grads = (
             {
                 name: wp.to_torch(getattr(group, field))

@@ -11,12 +11,14 @@ from warpsplat.errors import UsageError
 from warpsplat.render.backend import Viewport
 from warpsplat.render.models import EXACT, GaussianModel, Model, SplatModel
 from warpsplat.scene import ATTRIBUTES, Canvas
+from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import Picture, engine_of
 from warpsplat.torch.tensors import SceneTensors
 
 Tensor = torch.Tensor
 MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
 NAMES = tuple(attribute.name for attribute in ATTRIBUTES)
+OPACITIES = ATTRIBUTES[NAMES.index("opacities")]
 
 
 def render(
@@ -51,7 +53,9 @@ def render(
     model = model_of(renderer)
     used = threads or torch.get_num_threads()
     pictures = [
-        Picture(one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used)
+        Picture(
+            one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used, is_opaque(one)
+        )
         for one in scenes
     ]
     sizes = {(p.viewport.width, p.viewport.height, p.device) for p in pictures}
@@ -66,6 +70,11 @@ def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
     """A picture of ``render``, shape (..., 4), on a colour or on a picture of sRGB: shape (..., 3)."""
     below = torch.as_tensor(background, dtype=image.dtype, device=image.device)
     return image[..., :3] + (1 - image[..., 3:]) * below
+
+
+def is_opaque(scene: SceneTensors) -> bool:
+    """Whether some shape lets so little light through that one could not divide by it."""
+    return bool((scene.value(OPACITIES).detach() > OPACITY_RANGE[1]).any())
 
 
 def model_of(renderer: str | Model) -> Model:
