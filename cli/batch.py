@@ -90,8 +90,8 @@ def command(
     from warpsplat.cli.run import run_file
     from warpsplat.jobs.execute import Outcome, execute
     from warpsplat.jobs.plan import load_jobs
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
 
     todo = load_jobs(jobs)
     if not overwrite:

@@ -65,8 +65,8 @@ def command(
     from warpsplat.cli.vectorize import summary
     from warpsplat.jobs.refine import refine
     from warpsplat.jobs.vectorize import load_target
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
     from warpsplat.svg.inspect import read_svg_text
 
     text = read_svg_text(svg)

@@ -54,8 +54,8 @@ def command(
             png = draw_png(text, zoom=scale)
         else:
             from warpsplat.jobs.render import draw_own
-            from warpsplat.render.backend import Backend
-            from warpsplat.render.device import choose_device, start_warp
+            from warpsplat.rendering.backend import Backend
+            from warpsplat.rendering.device import choose_device, start_warp
 
             start_warp()
             png = draw_own(text, renderer, scale, Backend.on(choose_device(device), threads))

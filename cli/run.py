@@ -17,7 +17,7 @@ from warpsplat.files.inputs import input_name
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.vectorize import Result, vectorize_file
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}

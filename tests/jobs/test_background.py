@@ -15,7 +15,7 @@ from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.vectorize import Result, load_target, vectorize_file
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own
 

@@ -13,7 +13,7 @@ from tests.trace.line_art import CROSS, TEE, drawn, grown, shown
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.vectorize import Result, vectorize, vectorize_file
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 
 
 def lines_of(image: np.ndarray, device: str) -> Result:

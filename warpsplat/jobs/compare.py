@@ -17,7 +17,7 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.tracer import Tracer
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, vectorize
 from warpsplat.metrics import Score, score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 OURS = "warpsplat"

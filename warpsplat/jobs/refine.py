@@ -15,7 +15,7 @@ from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, training_seconds
 from warpsplat.metrics import psnr, score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import KeptScene, load_kept

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from PIL import Image
 
 from warpsplat.errors import ImageError
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import EXACT, Model, SplatModel
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import EXACT, Model, SplatModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.scene.chains import as_chains
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
