@@ -18,7 +18,7 @@ def command(as_json: bool) -> None:
 
     import warp as wp
 
-    from warpsplat import __version__
+    from warpsplat._version import __version__
     from warpsplat.rendering.backend import available_cores
     from warpsplat.rendering.device import choose_device, start_warp
 

@@ -26,7 +26,8 @@ def improved(
     text: str, target: np.ndarray, settings: Settings, device: str, **how: bool
 ) -> tuple[Result, float]:
     refined = refine(text, target, settings, Backend.on(device), name="a.svg", **how)
-    return refined.result, refined.before
+    assert refined.before is not None
+    return refined, refined.before
 
 
 def test_nothing_is_added(device: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from warpsplat import __version__
+from warpsplat._version import __version__
 from warpsplat.errors import ImageError, Stopped, printable
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.tracer import Tracer

@@ -20,6 +20,7 @@ import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import warp as wp
 
@@ -46,6 +47,18 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
     """
     module = kernel.module
     block_dim = 1 if device.is_cpu else module.options["block_dim"]
+    if (None if device.is_cpu else device.context, block_dim) in module.execs:
+        return
+    with _loading:
+        _load(module, device, block_dim)
+
+
+_loading = threading.RLock()
+"""One thread at a time compiles or loads."""
+
+
+def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
+    """Load what is not loaded."""
     if (None if device.is_cpu else device.context, block_dim) in module.execs:
         return
     failure: BaseException | None = None

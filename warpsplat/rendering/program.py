@@ -15,6 +15,7 @@ import warp as wp
 
 from warpsplat.rendering.helpers import Request, helpers
 from warpsplat.rendering.kernel_cache import load
+from warpsplat.rendering.turns import undisturbed
 
 PIECES_PER_THREAD = 4
 """A split launch is cut finer than there are threads, so that uneven pieces balance."""
@@ -130,7 +131,8 @@ class Program:
 def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
     """One graph that replays ``programs`` without Python in between; None where that is not possible.
 
-    A CPU graph runs on one thread, so several threads are not given up for it; a GPU needs its memory pool,
+    A CPU graph runs on one thread, so several threads are not given up for it; nor is one made while other
+    threads work (``turns``), whose launches would become part of it. A GPU needs its memory pool,
     as scans and sorts take their scratch memory from it.
     """
     if device.is_cpu:
@@ -138,10 +140,13 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
             return None
     elif not wp.is_mempool_enabled(device):
         return None
-    with wp.ScopedCapture(device) as captured:
-        for program in programs:
-            program.run()
-    return captured.graph
+    with undisturbed() as alone:
+        if not alone and device.is_cpu:
+            return None
+        with wp.ScopedCapture(device) as captured:
+            for program in programs:
+                program.run()
+        return captured.graph
 
 
 def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:

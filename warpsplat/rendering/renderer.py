@@ -227,6 +227,13 @@ def render(
     """
     canvas = scene.canvas
     size = max(1, round(canvas.width * scale)), max(1, round(canvas.height * scale))
-    made = Renderer(Parameters(scene, backend or Backend.on()), Viewport(*size, scale), model=model)
+    return render_into(scene, Viewport(*size, scale), model=model, backend=backend)
+
+
+def render_into(
+    scene: Scene, viewport: Viewport, *, model: Model = EXACT, backend: Backend | None = None
+) -> FloatArray:
+    """As ``render``, at a size in pixels."""
+    made = Renderer(Parameters(scene, backend or Backend.on()), viewport, model=model)
     made.forward_complete()
     return made.read_image()
