@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import sys
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -17,7 +18,8 @@ import warpsplat
 from tests import ROOT
 
 EXAMPLES = ROOT / "examples"
-STEPS = 12
+STEPS = 25
+CURVES = 12
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +44,9 @@ def example(name: str) -> ModuleType:
 
 @pytest.mark.parametrize("name", ["own_loss", "painterly", "masked_strokes"])
 def test_an_image_is_fitted(name: str, cat: str, tmp_path: Path) -> None:
-    losses = example(name).main(cat, str(tmp_path / "a.svg"), STEPS)
+    losses = example(name).main(cat, str(tmp_path / "a.svg"), STEPS, curves=CURVES)
     assert len(losses) == STEPS
-    assert losses[-1] < 0.8 * losses[0]
+    assert losses[-1] < 0.9 * losses[0]
     assert warpsplat.load_svg(tmp_path / "a.svg").canvas.width == 48
 
 
@@ -61,7 +63,7 @@ def test_strokes_keep_to_a_mask_from_a_file(cat: str, tmp_path: Path) -> None:
 def test_two_pictures_are_morphed(cat: str, tmp_path: Path) -> None:
     other = tmp_path / "other.png"
     cv2.imwrite(str(other), cv2.flip(cv2.imread(cat), 0))
-    errors = example("morph").main(cat, str(other), str(tmp_path / "a.webp"), STEPS)
+    errors = example("morph").main(cat, str(other), str(tmp_path / "a.webp"), STEPS, 40)
     assert max(errors) < 0.03
     from PIL import Image
 
@@ -73,12 +75,12 @@ def test_a_network_compares(cat: str, tmp_path: Path) -> None:
     torch.manual_seed(3)
     sizes = [3, 4, 4, 6, 6, 8, 8, 8]
     state: dict[str, Any] = {}
-    for i, (before, after) in enumerate(zip(sizes, sizes[1:], strict=False)):
+    for i, (before, after) in enumerate(pairwise(sizes)):
         state[f"features.{2 * i}.weight"] = torch.randn(after, before, 3, 3) / before**0.5
         state[f"features.{2 * i}.bias"] = torch.zeros(after)
     torch.save(state, tmp_path / "weights.pth")
     path = str(tmp_path / "weights.pth")
-    losses = example("perceptual_loss").main(cat, str(tmp_path / "a.svg"), path, STEPS)
+    losses = example("perceptual_loss").main(cat, str(tmp_path / "a.svg"), path, STEPS, CURVES)
     assert losses[-1] < 0.8 * losses[0]
 
 

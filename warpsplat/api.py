@@ -328,7 +328,7 @@ def load_image(image: ImageSource) -> FloatArray:
 def starting_scene(
     image: ImageSource, curves: int = 128, *, open: bool = False, seed: int = 0, background: str = "auto"
 ) -> Scene:
-    """Shapes to begin a fit of your own with: a loose grid that covers the canvas, in the colours of the image.
+    """Shapes to begin a fit of your own with: a loose grid over the canvas, in the colours of the image.
 
     Args:
         image: as for ``vectorize``.
