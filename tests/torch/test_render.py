@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from tests.scenes import mixed_scene, random_scene
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import SplatModel
-from warpsplat.render.renderer import render as native_render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import SplatModel
+from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Kind
 from warpsplat.torch import SceneTensors, render
 

@@ -18,8 +18,8 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.jobs.options import KINDS
 from warpsplat.jobs.timing import WARM_UP, Spread, timed
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 
 STAGES = ("outline", "bins", "forward", "loss", "backward", "update")

@@ -10,8 +10,8 @@ import torch
 import warp as wp
 
 from warpsplat.jobs.timing import WARM_UP, Spread, timed
-from warpsplat.render.program import capture
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.program import capture
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.torch import SceneTensors, render
 
 
@@ -31,7 +31,7 @@ def bench_torch(own: Renderer, renderer: Any, repeats: int) -> dict[str, Any]:
     place = wp.device_to_torch(device)
     tensors = SceneTensors.of(own.parameters.scene(), place, requires_grad=True)
     wanted = [value for value in tensors.values.values() if value.requires_grad]
-    gradient = torch.rand(viewport.height, viewport.width, 4, device=place)
+    gradient = torch.rand(viewport.height, viewport.width, 4, dtype=torch.float32, device=place)
     programs = (own.forward_program, own.backward_program)
     graph = capture(device, programs)
 

@@ -15,12 +15,13 @@ import warp as wp
 
 from warpsplat.errors import UsageError
 from warpsplat.kernels import constants, pixels
-from warpsplat.render.backend import Backend, Viewport, view
-from warpsplat.render.device import start_warp
-from warpsplat.render.models import Model
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.backend import Backend, Viewport, view
+from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.models import Model
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import Renderer
+from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
 
 KEPT = 32
@@ -153,10 +154,6 @@ class Engine:
         program.run()
 
 
-_CUDA = threading.Lock()
-"""Calls take turns: Warp has one current stream for all threads."""
-
-
 class Engines:
     """Engines used last, as many as are allowed."""
 
@@ -169,7 +166,6 @@ class Engines:
         with self._lock:
             engine = self._kept.pop(picture.key, None)
             if engine is None:
-                start_warp()
                 engine = Engine(picture)
             self._kept[picture.key] = engine
             while len(self._kept) > 1 and (
@@ -195,15 +191,24 @@ def clear_cache() -> None:
 @contextlib.contextmanager
 def engine_of(picture: Picture) -> Iterator[Engine]:
     """The engine of ``picture``, for this thread alone and on torch's current stream."""
-    if picture.device.type == "cpu":
+    if picture.device.type not in ("cpu", "cuda"):
+        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
+    _start()
+    device = wp.device_from_torch(picture.device)
+    with turn(device), _on_stream(picture.device):
         engine = ENGINES.get(picture)
         with engine.lock:
+            engine.follow(picture.device)
             yield engine
-        return
-    if picture.device.type != "cuda":
-        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
+
+
+@functools.cache
+def _start() -> None:
     start_warp()
-    with _CUDA, wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(picture.device))):
-        engine = ENGINES.get(picture)
-        engine.follow(picture.device)
-        yield engine
+
+
+def _on_stream(device: torch.device) -> contextlib.AbstractContextManager[object]:
+    """Have Warp work where torch does."""
+    if device.type == "cpu":
+        return contextlib.nullcontext()
+    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))

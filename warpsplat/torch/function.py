@@ -8,8 +8,8 @@ from typing import Any, Literal
 import torch
 
 from warpsplat.errors import UsageError
-from warpsplat.render.backend import Viewport
-from warpsplat.render.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
 from warpsplat.scene import ATTRIBUTES, Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import Picture, engine_of
@@ -36,7 +36,7 @@ def render(
         width: of the picture [px]; default: the canvas', or what ``height`` makes it.
         height: [px]; the same.
         renderer: what covers the pixels: ``exact``, the area that a viewer computes; ``splat``, the
-            Gaussians of the paths; ``gaussian``, soft ones; or a model of ``warpsplat.render.models``.
+            Gaussians of the paths; ``gaussian``, soft ones; or a model of ``warpsplat.rendering.models``.
         threads: of the CPU, default: as many as torch uses.
 
     Returns:
@@ -118,7 +118,8 @@ class _Render(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, pictures: list[Picture], *values: Tensor) -> Tensor:
         viewport, device = pictures[0].viewport, pictures[0].device
-        images = torch.empty(len(pictures), viewport.height, viewport.width, 4, device=device)
+        shape = len(pictures), viewport.height, viewport.width, 4
+        images = torch.empty(shape, dtype=torch.float32, device=device)
         tickets = []
         for i, picture in enumerate(pictures):
             with engine_of(picture) as engine:
