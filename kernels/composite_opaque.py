@@ -1,11 +1,11 @@
 """The adjoint of compositing for opacities up to 1, flat or with gradients; see ``composite``.
 
 dL/d alpha_i = T_i (dot(c_i, G) - B_i), where B_i is dot(b_i, G) of the colour b_i that is seen where shape i
-and all in front of it are taken away. The other adjoint divides by 1 - alpha_i to find B_i, of which an opaque
-shape leaves nothing. Here one walk from the front keeps the light T_i that arrives at each slot, and one from
-the back, from the background on, has B_{i-1} = B_i + alpha_i (dot(c_i, G) - B_i). The lists go one opaque
-shape further back than what is seen (``most`` of ``bins.list_visible``): what is behind it says what its
-opacity is worth. (The same lines in both kernels: as a function, they are not kept in registers.)
+and all in front of it are taken away. The other adjoint divides by 1 - alpha_i to find B_i, of which an
+opaque shape leaves nothing. Here one walk from the front keeps the light T_i that arrives at each slot, and
+one from the back, from the background on, has B_{i-1} = B_i + alpha_i (dot(c_i, G) - B_i). The lists go one
+opaque shape further back than what is seen (``most`` of ``bins.list_visible``): what is behind it says what
+its opacity is worth. (The same lines in both kernels: as a function, they are not kept in registers.)
 """
 
 import warp as wp

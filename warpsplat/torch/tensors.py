@@ -43,6 +43,8 @@ class SceneTensors:
             wanted = self.layout.shape_of(TABLE[name])
             if tuple(value.shape) != wanted:
                 raise ValueError(f"{name} has shape {tuple(value.shape)}, not {wanted}")
+            if value.requires_grad and name in WITHOUT_GRADIENT:
+                raise ValueError(f"{name} has no gradient here, and requires one: detach it")
             if value.device != self.device:
                 raise ValueError(f"{name} is on {value.device}, other attributes are on {self.device}")
 
@@ -87,7 +89,15 @@ class SceneTensors:
             if not np.isfinite(array).all():
                 raise ValueError(f"{name} holds numbers that are not finite")
             arrays[name] = np.clip(array, *limits(TABLE[name])).astype(np.float32)
-        return replace(self.layout, **arrays)
+        return untied(replace(self.layout, **arrays))
+
+
+def untied(scene: Scene) -> Scene:
+    """The scene with only those twins whose points are still those of the shape before them."""
+    twin = scene.twin.copy()
+    for i in np.flatnonzero(twin).tolist():
+        twin[i] = np.array_equal(scene.points_of(i), scene.points_of(i - 1))
+    return replace(scene, twin=twin)
 
 
 def limits(attribute: Attribute) -> tuple[float, float]:
