@@ -62,7 +62,7 @@ def test_opaque_splats() -> None:
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_opaque_shapes_behind_one_another(kind: Kind) -> None:
-    """Three of the same place: the first is seen, the second counts for its opacity, the third for nothing."""
+    """Three in one place: the front one is seen, the next one says what its opacity is worth."""
     one = random_scene(kind, 1, seed=2)
     scene = replace(one.append(one).append(one), opacities=np.ones(3, np.float32))
     scene = replace(scene, widths=np.full(3, 30 if kind == Kind.STROKE else 0, np.float32))

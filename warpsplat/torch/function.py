@@ -44,13 +44,15 @@ def render(
         of several scenes (scene, height, width, 4). On a canvas with a background the opacity is 1.
 
     Raises:
-        UsageError: no such size, renderer or device.
-        ValueError: a scene that the model cannot show.
+        UsageError: no such size, renderer or device, or no scene.
+        ValueError: a scene that the model cannot show, or a number that is not finite.
     """
     scenes = [scene] if isinstance(scene, SceneTensors) else list(scene)
     if not scenes:
         raise UsageError("no scene to render")
     model = model_of(renderer)
+    for one in scenes:
+        check_finite(one)
     used = threads or torch.get_num_threads()
     pictures = [
         Picture(
@@ -70,6 +72,19 @@ def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
     """A picture of ``render``, shape (..., 4), on a colour or on a picture of sRGB: shape (..., 3)."""
     below = torch.as_tensor(background, dtype=image.dtype, device=image.device)
     return image[..., :3] + (1 - image[..., 3:]) * below
+
+
+def check_finite(scene: SceneTensors) -> None:
+    """Whether all numbers are.
+
+    Raises:
+        ValueError: one is not.
+    """
+    if scene.values:
+        finite = torch.stack([value.detach().isfinite().all() for value in scene.values.values()])
+        if not finite.all():
+            names = [name for name, fine in zip(scene.values, finite.tolist(), strict=True) if not fine]
+            raise ValueError(f"{', '.join(names)}: numbers that are not finite")
 
 
 def is_opaque(scene: SceneTensors) -> bool:

@@ -26,9 +26,9 @@ class Module(torch.nn.Module):
             soft_only = name == "fades" and model_of(renderer) is not MODELS["gaussian"]
             if name not in WITHOUT_GRADIENT and has(scene, attribute) and not soft_only:
                 self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
-        self._twins: torch.Tensor | None = None
-        if scene.twin.any():
-            self.register_buffer("_twins", torch.tensor(same_points(scene)), persistent=False)
+        self._twins: torch.Tensor | None
+        tied = torch.tensor(same_points(scene)) if scene.twin.any() else None
+        self.register_buffer("_twins", tied, persistent=False)
 
     def tensors(self) -> SceneTensors:
         """The scene of the parameters; what is done with it has gradients."""
