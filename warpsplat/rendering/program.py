@@ -94,12 +94,13 @@ class Program:
         """From now on ``array``, of the same type as before, is the parameter ``name`` of all launches that
         have one. Not kept alive: whoever runs the program does that.
         """
+        value = array.__ctype__()
         for command, packed in self._commands:
             for index, argument in enumerate(command.kernel.adj.args):
                 if argument.label == name:
-                    command.set_param_at_index(index, array)
+                    command.set_param_at_index_from_ctype(index, value)
                     if packed is not None:
-                        setattr(packed, name, command.params[index + 1])
+                        setattr(packed, name, value)
 
     def memory(self) -> dict[int, int]:
         """Bytes of the arrays of all launches, by address."""

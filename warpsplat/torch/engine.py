@@ -14,12 +14,11 @@ import torch
 import warp as wp
 
 from warpsplat.errors import UsageError
-from warpsplat.kernels import constants, pixels
-from warpsplat.rendering.backend import Backend, Viewport, view
+from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.film import PixelFilm
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
@@ -43,13 +42,11 @@ class Picture:
     model: Model
     device: torch.device
     threads: int
-    opaque: bool
-    """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
         """Equal where the same engine serves."""
-        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads, self.opaque
+        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads
 
 
 STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait.name for trait in TRAITS))
@@ -77,9 +74,7 @@ class Engine:
     def __init__(self, picture: Picture) -> None:
         backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
         self._parameters = Parameters(picture.layout, backend)
-        self._renderer = Renderer(
-            self._parameters, picture.viewport, model=picture.model, opaque=picture.opaque
-        )
+        self._renderer = Renderer(self._parameters, picture.viewport, model=picture.model, film=PixelFilm)
         self._values, self._grads = (
             {
                 name: wp.to_torch(getattr(group, field))
@@ -88,42 +83,39 @@ class Engine:
             }
             for field in ("value", "grad")
         )
-        self._record_pixels(backend, picture.viewport)
         self.lock = threading.Lock()
         self.ticket: object = None
         """Of the call whose forward pass the buffers hold."""
         self.bytes = self._renderer.bytes()
         self._stream: torch.cuda.Stream | None = None
 
-    def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
-        film = self._renderer.film
-        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS)
-        anything = backend.array(wp.vec4, 1, 1)
+    def forward(self, values: Mapping[str, torch.Tensor], image: torch.Tensor) -> None:
+        """Render the scene of these attributes, each in the shape of its field.
 
-        def record(kernel: wp.Kernel, tiles: wp.array) -> Program:
-            program = backend.program()
-            program.launch(
-                kernel,
-                (viewport.tile_count, constants.TILE),
-                viewport,
-                pixels=anything,
-                image_pixels=view(tiles, wp.float32, shape),
-                split=True,
-            )
-            return program
-
-        self._show = record(pixels.tiles_to_pixels, film.buffers.image)
-        self._take = record(pixels.pixels_to_tiles, film.buffers.image_grad)
-
-    def forward(self, values: Mapping[str, torch.Tensor]) -> None:
-        """Render the scene of these attributes, each in the shape of its field."""
+        ``image``: written, shape (height, width, 4).
+        """
         self.ticket = None
         for name, own in self._values.items():
             own.copy_(values[name].reshape(own.shape))
             if name in SENSIBLE:
                 own.clamp_(*SENSIBLE[name])
-        if self._renderer.forward_complete():
-            self.bytes = self._renderer.bytes()
+        pixels = rows_of(image)
+        grown = True
+        while grown:
+            self._renderer.forward_program.rebind("pixels", pixels)
+            self._renderer.forward()
+            if grown := self._renderer.make_room():
+                self.bytes = self._renderer.bytes()
+
+    def backward(self, image_grad: torch.Tensor) -> dict[str, torch.Tensor]:
+        """From the gradient of the image, shape (height, width, 4), to those of the attributes. The state of
+        the forward pass is used up.
+        """
+        self.ticket = None
+        pixels_grad = rows_of(image_grad)
+        self._renderer.backward_program.rebind("pixels_grad", pixels_grad)
+        self._renderer.backward()
+        return {name: own.clone() for name, own in self._grads.items()}
 
     def follow(self, device: torch.device) -> None:
         """Work of the last call, on another stream perhaps, comes before that of torch's current one."""
@@ -133,25 +125,12 @@ class Engine:
                 stream.wait_stream(self._stream)
             self._stream = stream
 
-    def show(self, image: torch.Tensor) -> None:
-        """Write what was rendered, shape (height, width, 4)."""
-        self._run(self._show, image)
 
-    def backward(self, image_grad: torch.Tensor) -> dict[str, torch.Tensor]:
-        """From the gradient of the image, shape (height, width, 4), to those of the attributes. The state of
-        the forward pass is used up.
-        """
-        self.ticket = None
-        self._run(self._take, image_grad)
-        self._renderer.backward()
-        return {name: own.clone() for name, own in self._grads.items()}
-
-    @staticmethod
-    def _run(program: Program, image: torch.Tensor) -> None:
-        array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
-        assert isinstance(array, wp.array)
-        program.rebind("pixels", array)
-        program.run()
+def rows_of(image: torch.Tensor) -> wp.array:
+    """The memory of a picture as the kernels know it: [height, width] vectors."""
+    array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
+    assert isinstance(array, wp.array)
+    return array
 
 
 class Engines:

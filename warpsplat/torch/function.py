@@ -11,14 +11,12 @@ from warpsplat.errors import UsageError
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
 from warpsplat.scene import ATTRIBUTES, Canvas
-from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import Picture, engine_of
 from warpsplat.torch.tensors import SceneTensors
 
 Tensor = torch.Tensor
 MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
 NAMES = tuple(attribute.name for attribute in ATTRIBUTES)
-OPACITIES = ATTRIBUTES[NAMES.index("opacities")]
 
 
 def render(
@@ -55,9 +53,7 @@ def render(
         check_finite(one)
     used = threads or torch.get_num_threads()
     pictures = [
-        Picture(
-            one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used, is_opaque(one)
-        )
+        Picture(one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used)
         for one in scenes
     ]
     sizes = {(p.viewport.width, p.viewport.height, p.device) for p in pictures}
@@ -85,11 +81,6 @@ def check_finite(scene: SceneTensors) -> None:
         if not finite.all():
             names = [name for name, fine in zip(scene.values, finite.tolist(), strict=True) if not fine]
             raise ValueError(f"{', '.join(names)}: numbers that are not finite")
-
-
-def is_opaque(scene: SceneTensors) -> bool:
-    """Whether some shape lets so little light through that one could not divide by it."""
-    return bool((scene.value(OPACITIES).detach() > OPACITY_RANGE[1]).any())
 
 
 def model_of(renderer: str | Model) -> Model:
@@ -138,8 +129,7 @@ class _Render(torch.autograd.Function):
         tickets = []
         for i, picture in enumerate(pictures):
             with engine_of(picture) as engine:
-                engine.forward(dict(zip(NAMES, _part(values, i), strict=True)))
-                engine.show(images[i])
+                engine.forward(dict(zip(NAMES, _part(values, i), strict=True)), images[i])
                 tickets.append(ticket := object())
                 engine.ticket = ticket
         ctx.pictures, ctx.tickets = pictures, tickets
@@ -169,12 +159,15 @@ class _Adjoint(torch.autograd.Function):
             if not any(asked):
                 found += [None] * len(NAMES)
                 continue
+            gradient = images_grad[i].contiguous()
             with engine_of(picture) as engine:
                 if engine.ticket is not tickets[i]:  # another call has used the buffers since
-                    engine.forward(dict(zip(NAMES, own, strict=True)))
-                gradients = engine.backward(images_grad[i].contiguous())
+                    engine.forward(dict(zip(NAMES, own, strict=True)), torch.empty_like(gradient))
+                gradients = engine.backward(gradient)
             found += [
-                gradients.get(name, torch.zeros_like(value)).reshape(value.shape) if want else None
+                (gradients[name] if name in gradients else torch.zeros_like(value)).reshape(value.shape)
+                if want
+                else None
                 for name, value, want in zip(NAMES, own, asked, strict=True)
             ]
         return tuple(found)
