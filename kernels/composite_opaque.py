@@ -1,4 +1,4 @@
-"""The adjoint of ``composite_pixels``, for opacities up to 1; see ``composite``.
+"""The adjoint of compositing for opacities up to 1, flat or with gradients; see ``composite``.
 
 dL/d alpha_i = T_i (dot(c_i, G) - B_i), where B_i is dot(b_i, G) of the colour b_i that is seen where shape i
 and all in front of it are taken away. The other adjoint divides by 1 - alpha_i to find B_i, of which an
@@ -16,7 +16,6 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-TILE = wp.constant(constants.TILE)
 AREA = wp.constant(constants.AREA)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 
@@ -42,11 +41,8 @@ def opaque_backward(
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
     law: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-    pixels_grad: wp.array2d[wp.vec4],  # [height, width]
+    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
     background: wp.vec3,
-    width: wp.int32,  # [px]
-    height: wp.int32,  # [px]
-    tiles_x: wp.int32,
     # Out:
     light: wp.array2d[column],  # [slot_capacity, lanes] by place in the lists, of the column at hand
     sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
@@ -59,19 +55,10 @@ def opaque_backward(
     start = tile_first[tile]
     stop = tile_stop[tile]
     one = column(1.0)
-    x0 = tile % tiles_x * TILE
-    y0 = tile / tiles_x * TILE
-    rows = wp.min(height - y0, TILE)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        red = column(0.0)
-        green = column(0.0)
-        blue = column(0.0)
-        if x0 + x < width:
-            for y in range(rows):
-                g = pixels_grad[y0 + y, x0 + x]
-                red[y] = g[0]
-                green[y] = g[1]
-                blue[y] = g[2]
+        red = image_grad[tile, 0, x]
+        green = image_grad[tile, 1, x]
+        blue = image_grad[tile, 2, x]
         t = one
         for k in range(start, stop):
             light[k, lane] = t
@@ -131,12 +118,8 @@ def opaque_paint_backward(
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: of a gradient or picture
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
     law: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-    pixels_grad: wp.array2d[wp.vec4],  # [height, width]
-    planes: wp.int32,  # 4: the canvas is transparent
+    image_grad: wp.array3d[column],  # [tile_count, planes, TILE]
     background: wp.vec3,
-    width: wp.int32,  # [px]
-    height: wp.int32,  # [px]
-    tiles_x: wp.int32,
     # Out:
     light: wp.array2d[column],  # [slot_capacity, lanes] by place in the lists, of the column at hand
     paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colours and opacities, replaced by gradients
@@ -150,22 +133,14 @@ def opaque_paint_backward(
     start = tile_first[tile]
     stop = tile_stop[tile]
     one = column(1.0)
-    x0 = tile % tiles_x * TILE
-    y0 = tile / tiles_x * TILE
-    rows = wp.min(height - y0, TILE)
+    zero = column(0.0)
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        red = column(0.0)
-        green = column(0.0)
-        blue = column(0.0)
-        opaque = column(0.0)
-        if x0 + x < width:
-            for y in range(rows):
-                g = pixels_grad[y0 + y, x0 + x]
-                red[y] = g[0]
-                green[y] = g[1]
-                blue[y] = g[2]
-                if planes == 4:
-                    opaque[y] = g[3]
+        red = image_grad[tile, 0, x]
+        green = image_grad[tile, 1, x]
+        blue = image_grad[tile, 2, x]
+        opaque = zero
+        if image_grad.shape[1] == 4:
+            opaque = image_grad[tile, 3, x]
         t = one
         for k in range(start, stop):
             light[k, lane] = t

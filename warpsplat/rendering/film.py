@@ -7,14 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import (
-    composite,
-    composite_opaque,
-    composite_paint,
-    composite_pixels,
-    constants,
-    visibility,
-)
+from warpsplat.kernels import composite, composite_opaque, composite_paint, constants, visibility
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -23,7 +16,6 @@ from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
-from warpsplat.scene.attributes import OPACITY_RANGE
 
 
 @dataclass
@@ -39,9 +31,6 @@ class FilmBuffers:
 
 class Film:
     """What the shapes are composited on."""
-
-    most = 1.0
-    """See ``Bins``."""
 
     def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas, *, opaque: bool = False) -> None:
         """``opaque``: whether shapes of opacity 1 have gradients (``kernels.composite_opaque``)."""
@@ -82,8 +71,17 @@ class Film:
     def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
         plain = self._is_plain(paint)
+        kernel = composite.composite_backward if plain else composite_paint.paint_backward
+        more = {}
+        if self._opaque:
+            kernel = composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward
+            slots = bins.buffers.list_slot.shape[0]
+            more = {
+                "background": self._background,
+                "light": self._backend.array(column, slots, self._backend.lanes),
+            }
         program.launch(
-            composite.composite_backward if plain else composite_paint.paint_backward,
+            kernel,
             self._dim,
             self.buffers,
             bins.buffers,
@@ -93,6 +91,7 @@ class Film:
             law=coverage.law,
             sum_grad=coverage.buffers.coverage,
             split=True,
+            **more,
         )
 
     def removal_cost(
@@ -134,55 +133,3 @@ class Film:
             seen=seen,
             split=True,
         )
-
-
-@dataclass
-class PixelBuffers:
-    """What stands for the picture and its gradient until a caller's arrays do (``Program.rebind``)."""
-
-    pixels: wp.array = buffer(wp.vec4, 1, 1)
-    """[height, width] sRGB premultiplied by opacity, and opacity."""
-    pixels_grad: wp.array = buffer(wp.vec4, 1, 1)
-
-
-class PixelFilm(Film):
-    """Composites into a caller's rows of pixels. Opacities may be 1, and have gradients even so."""
-
-    most = OPACITY_RANGE[1]
-
-    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas) -> None:
-        super().__init__(backend, Viewport(1, 1), canvas)  # its images are not used
-        self._viewport = viewport
-        self.pixels = backend.allocate(PixelBuffers, {})
-
-    def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
-        """Record lists and coverages -> ``pixels``."""
-        plain = self._is_plain(paint)
-        program.launch(
-            composite_pixels.pixels_forward if plain else composite_pixels.pixels_paint_forward,
-            self._dim,
-            *self._sources(bins, coverage, paint),
-            lane_columns=self._backend.lane_size,
-            background=self._background,
-            split=True,
-            **({} if plain else {"planes": self.planes}),
-        )
-
-    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
-        """Record ``pixels_grad`` -> gradients by slot, those of the coverages in their place."""
-        plain = self._is_plain(paint)
-        program.launch(
-            composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward,
-            self._dim,
-            *self._sources(bins, coverage, paint),
-            lane_columns=self._backend.lane_size,
-            background=self._background,
-            law=coverage.law,
-            light=self._backend.array(column, bins.buffers.list_slot.shape[0], self._backend.lanes),
-            sum_grad=coverage.buffers.coverage,
-            split=True,
-            **({} if plain else {"planes": self.planes}),
-        )
-
-    def _sources(self, bins: Bins, coverage: Coverage, paint: Painting) -> tuple[object, ...]:
-        return self.pixels, bins.buffers, coverage.buffers, paint.buffers, self._viewport

@@ -7,21 +7,23 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import torch
 import warp as wp
 
 from warpsplat.errors import UsageError
-from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.kernels import constants, pixels
+from warpsplat.rendering.backend import Backend, Viewport, view
 from warpsplat.rendering.device import start_warp
-from warpsplat.rendering.film import PixelFilm
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
+from warpsplat.torch.tensors import attributes_of
 
 KEPT = 32
 """Engines that are kept at the most."""
@@ -42,11 +44,13 @@ class Picture:
     model: Model
     device: torch.device
     threads: int
+    opaque: bool
+    """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
         """Equal where the same engine serves."""
-        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads
+        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads, self.opaque
 
 
 STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait.name for trait in TRAITS))
@@ -54,14 +58,12 @@ STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait
 
 def layout_key(scene: Scene) -> tuple[object, ...]:
     """Equal for scenes that differ in the values of attributes alone."""
-    digest = hashlib.blake2b(digest_size=16)
-    for name in STRUCTURE:
-        array = getattr(scene, name)
-        digest.update(f"{name} {array.shape}".encode())
-        digest.update(array.tobytes())
+    arrays = [getattr(scene, name) for name in STRUCTURE]
+    digest = hashlib.blake2b(b"".join(array.tobytes() for array in arrays), digest_size=16)
     background = scene.canvas.background
     return (
         digest.digest(),
+        tuple(map(len, arrays)),
         (scene.canvas.width, scene.canvas.height, None if background is None else background.tobytes()),
         scene.dashes,
         tuple(map(id, scene.pictures)),  # kept alive by the engine's own layout
@@ -74,48 +76,73 @@ class Engine:
     def __init__(self, picture: Picture) -> None:
         backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
         self._parameters = Parameters(picture.layout, backend)
-        self._renderer = Renderer(self._parameters, picture.viewport, model=picture.model, film=PixelFilm)
+        self._renderer = Renderer(
+            self._parameters, picture.viewport, model=picture.model, opaque=picture.opaque
+        )
+        names = {attribute.name for attribute in attributes_of(picture.layout)}
+        for name in self._parameters.groups.keys() - names:
+            self._parameters.groups[name].value.zero_()  # whatever the layout says
         self._values, self._grads = (
-            {
-                name: wp.to_torch(getattr(group, field))
-                for name, group in self._parameters.groups.items()
-                if group.value.shape[0]
-            }
+            {name: wp.to_torch(getattr(self._parameters.groups[name], field)) for name in names}
             for field in ("value", "grad")
         )
+        self._record_pixels(backend, picture.viewport)
         self.lock = threading.Lock()
         self.ticket: object = None
         """Of the call whose forward pass the buffers hold."""
         self.bytes = self._renderer.bytes()
         self._stream: torch.cuda.Stream | None = None
 
-    def forward(self, values: Mapping[str, torch.Tensor], image: torch.Tensor) -> None:
-        """Render the scene of these attributes, each in the shape of its field.
+    def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
+        film = self._renderer.film
+        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS)
+        anything = backend.array(wp.vec4, 1, 1)
 
-        ``image``: written, shape (height, width, 4).
-        """
+        def record(kernel: wp.Kernel, tiles: wp.array) -> Program:
+            program = backend.program()
+            program.launch(
+                kernel,
+                (viewport.tile_count, constants.TILE),
+                viewport,
+                pixels=anything,
+                image_pixels=view(tiles, wp.float32, shape),
+                split=True,
+            )
+            return program
+
+        self._show = record(pixels.tiles_to_pixels, film.buffers.image)
+        self._take = record(pixels.pixels_to_tiles, film.buffers.image_grad)
+
+    def forward(self, values: Mapping[str, torch.Tensor]) -> None:
+        """Render the scene of these attributes, each in the shape of its field."""
         self.ticket = None
         for name, own in self._values.items():
             own.copy_(values[name].reshape(own.shape))
             if name in SENSIBLE:
                 own.clamp_(*SENSIBLE[name])
-        pixels = rows_of(image)
-        grown = True
-        while grown:
-            self._renderer.forward_program.rebind("pixels", pixels)
-            self._renderer.forward()
-            if grown := self._renderer.make_room():
-                self.bytes = self._renderer.bytes()
+        if self._renderer.forward_complete():
+            self.bytes = self._renderer.bytes()
 
-    def backward(self, image_grad: torch.Tensor) -> dict[str, torch.Tensor]:
-        """From the gradient of the image, shape (height, width, 4), to those of the attributes. The state of
-        the forward pass is used up.
+    def show(self, image: torch.Tensor) -> None:
+        """Write what was rendered, shape (height, width, 4)."""
+        self._run(self._show, image)
+
+    def backward(self, image_grad: torch.Tensor, names: Iterable[str]) -> dict[str, torch.Tensor]:
+        """From the gradient of the image, shape (height, width, 4), to those of the attributes ``names``. The
+        state of the forward pass is used up.
         """
         self.ticket = None
-        pixels_grad = rows_of(image_grad)
-        self._renderer.backward_program.rebind("pixels_grad", pixels_grad)
+        self._run(self._take, image_grad)
         self._renderer.backward()
-        return {name: own.clone() for name, own in self._grads.items()}
+        return {name: self._grads[name].clone() for name in names}
+
+    @staticmethod
+    def _run(program: Program, image: torch.Tensor) -> None:
+        """With the tensor's own memory as the rows of pixels."""
+        array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
+        assert isinstance(array, wp.array)
+        program.rebind("pixels", array)
+        program.run()
 
     def follow(self, device: torch.device) -> None:
         """Work of the last call, on another stream perhaps, comes before that of torch's current one."""
@@ -124,13 +151,6 @@ class Engine:
             if self._stream not in (None, stream):
                 stream.wait_stream(self._stream)
             self._stream = stream
-
-
-def rows_of(image: torch.Tensor) -> wp.array:
-    """The memory of a picture as the kernels know it: [height, width] vectors."""
-    array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
-    assert isinstance(array, wp.array)
-    return array
 
 
 class Engines:

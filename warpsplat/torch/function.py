@@ -10,13 +10,14 @@ import torch
 from warpsplat.errors import UsageError
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
-from warpsplat.scene import ATTRIBUTES, Canvas
+from warpsplat.scene import Canvas
+from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import Picture, engine_of
-from warpsplat.torch.tensors import SceneTensors
+from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
 
 Tensor = torch.Tensor
+Names = tuple[tuple[str, ...], ...]
 MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
-NAMES = tuple(attribute.name for attribute in ATTRIBUTES)
 
 
 def render(
@@ -53,14 +54,17 @@ def render(
         check_finite(one)
     used = threads or torch.get_num_threads()
     pictures = [
-        Picture(one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used)
+        Picture(
+            one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used, is_opaque(one)
+        )
         for one in scenes
     ]
     sizes = {(p.viewport.width, p.viewport.height, p.device) for p in pictures}
     if len(sizes) > 1:
         raise UsageError("scenes of several sizes or devices in one call")
-    values = [one.value(attribute) for one in scenes for attribute in ATTRIBUTES]
-    images: Tensor = _Render.apply(pictures, *values)
+    given = [[(a.name, one.value(a)) for a in attributes_of(one.layout)] for one in scenes]
+    names = tuple(tuple(name for name, _ in each) for each in given)
+    images: Tensor = _Render.apply(pictures, names, *(value for each in given for _, value in each))
     return images.squeeze(0) if isinstance(scene, SceneTensors) else images
 
 
@@ -81,6 +85,11 @@ def check_finite(scene: SceneTensors) -> None:
         if not finite.all():
             names = [name for name, fine in zip(scene.values, finite.tolist(), strict=True) if not fine]
             raise ValueError(f"{', '.join(names)}: numbers that are not finite")
+
+
+def is_opaque(scene: SceneTensors) -> bool:
+    """Whether some shape lets so little light through that one cannot divide by it."""
+    return bool((scene.value(TABLE["opacities"]).detach() > OPACITY_RANGE[1]).any())
 
 
 def model_of(renderer: str | Model) -> Model:
@@ -119,20 +128,21 @@ def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewpo
 
 
 class _Render(torch.autograd.Function):
-    """Pictures, and for each all attributes in the order of the table -> images."""
+    """Pictures, names of the attributes of each, and these one after the other -> images."""
 
     @staticmethod
-    def forward(ctx: Any, pictures: list[Picture], *values: Tensor) -> Tensor:
+    def forward(ctx: Any, pictures: list[Picture], names: Names, *values: Tensor) -> Tensor:
         viewport, device = pictures[0].viewport, pictures[0].device
         shape = len(pictures), viewport.height, viewport.width, 4
         images = torch.empty(shape, dtype=torch.float32, device=device)
         tickets = []
-        for i, picture in enumerate(pictures):
+        for picture, own, image in zip(pictures, _parts(names, values), images, strict=True):
             with engine_of(picture) as engine:
-                engine.forward(dict(zip(NAMES, _part(values, i), strict=True)), images[i])
+                engine.forward(own)
+                engine.show(image)
                 tickets.append(ticket := object())
                 engine.ticket = ticket
-        ctx.pictures, ctx.tickets = pictures, tickets
+        ctx.state = (pictures, tickets, names)
         ctx.save_for_backward(*values)
         ctx.set_materialize_grads(False)
         return images
@@ -140,36 +150,32 @@ class _Render(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, images_grad: Tensor | None) -> tuple[Tensor | None, ...]:
         if images_grad is None:
-            return (None,) * (1 + len(ctx.saved_tensors))
-        wanted = ctx.needs_input_grad[1:]
-        state = (ctx.pictures, ctx.tickets, wanted)
-        found: tuple[Tensor | None, ...] = _Adjoint.apply(state, images_grad, *ctx.saved_tensors)
-        return (None, *found)
+            return (None,) * len(ctx.needs_input_grad)
+        wanted = ctx.needs_input_grad[2:]
+        found: tuple[Tensor | None, ...] = _Adjoint.apply(ctx.state, wanted, images_grad, *ctx.saved_tensors)
+        return (None, None, *found)
 
 
 class _Adjoint(torch.autograd.Function):
     """Gradients of images -> of attributes. A function of its own, as it is what has no derivative."""
 
     @staticmethod
-    def forward(ctx: Any, state: Any, images_grad: Tensor, *values: Tensor) -> tuple[Tensor | None, ...]:
-        pictures, tickets, wanted = state
+    def forward(
+        ctx: Any, state: Any, wanted: Sequence[bool], images_grad: Tensor, *values: Tensor
+    ) -> tuple[Tensor | None, ...]:
+        pictures, tickets, names = state
         found: list[Tensor | None] = []
-        for i, picture in enumerate(pictures):
-            own, asked = _part(values, i), _part(wanted, i)
-            if not any(asked):
-                found += [None] * len(NAMES)
+        each = zip(pictures, tickets, _parts(names, values), _parts(names, wanted), images_grad, strict=True)
+        for picture, ticket, own, asked, image_grad in each:
+            if not any(asked.values()):
+                found += [None] * len(asked)
                 continue
-            gradient = images_grad[i].contiguous()
+            gradient = image_grad.contiguous()
             with engine_of(picture) as engine:
-                if engine.ticket is not tickets[i]:  # another call has used the buffers since
-                    engine.forward(dict(zip(NAMES, own, strict=True)), torch.empty_like(gradient))
-                gradients = engine.backward(gradient)
-            found += [
-                (gradients[name] if name in gradients else torch.zeros_like(value)).reshape(value.shape)
-                if want
-                else None
-                for name, value, want in zip(NAMES, own, asked, strict=True)
-            ]
+                if engine.ticket is not ticket:  # another call has used the buffers since
+                    engine.forward(own)
+                gradients = engine.backward(gradient, [name for name in asked if asked[name]])
+            found += [gradients[name].reshape(own[name].shape) if asked[name] else None for name in asked]
         return tuple(found)
 
     @staticmethod
@@ -177,6 +183,7 @@ class _Adjoint(torch.autograd.Function):
         raise RuntimeError("warpsplat.torch.render has first derivatives only: no double backward")
 
 
-def _part(values: Any, i: int) -> Any:
-    """Those of picture ``i``, in the order of the table."""
-    return values[i * len(NAMES) : (i + 1) * len(NAMES)]
+def _parts(names: Names, values: Sequence[Any]) -> list[dict[str, Any]]:
+    """The values of each picture by name."""
+    rest = iter(values)
+    return [{name: next(rest) for name in own} for own in names]

@@ -12,7 +12,7 @@ from warpsplat.fit.units import Units
 from warpsplat.scene import IndexArray, Scene
 from warpsplat.svg.write import write_svg
 from warpsplat.torch.function import MODELS, model_of, render
-from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, has
+from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of
 
 
 class Module(torch.nn.Module):
@@ -22,9 +22,11 @@ class Module(torch.nn.Module):
         """``renderer``, ``threads``: see ``render``."""
         super().__init__()
         self._layout, self._renderer, self._threads = scene, renderer, threads
-        for name, attribute in TABLE.items():
-            soft_only = name == "fades" and model_of(renderer) is not MODELS["gaussian"]
-            if name not in WITHOUT_GRADIENT and has(scene, attribute) and not soft_only:
+        without = (
+            WITHOUT_GRADIENT if model_of(renderer) is MODELS["gaussian"] else (*WITHOUT_GRADIENT, "fades")
+        )
+        for name in (attribute.name for attribute in attributes_of(scene)):
+            if name not in without:
                 self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
         self._twins: torch.Tensor | None
         tied = torch.tensor(same_points(scene)) if scene.twin.any() else None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from warpsplat.scene import ATTRIBUTES, Attribute, Paint, Scene, Unit
+from warpsplat.scene import ATTRIBUTES, Attribute, Scene, Unit
 
 TABLE = {attribute.name: attribute for attribute in ATTRIBUTES}
 
@@ -57,12 +57,12 @@ class SceneTensors:
         Args:
             scene: at which values to begin.
             device: default: the CPU.
-            requires_grad: whether gradients are wanted, of all attributes that have one.
+            requires_grad: whether gradients are wanted, of all attributes that some shape has.
         """
         values = {name: torch.tensor(getattr(scene, name), device=device) for name in TABLE}
         if requires_grad:
-            for name, value in values.items():
-                value.requires_grad_(name not in WITHOUT_GRADIENT)
+            for attribute in attributes_of(scene):
+                values[attribute.name].requires_grad_(attribute.name not in WITHOUT_GRADIENT)
         return SceneTensors(scene, values)
 
     @property
@@ -109,7 +109,7 @@ def limits(attribute: Attribute) -> tuple[float, float]:
     return (0.0 if attribute.name == "widths" else -np.inf), np.inf
 
 
-def has(scene: Scene, attribute: Attribute) -> bool:
-    """Whether some shape of ``scene`` has ``attribute``, by its kind and paint."""
-    of_kind = np.isin(scene.kind, attribute.kinds)
-    return bool((of_kind & np.isin(scene.paint, [Paint(paint) for paint in attribute.paints])).any())
+def attributes_of(scene: Scene) -> tuple[Attribute, ...]:
+    """Those that some shape of ``scene`` has, by its kind and paint; the others are 0."""
+    kinds, paints = (set(np.flatnonzero(np.bincount(row)).tolist()) for row in (scene.kind, scene.paint))
+    return tuple(a for a in ATTRIBUTES if kinds & set(a.kinds) and paints & set(a.paints))
