@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -78,6 +79,17 @@ def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyP
         assert live(engine.Engine) == 3
         tensors.append(live(torch.Tensor))
     assert tensors[0] == tensors[1]
+
+
+def test_an_engine_keeps_no_picture_alive() -> None:
+    tensors = SceneTensors.of(random_scene(Kind.FILL), requires_grad=True)
+    image = render(tensors)
+    gradient = torch.ones_like(image)
+    image.backward(gradient)
+    kept = [weakref.ref(image), weakref.ref(gradient)]
+    del image, gradient
+    gc.collect()
+    assert [each() for each in kept] == [None, None]
 
 
 def test_little_memory_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

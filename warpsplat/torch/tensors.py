@@ -110,6 +110,8 @@ def limits(attribute: Attribute) -> tuple[float, float]:
 
 
 def attributes_of(scene: Scene) -> tuple[Attribute, ...]:
-    """Those that some shape of ``scene`` has, by its kind and paint; the others are 0."""
+    """Those that some shape of ``scene`` has, by its kind and paint; the others are 0. Points in any case."""
     kinds, paints = (set(np.flatnonzero(np.bincount(row)).tolist()) for row in (scene.kind, scene.paint))
-    return tuple(a for a in ATTRIBUTES if kinds & set(a.kinds) and paints & set(a.paints))
+    return tuple(
+        a for a in ATTRIBUTES if a.per == "point" or (kinds & set(a.kinds) and paints & set(a.paints))
+    )
