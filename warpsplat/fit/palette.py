@@ -35,9 +35,9 @@ class Palette:
     """The colours that shapes may have.
 
     Each shape has the one with which the error is least, all else as it is. Another colour changes the
-    squared error by a paraboloid that is as steep in all channels, around the colour that would be best: so that of
-    the palette is best which is nearest to it. It is chosen anew every few steps, at once for all shapes; in
-    between they are trained as they are.
+    squared error by a paraboloid that is as steep in all channels, around the colour that would be best: so
+    that of the palette is best which is nearest to it. It is chosen anew every few steps, at once for all
+    shapes; in between they are trained as they are.
     """
 
     def __init__(self, colors: FloatArray) -> None:

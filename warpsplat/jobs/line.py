@@ -10,7 +10,7 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.trace.ink import Ink, find_ink
 from warpsplat.trace.lines import rejoined, trace_ink
