@@ -142,6 +142,12 @@ def test_opaque_shapes_are_opaque(device: str) -> None:
     assert (result.scene.opacities > 0.99).all()
 
 
+def test_colours_of_a_palette_are_not_trained() -> None:
+    assert make_settings(colors=4, rates={"colors": 0.1, "points": 2.0}).rates["colors"] == 0
+    assert make_settings(colors=4, rates={"points": 2.0}).rates["points"] == 2
+    assert make_settings(opaque=True).rates["colors"] > 0
+
+
 def test_palettes_as_texts(tmp_path: Path) -> None:
     assert parse_palette("#F00, #00ff00\n#f00") == ("#ff0000", "#00ff00")
     for bad in ("red", "#12", "", "#ggg"):
