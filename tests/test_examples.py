@@ -11,8 +11,10 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import cv2
+import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 import warpsplat
 from tests import ROOT
@@ -53,7 +55,9 @@ def test_an_image_is_fitted(name: str, cat: str, tmp_path: Path) -> None:
 def test_strokes_keep_to_a_mask_from_a_file(cat: str, tmp_path: Path) -> None:
     mask = tmp_path / "mask.png"
     height, width = warpsplat.load_image(cat).shape[:2]
-    cv2.imwrite(str(mask), cv2.rectangle(0 * cv2.imread(cat), (4, 4), (width // 2, height), (255,) * 3, -1))
+    white = np.zeros((height, width), np.uint8)
+    white[4:, 4 : width // 2 + 1] = 255
+    cv2.imwrite(str(mask), white)
     example("masked_strokes").main(cat, str(tmp_path / "a.svg"), 40, str(mask))
     opacity = warpsplat.render(tmp_path / "a.svg")[..., 3]
     assert opacity[6:-6, 8 : width // 2 - 4].mean() > 0.5
@@ -62,11 +66,9 @@ def test_strokes_keep_to_a_mask_from_a_file(cat: str, tmp_path: Path) -> None:
 
 def test_two_pictures_are_morphed(cat: str, tmp_path: Path) -> None:
     other = tmp_path / "other.png"
-    cv2.imwrite(str(other), cv2.flip(cv2.imread(cat), 0))
+    Image.open(cat).transpose(Image.Transpose.FLIP_TOP_BOTTOM).save(other)
     errors = example("morph").main(cat, str(other), str(tmp_path / "a.webp"), STEPS, 40)
     assert max(errors) < 0.03
-    from PIL import Image
-
     with Image.open(tmp_path / "a.webp") as moving:
         assert getattr(moving, "n_frames", 1) == 24
 
