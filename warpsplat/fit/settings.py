@@ -415,6 +415,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         preset = replace(preset, rates={**preset.rates, "stop_opacities": 0.0, "stop_offsets": 0.0})
     if "rates" in given:
         given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
+    if given.get("colors") or given.get("palette"):  # colours are chosen, not trained
+        given["rates"] = {**given.get("rates", preset.rates), "colors": 0.0}
     if isinstance(given.get("density"), Mapping):
         names = tuple(f.name for f in fields(Density))
         given["density"] = replace(preset.density, **_known("density", given["density"], names))
