@@ -257,6 +257,8 @@ class Settings:
         if (self.opaque or self.is_limited) and self.renderer == "gaussian":
             raise UsageError("opaque fills and the renderer gaussian do not go together")
         fitted = self.fitted_options()
+        if self.subject == "line":
+            fitted = [name for name in fitted if name != "mixed"]
         if self.subject not in {"auto", "photo"} and fitted:
             raise UsageError(f"subject {self.subject} and {fitted[0]} do not go together")
         choices = (

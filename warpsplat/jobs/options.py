@@ -68,7 +68,11 @@ OPTIONS = (
     ),
     Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
     Option("open", bool, "Strokes.", kind=Kind.STROKE),
-    Option("mixed", bool, "Fills, and strokes where they remove more error."),
+    Option(
+        "mixed",
+        bool,
+        "Fills, and strokes where they remove more error; of line art, fills where it is filled.",
+    ),
     Option("quality", str, "Effort.", DEFAULT_QUALITY, choices=QUALITIES),
     Option(
         "renderer",

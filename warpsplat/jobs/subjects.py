@@ -30,14 +30,15 @@ Stop = Callable[[], bool]
 def decided(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
     """``settings`` with a subject, and why it is that; the reason is empty where it was given.
 
-    What only a fit can do makes a photograph of any image: strokes, levels, a goal.
+    What only a fit can do makes a photograph of any image: strokes, levels, a goal. Line art may
+    be mixed.
     """
     if settings.subject != "auto":
         return settings, ""
     fitted = settings.fitted_options()
-    if fitted:
+    guess = guess_subject(target) if fitted in ([], ["mixed"]) else None
+    if guess is None or (fitted and guess.subject != "line"):
         return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
-    guess = guess_subject(target)
     return replace(settings, subject=guess.subject), guess.why
 
 
