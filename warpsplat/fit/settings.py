@@ -179,7 +179,8 @@ class Settings:
     units: str = ""
     """In which the file says its size; empty: pixels, millimetres of a sheet."""
     ids: bool = False
-    """Whether paths have identifiers, by their colours, in the file."""
+    """Whether paths have identifiers, by their colours, and those of one colour groups, in the file: they are
+    brought together where nothing lies between."""
     minify: bool = False
     """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None

@@ -109,7 +109,7 @@ OPTIONS = (
     Option("size", str, "Size that the picture fills, for plotters: 200x150mm.", metavar="WxH"),
     Option("page", str, "Sheet that it fills but for margins: a3, a4, a5, letter.", metavar="NAME"),
     Option("units", str, "Units of the file's size: mm, cm, in, pt, px.", metavar="UNIT"),
-    Option("ids", bool, "Name paths by their colours, for editors."),
+    Option("ids", bool, "Name paths by their colours, and group neighbours of one, for editors."),
     Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )
