@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.alpha import straight
 from warpsplat.errors import ImageError
@@ -46,18 +48,24 @@ def find_cells(image: FloatArray) -> Cells:
     Raises:
         ImageError: there are more than ``MOST_CELLS``.
     """
-    height, width, channels = image.shape
+    channels = image.shape[2]
     shown = np.concatenate([straight(image), image[..., 3:]], axis=2)
     levels = np.round(shown * 255).astype(np.uint8)  # as a file can say them
-    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
-    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
-    size = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
+    size = cell_size(levels)
     cells = levels[::size, ::size]
     if cells.shape[0] * cells.shape[1] > MOST_CELLS:
         shape = f"{cells.shape[1]}x{cells.shape[0]}"
         raise ImageError(f"{shape} cells of {size} px, more than pixel art may have ({MOST_CELLS})")
     palette, colors = np.unique(cells.reshape(-1, channels), axis=0, return_inverse=True)
     return Cells(colors.reshape(cells.shape[:2]), np.asarray(palette / 255, np.float32), size)
+
+
+def cell_size(levels: npt.NDArray[Any]) -> int:
+    """Side of the largest cells of one colour each of an image, shape (height, width, channel) [px]."""
+    height, width = levels.shape[:2]
+    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
+    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
+    return int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
 
 
 def outlines(inside: Bools) -> list[list[Point]]:
