@@ -72,8 +72,8 @@ def command(size: str, device: str, threads: int | None, verbose: int, as_json: 
     """
     width, height = parse_size(size)
     from warpsplat.jobs.bench import bench
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
 
     start_warp()
     values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)

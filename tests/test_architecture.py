@@ -26,15 +26,15 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "svg": ("errors", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
     "trace": ("alpha", "errors", "scene"),
-    "render": ("errors", "native", "scene", "kernels"),
-    "fit": ("alpha", "errors", "scene", "kernels", "render", "svg", "metrics"),
+    "rendering": ("errors", "native", "scene", "kernels"),
+    "fit": ("alpha", "errors", "scene", "kernels", "rendering", "svg", "metrics"),
     "jobs": (
         "alpha",
         "errors",
         "native",
         "scene",
         "kernels.constants",
-        "render",
+        "rendering",
         "fit",
         "trace",
         "files",
@@ -259,5 +259,5 @@ def test_kernels_are_launched_by_name_only() -> None:
                 name = ast.unparse(node.func)
                 homes += [module] if name in {"wp.launch", "wp.launch_tiled", "warp.launch"} else []
                 launches += name == "program.launch"
-    assert homes == ["render.program"]
+    assert homes == ["rendering.program"]
     assert launches > 25

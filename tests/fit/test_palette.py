@@ -16,7 +16,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.texts import parse_palette
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.vectorize import vectorize
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 
 COLOR = re.compile(r'(?:fill|stroke)="(#[0-9a-f]{3,6})"')

@@ -13,8 +13,8 @@ from tests.trace.line_art import CROSS, TEE, drawn, grown, shown
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.subjects import decided
-from warpsplat.jobs.vectorize import Result, vectorize, vectorize_file
-from warpsplat.render.backend import Backend
+from warpsplat.jobs.vectorize import Result, vectorize, vectorize_image
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
 
 
@@ -66,11 +66,11 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
     assert ok
     for minify in (False, True):
         results = [
-            vectorize_file(
+            vectorize_image(
                 data.tobytes(),
-                tmp_path / f"{len(page)}.svg",
                 make_settings(subject="line", page=page, minify=minify),
                 Backend.on(device),
+                output=tmp_path / f"{len(page)}.svg",
                 name="a.png",
             )
             for page in ("", "a4")

@@ -10,7 +10,7 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.subjects import LEAST_SIDE, enlargement
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 DRAWING = (

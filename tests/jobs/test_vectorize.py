@@ -18,7 +18,7 @@ from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
 from warpsplat.jobs.vectorize import has_time_for_eyes, render_figures, vectorize
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, random_scene
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.svg import order

@@ -16,9 +16,9 @@ from PIL import Image
 from tests.scenes import disc, mixed_scene, random_scene, started_alike, with_gradients
 from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import SplatModel
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import SplatModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.svg.data import PathData, integers, spline_data
 from warpsplat.svg.numbers import hex_colors, number

@@ -28,7 +28,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
 

@@ -18,10 +18,10 @@ from warpsplat.fit.schedule import Phase, fold_weight
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
-from warpsplat.render.backend import Viewport
-from warpsplat.render.models import ExactModel, GaussianModel, Model, SplatModel
-from warpsplat.render.program import Program, capture
-from warpsplat.render.renderer import Capacity, Renderer
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.models import ExactModel, GaussianModel, Model, SplatModel
+from warpsplat.rendering.program import Program, capture
+from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
 
 

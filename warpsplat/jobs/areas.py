@@ -12,7 +12,7 @@ import numpy as np
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import Refinement
 from warpsplat.fit.tidy import finish_drawing
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 from warpsplat.trace.lines import TracedLines
 from warpsplat.trace.trace import trace

@@ -18,7 +18,7 @@ from warpsplat.fit.settings import Density, Settings, default_rates
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.jobs.options import KINDS
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 
 STAGES = ("outline", "bins", "forward", "loss", "backward", "update")

@@ -12,7 +12,7 @@ from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.jobs.areas import filled
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.trace.ink import Ink, find_ink
 from warpsplat.trace.lines import TracedLines, rejoined, trace_ink

@@ -18,8 +18,8 @@ from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.tidy import finish_drawing
 from warpsplat.jobs.line import draw_lines
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray, Scene
 from warpsplat.trace.pixels import cell_size, trace_pixels
 from warpsplat.trace.subject import guess_subject
