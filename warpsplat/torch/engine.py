@@ -19,7 +19,7 @@ from warpsplat.rendering.backend import Backend, Viewport, view
 from warpsplat.rendering.device import start_warp
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.rendering.program import Program
+from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
@@ -91,6 +91,7 @@ class Engine:
         self.ticket: object = None
         """Of the call whose forward pass the buffers hold."""
         self.bytes = self._renderer.bytes()
+        self._graphs: dict[Program, wp.Graph] = {}
         self._stream: torch.cuda.Stream | None = None
 
     def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
@@ -120,7 +121,10 @@ class Engine:
             own.copy_(values[name].reshape(own.shape))
             if name in SENSIBLE:
                 own.clamp_(*SENSIBLE[name])
-        if self._renderer.forward_complete():
+        self._replay(self._renderer.forward_program)
+        if self._renderer.make_room():
+            self._graphs.clear()
+            self._renderer.forward_complete()
             self.bytes = self._renderer.bytes()
 
     def show(self, image: torch.Tensor) -> None:
@@ -133,8 +137,19 @@ class Engine:
         """
         self.ticket = None
         self._run(self._take, image_grad)
-        self._renderer.backward()
+        self._replay(self._renderer.backward_program)
         return {name: self._grads[name].clone() for name in names}
+
+    def _replay(self, program: Program) -> None:
+        """Without Python in between where one thread of a CPU does all; a GPU does not wait for Python."""
+        if program.device.is_cpu and program not in self._graphs:
+            graph = capture(program.device, [program])
+            if graph is not None:
+                self._graphs[program] = graph
+        if program in self._graphs:
+            wp.capture_launch(self._graphs[program])
+        else:
+            program.run()
 
     @staticmethod
     def _run(program: Program, image: torch.Tensor) -> None:

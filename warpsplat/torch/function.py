@@ -50,8 +50,6 @@ def render(
     if not scenes:
         raise UsageError("no scene to render")
     model = model_of(renderer)
-    for one in scenes:
-        check_finite(one)
     used = threads or torch.get_num_threads()
     pictures = [
         Picture(
@@ -63,6 +61,8 @@ def render(
     if len(sizes) > 1:
         raise UsageError("scenes of several sizes or devices in one call")
     given = [[(a.name, one.value(a)) for a in attributes_of(one.layout)] for one in scenes]
+    for each in given:
+        check_finite(each)
     names = tuple(tuple(name for name, _ in each) for each in given)
     images: Tensor = _Render.apply(pictures, names, *(value for each in given for _, value in each))
     return images.squeeze(0) if isinstance(scene, SceneTensors) else images
@@ -74,17 +74,16 @@ def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
     return image[..., :3] + (1 - image[..., 3:]) * below
 
 
-def check_finite(scene: SceneTensors) -> None:
+def check_finite(values: Sequence[tuple[str, Tensor]]) -> None:
     """Whether all numbers are.
 
     Raises:
         ValueError: one is not.
     """
-    if scene.values:
-        finite = torch.stack([value.detach().isfinite().all() for value in scene.values.values()])
-        if not finite.all():
-            names = [name for name, fine in zip(scene.values, finite.tolist(), strict=True) if not fine]
-            raise ValueError(f"{', '.join(names)}: numbers that are not finite")
+    finite = torch.stack([value.detach().isfinite().all() for _, value in values]).tolist()
+    if not all(finite):
+        wrong = (name for (name, _), fine in zip(values, finite, strict=True) if not fine)
+        raise ValueError(f"{', '.join(wrong)}: numbers that are not finite")
 
 
 def is_opaque(scene: SceneTensors) -> bool:
