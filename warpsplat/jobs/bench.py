@@ -134,17 +134,17 @@ def bench(
         "megapixels_per_s": round(width * height / 1e3 / whole.median, 3),
         "us_per_curve": round(1e3 * whole.median / curves, 3),
         "ns_per_pixel": round(1e6 * whole.median / (width * height), 3),
-        **({"through_torch": _through_torch(step.renderer, renderer, repeats)} if through_torch else {}),
+        **({"through_torch": _through_torch(step.renderer, repeats)} if through_torch else {}),
         "peak_memory": peak_memory(backend.device),
     }
 
 
-def _through_torch(own: Renderer, renderer: Any, repeats: int) -> dict[str, Any]:
+def _through_torch(own: Renderer, repeats: int) -> dict[str, Any]:
     try:
         from warpsplat.jobs.bench_torch import bench_torch
     except ImportError as error:
         raise UsageError(str(error)) from None
-    return bench_torch(own, renderer, repeats)
+    return bench_torch(own, repeats)
 
 
 @dataclass(frozen=True)

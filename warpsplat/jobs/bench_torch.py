@@ -15,12 +15,11 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.torch import SceneTensors, render
 
 
-def bench_torch(own: Renderer, renderer: Any, repeats: int) -> dict[str, Any]:
+def bench_torch(own: Renderer, repeats: int) -> dict[str, Any]:
     """Time ``repeats`` passes of each, by turns, after a warm-up.
 
     Args:
         own: renders the scene, as a step does it.
-        renderer: the name of its model.
         repeats: of both.
 
     Returns:
@@ -43,7 +42,7 @@ def bench_torch(own: Renderer, renderer: Any, repeats: int) -> dict[str, Any]:
             own.backward()
 
     def pass_torch() -> None:
-        image = render(tensors, viewport.width, renderer=renderer, threads=own.backend.threads)
+        image = render(tensors, viewport.width, renderer=own.model, threads=own.backend.threads)
         torch.autograd.grad(image, wanted, gradient)
 
     pairs = [(timed(device, pass_own), timed(device, pass_torch)) for _ in range(repeats + WARM_UP)]

@@ -84,7 +84,7 @@ class Renderer:
         """
         self.parameters, self.viewport = parameters, viewport
         self.backend = parameters.backend
-        self._model, self._opaque = model, opaque
+        self.model, self._opaque = model, opaque
         self.film = Film(self.backend, viewport, parameters.canvas, opaque=opaque)
         self.needed_samples = self.backend.array(wp.int32, 1)
         self.needed_slots = self.backend.array(wp.int32, 1)
@@ -101,7 +101,7 @@ class Renderer:
         most = OPACITY_RANGE[1] if self._opaque else 1.0
         self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, most=most)
         job = Job(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
-        self.geometry, self.coverage = self._model.stages(job)
+        self.geometry, self.coverage = self.model.stages(job)
         self.paint = Painting(backend, p, v, self.bins, capacity.slots)
         self.forward_program = backend.program()
         self._record_forward(self.forward_program)
