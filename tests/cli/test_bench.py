@@ -30,6 +30,14 @@ def test_bench_for_people(kind: str, renderer: str, capsys: pytest.CaptureFixtur
     assert "composite_backward" in shown
 
 
+def test_bench_through_torch(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--threads", 1, "--device", "cpu", "--torch")
+    assert run("bench", *options) == 0
+    shown = capsys.readouterr().out
+    assert "by turns, torch" in shown
+    assert "through PyTorch" in shown
+
+
 @pytest.mark.parametrize("size", ["0x10", "10", "16x", "99999x99999", "axb"])
 def test_bench_refuses_odd_sizes(size: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("bench", "--size", size) == 2

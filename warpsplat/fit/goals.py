@@ -17,7 +17,7 @@ from warpsplat.fit.pursuit import Change, Made, Pursuit, Report, Stop
 from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import PRESETS, Settings
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS
 

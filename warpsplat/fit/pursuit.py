@@ -19,7 +19,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.write import path_sizes

@@ -7,25 +7,32 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 import warp as wp
 
 from warpsplat.errors import UsageError
 from warpsplat.kernels import constants, pixels
-from warpsplat.render.backend import Backend, Viewport, view
-from warpsplat.render.device import start_warp
-from warpsplat.render.models import Model
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.backend import Backend, Viewport, view
+from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.models import Model
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program, capture
+from warpsplat.rendering.renderer import Renderer
+from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
+from warpsplat.torch.tensors import attributes_of
 
-KEPT = 8
-"""Engines that are kept."""
+KEPT = 32
+"""Engines that are kept at the most."""
+
+KEPT_BYTES = 512 * 2**20
+"""Memory beyond which only the engine used last is kept."""
+
+SENSIBLE = {"opacities": (0.0, 1.0), "stop_opacities": (0.0, 1.0), "widths": (0.0, None)}
+"""Values that mean something; what lies beyond is drawn as the nearest, and has its gradient."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +44,13 @@ class Picture:
     model: Model
     device: torch.device
     threads: int
+    opaque: bool
+    """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
         """Equal where the same engine serves."""
-        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads
+        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads, self.opaque
 
 
 STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait.name for trait in TRAITS))
@@ -49,14 +58,12 @@ STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait
 
 def layout_key(scene: Scene) -> tuple[object, ...]:
     """Equal for scenes that differ in the values of attributes alone."""
-    digest = hashlib.blake2b(digest_size=16)
-    for name in STRUCTURE:
-        array = getattr(scene, name)
-        digest.update(f"{name} {array.shape}".encode())
-        digest.update(array.tobytes())
+    arrays = [getattr(scene, name) for name in STRUCTURE]
+    digest = hashlib.blake2b(b"".join(array.tobytes() for array in arrays), digest_size=16)
     background = scene.canvas.background
     return (
         digest.digest(),
+        tuple(map(len, arrays)),
         (scene.canvas.width, scene.canvas.height, None if background is None else background.tobytes()),
         scene.dashes,
         tuple(map(id, scene.pictures)),  # kept alive by the engine's own layout
@@ -69,19 +76,23 @@ class Engine:
     def __init__(self, picture: Picture) -> None:
         backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
         self._parameters = Parameters(picture.layout, backend)
-        self._renderer = Renderer(self._parameters, picture.viewport, model=picture.model)
+        self._renderer = Renderer(
+            self._parameters, picture.viewport, model=picture.model, opaque=picture.opaque
+        )
+        names = {attribute.name for attribute in attributes_of(picture.layout)}
+        for name in self._parameters.groups.keys() - names:
+            self._parameters.groups[name].value.zero_()  # whatever the layout says
         self._values, self._grads = (
-            {
-                name: wp.to_torch(getattr(group, field))
-                for name, group in self._parameters.groups.items()
-                if group.value.shape[0]
-            }
+            {name: wp.to_torch(getattr(self._parameters.groups[name], field)) for name in names}
             for field in ("value", "grad")
         )
         self._record_pixels(backend, picture.viewport)
         self.lock = threading.Lock()
         self.ticket: object = None
         """Of the call whose forward pass the buffers hold."""
+        self.bytes = self._renderer.bytes()
+        self._graphs: dict[Program, wp.Graph] = {}
+        self._stream: torch.cuda.Stream | None = None
 
     def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
         film = self._renderer.film
@@ -108,31 +119,57 @@ class Engine:
         self.ticket = None
         for name, own in self._values.items():
             own.copy_(values[name].reshape(own.shape))
-        self._renderer.forward_complete()
+            if name in SENSIBLE:
+                own.clamp_(*SENSIBLE[name])
+        self._replay(self._renderer.forward_program)
+        if self._renderer.make_room():
+            self._graphs.clear()
+            self._renderer.forward_complete()
+            self.bytes = self._renderer.bytes()
 
     def show(self, image: torch.Tensor) -> None:
         """Write what was rendered, shape (height, width, 4)."""
         self._run(self._show, image)
 
-    def backward(self, image_grad: torch.Tensor) -> dict[str, torch.Tensor]:
-        """From the gradient of the image, shape (height, width, 4), to those of the attributes. The state of
-        the forward pass is used up.
+    def backward(self, image_grad: torch.Tensor, names: Iterable[str]) -> dict[str, torch.Tensor]:
+        """From the gradient of the image, shape (height, width, 4), to those of the attributes ``names``. The
+        state of the forward pass is used up.
         """
         self.ticket = None
         self._run(self._take, image_grad)
-        self._renderer.backward()
-        return {name: own.clone() for name, own in self._grads.items()}
+        self._replay(self._renderer.backward_program)
+        return {name: self._grads[name].clone() for name in names}
+
+    def _replay(self, program: Program) -> None:
+        """Without Python in between where one thread of a CPU does all; a GPU does not wait for Python."""
+        if program.device.is_cpu and program not in self._graphs:
+            graph = capture(program.device, [program])
+            if graph is not None:
+                self._graphs[program] = graph
+        if program in self._graphs:
+            wp.capture_launch(self._graphs[program])
+        else:
+            program.run()
 
     @staticmethod
     def _run(program: Program, image: torch.Tensor) -> None:
+        """With the tensor's own memory as the rows of pixels."""
         array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
         assert isinstance(array, wp.array)
         program.rebind("pixels", array)
         program.run()
 
+    def follow(self, device: torch.device) -> None:
+        """Work of the last call, on another stream perhaps, comes before that of torch's current one."""
+        if device.type == "cuda":
+            stream = torch.cuda.current_stream(device)
+            if self._stream not in (None, stream):
+                stream.wait_stream(self._stream)
+            self._stream = stream
+
 
 class Engines:
-    """A bounded number of engines, those used last."""
+    """Engines used last, as many as are allowed."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
@@ -143,10 +180,11 @@ class Engines:
         with self._lock:
             engine = self._kept.pop(picture.key, None)
             if engine is None:
-                start_warp()
                 engine = Engine(picture)
             self._kept[picture.key] = engine
-            while len(self._kept) > KEPT:
+            while len(self._kept) > 1 and (
+                len(self._kept) > KEPT or sum(each.bytes for each in self._kept.values()) > KEPT_BYTES
+            ):
                 self._kept.popitem(last=False)
             return engine
 
@@ -167,16 +205,24 @@ def clear_cache() -> None:
 @contextlib.contextmanager
 def engine_of(picture: Picture) -> Iterator[Engine]:
     """The engine of ``picture``, for this thread alone and on torch's current stream."""
-    with on_stream(picture.device):
+    if picture.device.type not in ("cpu", "cuda"):
+        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
+    _start()
+    device = wp.device_from_torch(picture.device)
+    with turn(device), _on_stream(picture.device):
         engine = ENGINES.get(picture)
         with engine.lock:
+            engine.follow(picture.device)
             yield engine
 
 
-def on_stream(device: torch.device) -> contextlib.AbstractContextManager[Any]:
+@functools.cache
+def _start() -> None:
+    start_warp()
+
+
+def _on_stream(device: torch.device) -> contextlib.AbstractContextManager[object]:
     """Have Warp work where torch does."""
     if device.type == "cpu":
         return contextlib.nullcontext()
-    if device.type != "cuda":
-        raise UsageError(f"tensors are on {device}, neither on the CPU nor on CUDA")
     return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))

@@ -8,15 +8,16 @@ from typing import Any, Literal
 import torch
 
 from warpsplat.errors import UsageError
-from warpsplat.render.backend import Viewport
-from warpsplat.render.models import EXACT, GaussianModel, Model, SplatModel
-from warpsplat.scene import ATTRIBUTES, Canvas
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.scene import Canvas
+from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import Picture, engine_of
-from warpsplat.torch.tensors import SceneTensors
+from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
 
 Tensor = torch.Tensor
+Names = tuple[tuple[str, ...], ...]
 MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
-NAMES = tuple(attribute.name for attribute in ATTRIBUTES)
 
 
 def render(
@@ -34,7 +35,7 @@ def render(
         width: of the picture [px]; default: the canvas', or what ``height`` makes it.
         height: [px]; the same.
         renderer: what covers the pixels: ``exact``, the area that a viewer computes; ``splat``, the
-            Gaussians of the paths; ``gaussian``, soft ones; or a model of ``warpsplat.render.models``.
+            Gaussians of the paths; ``gaussian``, soft ones; or a model of ``warpsplat.rendering.models``.
         threads: of the CPU, default: as many as torch uses.
 
     Returns:
@@ -42,8 +43,8 @@ def render(
         of several scenes (scene, height, width, 4). On a canvas with a background the opacity is 1.
 
     Raises:
-        UsageError: no such size, renderer or device.
-        ValueError: a scene that the model cannot show.
+        UsageError: no such size, renderer or device, or no scene.
+        ValueError: a scene that the model cannot show, or a number that is not finite.
     """
     scenes = [scene] if isinstance(scene, SceneTensors) else list(scene)
     if not scenes:
@@ -51,14 +52,19 @@ def render(
     model = model_of(renderer)
     used = threads or torch.get_num_threads()
     pictures = [
-        Picture(one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used)
+        Picture(
+            one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used, is_opaque(one)
+        )
         for one in scenes
     ]
     sizes = {(p.viewport.width, p.viewport.height, p.device) for p in pictures}
     if len(sizes) > 1:
         raise UsageError("scenes of several sizes or devices in one call")
-    values = [one.value(attribute) for one in scenes for attribute in ATTRIBUTES]
-    images: Tensor = _Render.apply(pictures, *values)
+    given = [[(a.name, one.value(a)) for a in attributes_of(one.layout)] for one in scenes]
+    for each in given:
+        check_finite(each)
+    names = tuple(tuple(name for name, _ in each) for each in given)
+    images: Tensor = _Render.apply(pictures, names, *(value for each in given for _, value in each))
     return images.squeeze(0) if isinstance(scene, SceneTensors) else images
 
 
@@ -66,6 +72,23 @@ def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
     """A picture of ``render``, shape (..., 4), on a colour or on a picture of sRGB: shape (..., 3)."""
     below = torch.as_tensor(background, dtype=image.dtype, device=image.device)
     return image[..., :3] + (1 - image[..., 3:]) * below
+
+
+def check_finite(values: Sequence[tuple[str, Tensor]]) -> None:
+    """Whether all numbers are.
+
+    Raises:
+        ValueError: one is not.
+    """
+    finite = torch.stack([value.detach().isfinite().all() for _, value in values]).tolist()
+    if not all(finite):
+        wrong = (name for (name, _), fine in zip(values, finite, strict=True) if not fine)
+        raise ValueError(f"{', '.join(wrong)}: numbers that are not finite")
+
+
+def is_opaque(scene: SceneTensors) -> bool:
+    """Whether some shape lets so little light through that one cannot divide by it."""
+    return bool((scene.value(TABLE["opacities"]).detach() > OPACITY_RANGE[1]).any())
 
 
 def model_of(renderer: str | Model) -> Model:
@@ -104,20 +127,21 @@ def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewpo
 
 
 class _Render(torch.autograd.Function):
-    """Pictures, and for each all attributes in the order of the table -> images."""
+    """Pictures, names of the attributes of each, and these one after the other -> images."""
 
     @staticmethod
-    def forward(ctx: Any, pictures: list[Picture], *values: Tensor) -> Tensor:
+    def forward(ctx: Any, pictures: list[Picture], names: Names, *values: Tensor) -> Tensor:
         viewport, device = pictures[0].viewport, pictures[0].device
-        images = torch.empty(len(pictures), viewport.height, viewport.width, 4, device=device)
+        shape = len(pictures), viewport.height, viewport.width, 4
+        images = torch.empty(shape, dtype=torch.float32, device=device)
         tickets = []
-        for i, picture in enumerate(pictures):
+        for picture, own, image in zip(pictures, _parts(names, values), images, strict=True):
             with engine_of(picture) as engine:
-                engine.forward(dict(zip(NAMES, _part(values, i), strict=True)))
-                engine.show(images[i])
+                engine.forward(own)
+                engine.show(image)
                 tickets.append(ticket := object())
                 engine.ticket = ticket
-        ctx.pictures, ctx.tickets = pictures, tickets
+        ctx.state = (pictures, tickets, names)
         ctx.save_for_backward(*values)
         ctx.set_materialize_grads(False)
         return images
@@ -125,33 +149,32 @@ class _Render(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, images_grad: Tensor | None) -> tuple[Tensor | None, ...]:
         if images_grad is None:
-            return (None,) * (1 + len(ctx.saved_tensors))
-        wanted = ctx.needs_input_grad[1:]
-        state = (ctx.pictures, ctx.tickets, wanted)
-        found: tuple[Tensor | None, ...] = _Adjoint.apply(state, images_grad, *ctx.saved_tensors)
-        return (None, *found)
+            return (None,) * len(ctx.needs_input_grad)
+        wanted = ctx.needs_input_grad[2:]
+        found: tuple[Tensor | None, ...] = _Adjoint.apply(ctx.state, wanted, images_grad, *ctx.saved_tensors)
+        return (None, None, *found)
 
 
 class _Adjoint(torch.autograd.Function):
     """Gradients of images -> of attributes. A function of its own, as it is what has no derivative."""
 
     @staticmethod
-    def forward(ctx: Any, state: Any, images_grad: Tensor, *values: Tensor) -> tuple[Tensor | None, ...]:
-        pictures, tickets, wanted = state
+    def forward(
+        ctx: Any, state: Any, wanted: Sequence[bool], images_grad: Tensor, *values: Tensor
+    ) -> tuple[Tensor | None, ...]:
+        pictures, tickets, names = state
         found: list[Tensor | None] = []
-        for i, picture in enumerate(pictures):
-            own, asked = _part(values, i), _part(wanted, i)
-            if not any(asked):
-                found += [None] * len(NAMES)
+        each = zip(pictures, tickets, _parts(names, values), _parts(names, wanted), images_grad, strict=True)
+        for picture, ticket, own, asked, image_grad in each:
+            if not any(asked.values()):
+                found += [None] * len(asked)
                 continue
+            gradient = image_grad.contiguous()
             with engine_of(picture) as engine:
-                if engine.ticket is not tickets[i]:  # another call has used the buffers since
-                    engine.forward(dict(zip(NAMES, own, strict=True)))
-                gradients = engine.backward(images_grad[i].contiguous())
-            found += [
-                gradients.get(name, torch.zeros_like(value)).reshape(value.shape) if want else None
-                for name, value, want in zip(NAMES, own, asked, strict=True)
-            ]
+                if engine.ticket is not ticket:  # another call has used the buffers since
+                    engine.forward(own)
+                gradients = engine.backward(gradient, [name for name in asked if asked[name]])
+            found += [gradients[name].reshape(own[name].shape) if asked[name] else None for name in asked]
         return tuple(found)
 
     @staticmethod
@@ -159,6 +182,7 @@ class _Adjoint(torch.autograd.Function):
         raise RuntimeError("warpsplat.torch.render has first derivatives only: no double backward")
 
 
-def _part(values: Any, i: int) -> Any:
-    """Those of picture ``i``, in the order of the table."""
-    return values[i * len(NAMES) : (i + 1) * len(NAMES)]
+def _parts(names: Names, values: Sequence[Any]) -> list[dict[str, Any]]:
+    """The values of each picture by name."""
+    rest = iter(values)
+    return [{name: next(rest) for name in own} for own in names]

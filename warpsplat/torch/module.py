@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
 
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.units import Units
-from warpsplat.scene import Scene
+from warpsplat.scene import IndexArray, Scene
 from warpsplat.svg.write import write_svg
-from warpsplat.torch.function import render
-from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, has
+from warpsplat.torch.function import MODELS, model_of, render
+from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of
 
 
 class Module(torch.nn.Module):
@@ -21,13 +22,22 @@ class Module(torch.nn.Module):
         """``renderer``, ``threads``: see ``render``."""
         super().__init__()
         self._layout, self._renderer, self._threads = scene, renderer, threads
-        for name, attribute in TABLE.items():
-            if name not in WITHOUT_GRADIENT and has(scene, attribute):
+        without = (
+            WITHOUT_GRADIENT if model_of(renderer) is MODELS["gaussian"] else (*WITHOUT_GRADIENT, "fades")
+        )
+        for name in (attribute.name for attribute in attributes_of(scene)):
+            if name not in without:
                 self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
+        self._twins: torch.Tensor | None
+        tied = torch.tensor(same_points(scene)) if scene.twin.any() else None
+        self.register_buffer("_twins", tied, persistent=False)
 
     def tensors(self) -> SceneTensors:
         """The scene of the parameters; what is done with it has gradients."""
-        return SceneTensors(self._layout, dict(self.named_parameters()))
+        values: dict[str, torch.Tensor] = dict(self.named_parameters())
+        if self._twins is not None:
+            values["points"] = values["points"][self._twins]
+        return SceneTensors(self._layout, values)
 
     def forward(self, width: int | None = None, height: int | None = None) -> torch.Tensor:
         """See ``render``."""
@@ -67,3 +77,11 @@ class Module(torch.nn.Module):
     def to_svg(self) -> str:
         """The scene as an SVG file's text."""
         return write_svg(self.scene())
+
+
+def same_points(scene: Scene) -> IndexArray:
+    """For each point its own row, or that of the same point of the shape that its shape is the twin of."""
+    rows = np.arange(len(scene.points))
+    for i in np.flatnonzero(scene.twin):  # ascending: the shape before may be a twin itself
+        rows[scene.first[i] : scene.first[i + 1]] = rows[scene.first[i - 1] : scene.first[i]]
+    return rows

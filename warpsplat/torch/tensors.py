@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from warpsplat.scene import ATTRIBUTES, Attribute, Paint, Scene, Unit
+from warpsplat.scene import ATTRIBUTES, Attribute, Scene, Unit
 
 TABLE = {attribute.name: attribute for attribute in ATTRIBUTES}
 
@@ -43,6 +43,8 @@ class SceneTensors:
             wanted = self.layout.shape_of(TABLE[name])
             if tuple(value.shape) != wanted:
                 raise ValueError(f"{name} has shape {tuple(value.shape)}, not {wanted}")
+            if value.requires_grad and name in WITHOUT_GRADIENT:
+                raise ValueError(f"{name} has no gradient here, and requires one: detach it")
             if value.device != self.device:
                 raise ValueError(f"{name} is on {value.device}, other attributes are on {self.device}")
 
@@ -55,12 +57,12 @@ class SceneTensors:
         Args:
             scene: at which values to begin.
             device: default: the CPU.
-            requires_grad: whether gradients are wanted, of all attributes that have one.
+            requires_grad: whether gradients are wanted, of all attributes that some shape has.
         """
         values = {name: torch.tensor(getattr(scene, name), device=device) for name in TABLE}
         if requires_grad:
-            for name, value in values.items():
-                value.requires_grad_(name not in WITHOUT_GRADIENT)
+            for attribute in attributes_of(scene):
+                values[attribute.name].requires_grad_(attribute.name not in WITHOUT_GRADIENT)
         return SceneTensors(scene, values)
 
     @property
@@ -87,7 +89,15 @@ class SceneTensors:
             if not np.isfinite(array).all():
                 raise ValueError(f"{name} holds numbers that are not finite")
             arrays[name] = np.clip(array, *limits(TABLE[name])).astype(np.float32)
-        return replace(self.layout, **arrays)
+        return untied(replace(self.layout, **arrays))
+
+
+def untied(scene: Scene) -> Scene:
+    """The scene with only those twins whose points are still those of the shape before them."""
+    twin = scene.twin.copy()
+    for i in np.flatnonzero(twin).tolist():
+        twin[i] = np.array_equal(scene.points_of(i), scene.points_of(i - 1))
+    return replace(scene, twin=twin)
 
 
 def limits(attribute: Attribute) -> tuple[float, float]:
@@ -99,7 +109,9 @@ def limits(attribute: Attribute) -> tuple[float, float]:
     return (0.0 if attribute.name == "widths" else -np.inf), np.inf
 
 
-def has(scene: Scene, attribute: Attribute) -> bool:
-    """Whether some shape of ``scene`` has ``attribute``, by its kind and paint."""
-    of_kind = np.isin(scene.kind, attribute.kinds)
-    return bool((of_kind & np.isin(scene.paint, [Paint(paint) for paint in attribute.paints])).any())
+def attributes_of(scene: Scene) -> tuple[Attribute, ...]:
+    """Those that some shape of ``scene`` has, by its kind and paint; the others are 0. Points in any case."""
+    kinds, paints = (set(np.flatnonzero(np.bincount(row)).tolist()) for row in (scene.kind, scene.paint))
+    return tuple(
+        a for a in ATTRIBUTES if a.per == "point" or (kinds & set(a.kinds) and paints & set(a.paints))
+    )
