@@ -170,6 +170,16 @@ def test_sizes_of_a_render(device: str) -> None:
         warpsplat.render(scene, 40, scale=2)
 
 
+def test_a_scene_to_start_from(device: str) -> None:
+    fills, strokes = (warpsplat.starting_scene(photograph(), 20, open=is_open) for is_open in (False, True))
+    assert len(fills) == len(strokes) == 20
+    assert (strokes.kind == Kind.STROKE).all()
+    wanted = photograph() / 255
+    shown = warpsplat.render(fills, device=device)[..., :3]
+    blank = ((wanted - wanted.mean(axis=(0, 1))) ** 2).mean()
+    assert ((shown - wanted) ** 2).mean() < 0.7 * blank
+
+
 def test_an_svg_is_refined(device: str) -> None:
     text = '<svg xmlns="http://www.w3.org/2000/svg" width="40" height="32"><path d="M2 3H30V29H2z"/></svg>'
     wanted = np.full((32, 40, 3), 255, np.uint8)
@@ -199,6 +209,7 @@ def test_threads_do_not_disturb_each_other(device: str) -> None:
 def test_what_is_public_is_there_and_light() -> None:
     public = {
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
+        *("starting_scene", "load_image"),
         *("Result", "Score", "Progress", "Settings", "Scene", "Canvas", "__version__"),
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 from warpsplat._version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from warpsplat.api import load_image as load_image
     from warpsplat.api import load_svg as load_svg
     from warpsplat.api import refine as refine
     from warpsplat.api import render as render
     from warpsplat.api import save_svg as save_svg
     from warpsplat.api import score as score
+    from warpsplat.api import starting_scene as starting_scene
     from warpsplat.api import vectorize as vectorize
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
@@ -33,7 +35,10 @@ if TYPE_CHECKING:
     from warpsplat.scene import Scene as Scene
 
 _HOMES = {
-    **dict.fromkeys(("vectorize", "refine", "render", "load_svg", "save_svg", "score"), "warpsplat.api"),
+    **dict.fromkeys(
+        ("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "starting_scene"),
+        "warpsplat.api",
+    ),
     **dict.fromkeys(
         ("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"), "warpsplat.errors"
     ),

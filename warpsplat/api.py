@@ -21,6 +21,7 @@ from warpsplat.files.output import write_svg_text
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import Progress
+from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Painting, Quality, Renderer, Settings, Subject, make_settings
 from warpsplat.fit.step import model_for
@@ -309,6 +310,42 @@ def render(
     with _backend(device, threads) as backend:
         model = model_for(Settings(renderer=renderer), 0)
         return _with_opacity(render_into(scene, viewport, model=model, backend=backend))
+
+
+def load_image(image: ImageSource) -> FloatArray:
+    """An image as it is fitted: upright, sRGB in [0, 1], shape (height, width, 3), float32; with opacity
+    premultiplied by it, shape (height, width, 4).
+
+    Args:
+        image: as for ``vectorize``.
+
+    Raises:
+        ImageError: it cannot be read.
+    """
+    return image_of(image)
+
+
+def starting_scene(
+    image: ImageSource, curves: int = 128, *, open: bool = False, seed: int = 0, background: str = "auto"
+) -> Scene:
+    """Shapes to begin a fit of your own with: a loose grid over the canvas, in the colours of the image.
+
+    Args:
+        image: as for ``vectorize``.
+        curves: number of shapes.
+        open: strokes of three cubics in place of filled rings of quadratics.
+        seed: of random numbers.
+        background: as for ``vectorize``.
+
+    Raises:
+        UsageError: a value out of range.
+        ImageError: the image cannot be read.
+    """
+    settings = make_settings(
+        curves=curves, kind=_kind(closed=None, open=open), seed=seed, background=background
+    )
+    target = load_target(image, None, background)
+    return grid_scene(settings, target, curves, np.random.default_rng(seed))
 
 
 def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
