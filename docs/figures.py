@@ -138,7 +138,7 @@ def tiles(stages: Stages) -> str:
 
 def coverage(stages: Stages) -> str:
     """The numbers of one slot that its outline crosses: a share of each pixel."""
-    tile, size = 0, 36
+    tile, size = 2, 36
     x0, y0 = TILE * (tile % stages.viewport.tiles_x), TILE * (tile // stages.viewport.tiles_x)
     values = stages.coverage[stages.slot(BLOB, tile)]  # by columns
     body = []

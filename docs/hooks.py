@@ -4,6 +4,7 @@ README, and the help of the commands.
 
 from __future__ import annotations
 
+import html
 import inspect
 import re
 from collections.abc import Iterator
@@ -91,8 +92,14 @@ def option_row(flags: str, meaning: str) -> str:
     """A row of a table of options; what click adds in brackets is the default, or known from the rest."""
     default = re.search(r"\[default(?:: (.*?))?\]", meaning)
     words = re.sub(r"\[(default|x[<>]|\d).*$", "", meaning)
-    cells = f"`{flags.replace('|', ' | ')}`", words, (default[1] or "yes") if default else ""
-    return "| " + " | ".join(" ".join(text.split()).replace("|", "\\|") for text in cells) + " |"
+    name, _, choices = flags.partition("[")
+    choices = f' <code class="choices">{choices.strip("]").replace("|", ", ")}</code>' if choices else ""
+    cells = (
+        f"<code>{name.strip()}</code>{choices}",
+        html.escape(words),
+        (default[1] or "yes") if default else "",
+    )
+    return "| " + " | ".join(" ".join(text.split()) for text in cells) + " |"
 
 
 def paragraphs(text: str) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """The pictures of the tutorial: draws what it starts from, then runs its commands.
 
-``python docs/pictures.py [NAME ...]`` writes into ``docs/images/tutorial``; of names, only their results.
+``python docs/pictures.py [NAME ...]`` writes ``docs/images/sources`` and ``tutorial``; or results of names.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from PIL import Image, ImageFilter
 
 from warpsplat.svg.viewer import render_own
 
-FOLDER = Path(__file__).parent / "images" / "tutorial"
+FOLDER = Path(__file__).parent / "images" / "sources"
 
 LOGO = """<svg xmlns="http://www.w3.org/2000/svg" width="240" height="240" viewBox="0 0 240 240">
 <rect x="12" y="12" width="216" height="216" rx="52" fill="#20304f"/>
@@ -90,18 +90,19 @@ COLORS = {"#": "#3b2a2a", "o": "#e2873b", "-": "#b9602a", "p": "#f2a7a0", "w": "
 
 INKS = "#2b1d16,#6e4f35,#a87c52,#d0b090,#efe4da,#8d8d3e,#b4532f,#a89a9c"
 CAT = "docs/images/cat.jpg"
-HERE = "docs/images/tutorial"
+SOURCES = "docs/images/sources"
+RESULTS = "docs/images/tutorial"
 COMMANDS = {
     "16": f"vectorize {CAT} --curves 16",
     "64": f"vectorize {CAT} --curves 64",
     "256": f"vectorize {CAT} --curves 256",
     "strokes": f"vectorize {CAT} --curves 256 --open",
     "poster": f"vectorize {CAT} --curves 128 --palette {INKS}",
-    "face": f"vectorize {CAT} --curves 64 --importance {HERE}/mask.png",
-    "refined": f"refine {HERE}/by-hand.svg {CAT}",
-    "logo": f"vectorize {HERE}/logo.png",
-    "sketch": f"vectorize {HERE}/sketch.jpg --subject line",
-    "sprite": f"vectorize {HERE}/sprite.png",
+    "face": f"vectorize {CAT} --curves 64 --importance {SOURCES}/mask.png",
+    "refined": f"refine {SOURCES}/by-hand.svg {CAT}",
+    "logo": f"vectorize {SOURCES}/logo.png",
+    "sketch": f"vectorize {SOURCES}/sketch.jpg --subject line",
+    "sprite": f"vectorize {SOURCES}/sprite.png",
 }
 """By the names of the results."""
 
@@ -148,7 +149,7 @@ def main(names: list[str]) -> None:
     """Write the sources and the results of these names."""
     sources()
     for name in names:
-        line = f"{COMMANDS[name]} -o {HERE}/{name}.svg"
+        line = f"{COMMANDS[name]} -o {RESULTS}/{name}.svg"
         print(line, flush=True)
         subprocess.run([sys.executable, "-m", "warpsplat", *shlex.split(line)], check=True)
 

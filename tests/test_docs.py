@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,11 +21,12 @@ from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
-SOMETHING = {"photo.jpg": "docs/images/cat.jpg", "logo.png": "docs/images/tutorial/logo.png"}
-"""Files that pages name as the reader's own."""
+CAT = "docs/images/cat.jpg"
+PHOTOGRAPHS = ("photo.jpg", "cat.jpg", CAT)
+"""What pages call one: the reader's own, the tutorial's copy, and the repository's."""
 
 SMALL = (72, 64)
-"""Pixels that pictures are reduced to, so that blocks are quick."""
+"""Pixels that it is reduced to, so that blocks are quick."""
 
 NEEDED = {"warpsplat.torch": "torch"}
 """What parts of the library need, which need not be installed."""
@@ -44,25 +46,17 @@ def with_code(language: str) -> list[object]:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A reader's folder: the pictures of the documentation, small; and runs are short."""
-    for path in ROOT.glob("docs/images/**/*"):
-        copy = tmp_path / path.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix in (".jpg", ".png"):
-            reduced(path, copy)
-        elif path.suffix == ".svg" and path.stat().st_size < 5000:
-            copy.write_bytes(path.read_bytes())
-    for name, source in SOMETHING.items():
-        reduced(ROOT / source, tmp_path / name)
+    (tmp_path / CAT).parent.mkdir(parents=True)
+    for path in ROOT.glob("docs/images/sources/*"):
+        shutil.copy(path, tmp_path)
+    with Image.open(ROOT / CAT) as image:
+        image.thumbnail(SMALL)
+        for name in PHOTOGRAPHS:
+            image.save(tmp_path / name)
     for name in PRESETS:
         monkeypatch.setitem(PRESETS, name, {"iterations": 30})
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def reduced(path: Path, copy: Path) -> None:
-    with Image.open(path) as image:
-        image.thumbnail(SMALL)
-        image.save(copy)
 
 
 @pytest.mark.parametrize("page", with_code("python"))
