@@ -88,7 +88,6 @@ SPRITE = """
 """
 COLORS = {"#": "#3b2a2a", "o": "#e2873b", "-": "#b9602a", "p": "#f2a7a0", "w": "#fbf3e4", "k": "#201b22"}
 
-INKS = "#2b1d16,#6e4f35,#a87c52,#d0b090,#efe4da,#8d8d3e,#b4532f,#a89a9c"
 CAT = "docs/images/cat.jpg"
 SOURCES = "docs/images/sources"
 RESULTS = "docs/images/tutorial"
@@ -97,7 +96,7 @@ COMMANDS = {
     "64": f"vectorize {CAT} --curves 64",
     "256": f"vectorize {CAT} --curves 256",
     "strokes": f"vectorize {CAT} --curves 256 --open",
-    "poster": f"vectorize {CAT} --curves 128 --palette {INKS}",
+    "poster": f"vectorize {CAT} --curves 128 --palette {SOURCES}/inks.txt",
     "face": f"vectorize {CAT} --curves 64 --importance {SOURCES}/mask.png",
     "refined": f"refine {SOURCES}/by-hand.svg {CAT}",
     "logo": f"vectorize {SOURCES}/logo.png",
