@@ -5,9 +5,9 @@ import sys
 import cv2
 import numpy as np
 import torch
-from warpsplat.torch import Module, over
 
 import warpsplat
+from warpsplat.torch import Module, over
 
 
 def ellipse(height: int, width: int) -> np.ndarray:

@@ -7,9 +7,9 @@ import sys
 
 import torch
 from PIL import Image
-from warpsplat.torch import Module, SceneTensors, render
 
 import warpsplat
+from warpsplat.torch import Module, SceneTensors, render
 
 
 def fitted(scene: warpsplat.Scene, wanted: torch.Tensor, steps: int) -> tuple[Module, float]:

@@ -3,9 +3,9 @@
 import sys
 
 import torch
-from warpsplat.torch import Module
 
 import warpsplat
+from warpsplat.torch import Module
 
 
 def edges(image: torch.Tensor) -> torch.Tensor:

@@ -3,9 +3,9 @@
 import sys
 
 import torch
-from warpsplat.torch import Module
 
 import warpsplat
+from warpsplat.torch import Module
 
 
 def main(source: str, output: str, steps: int = 200, curves: int = 128) -> list[float]:

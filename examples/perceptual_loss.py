@@ -8,9 +8,9 @@ import sys
 
 import torch
 import torch.nn.functional as F  # noqa: N812 - its usual name
-from warpsplat.torch import Module
 
 import warpsplat
+from warpsplat.torch import Module
 
 POOLED = {2, 4, 7, 10}
 """Convolutions of VGG16, counted from 0, before which the picture is halved."""

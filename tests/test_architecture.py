@@ -40,7 +40,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "files",
         "svg",
         "metrics",
+        "torch",
     ),
+    "torch": ("errors", "scene", "kernels", "rendering", "fit", "svg"),
 }
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.
 Those that are not named may import all but ``cli``."""

@@ -178,6 +178,24 @@ class Step:
         errors = squares(difference, axis=1) * self.renderer.film.buffers.inside.numpy()
         return float(errors.sum(dtype="float64")) / self.aim.value_count
 
+    def lacking(self) -> FloatArray:
+        """What the last render lacks of what it is compared with, by colour.
+
+        Of a transparent picture, the mean of what it lacks on black and on white. Copies both to the host.
+
+        Returns:
+            shape (tile, 3, TILE, TILE).
+        """
+        lacking = self.aim.target.numpy() - self.renderer.film.buffers.image.numpy()
+        if lacking.shape[1] == 4:
+            lacking = lacking[:, :3] - 0.5 * lacking[:, 3:]
+        return np.asarray(lacking, np.float32)
+
+    def weights(self) -> FloatArray:
+        """What the error of each pixel counts, 0 outside of the image, shape (tile, TILE, TILE)."""
+        weights = self.aim.importance if self.aim.weighted else self.renderer.film.buffers.inside
+        return np.asarray(weights.numpy(), np.float32)
+
     def psnr(self) -> float:
         """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
         look at the file on, an estimate of the file's. Reads a number a tile back from the device.

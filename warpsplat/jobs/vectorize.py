@@ -34,7 +34,7 @@ from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.scene.scene import level_ends
-from warpsplat.svg.order import by_opacity
+from warpsplat.svg.order import by_color, by_opacity
 from warpsplat.svg.page import placed
 from warpsplat.svg.write import minified
 
@@ -186,6 +186,8 @@ def vectorize(
     if target.shape[2] == 4 and not traced and not made.interrupted:
         clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
+    if settings.ids and settings.subject != "line" and settings.renderer != "gaussian":
+        made = replace(made, scene=made.scene.take(by_color(made.scene)))
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata

@@ -44,8 +44,17 @@ class Bins:
     """Each tile's list of slots, sorted front to back."""
 
     def __init__(
-        self, backend: Backend, parameters: Parameters, viewport: Viewport, capacity: int, needed: wp.array
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        capacity: int,
+        needed: wp.array,
+        *,
+        most: float = 1.0,
     ) -> None:
+        """``most``: of an opacity, where it decides whether what lies behind is seen."""
+        self._most = most
         self._parameters, self._viewport = parameters, viewport
         self._capacity, self._needed = capacity, needed
         self.paint: dict[str, wp.array] = {}
@@ -84,6 +93,7 @@ class Bins:
             self._viewport.tile_count,
             self.buffers,
             self._parameters.arrays,
+            most=self._most,
             split=True,
             **self.paint,
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import composite, composite_paint, constants, visibility
+from warpsplat.kernels import composite, composite_opaque, composite_paint, constants, visibility
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -32,10 +32,13 @@ class FilmBuffers:
 class Film:
     """What the shapes are composited on."""
 
-    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas) -> None:
+    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas, *, opaque: bool = False) -> None:
+        """``opaque``: whether shapes of opacity 1 have gradients (``kernels.composite_opaque``)."""
+        self._opaque = opaque
         self._backend, self._viewport = backend, viewport
         # Premultiplied, nothing is black.
-        self._background = np.zeros(3) if canvas.background is None else canvas.background
+        shown = np.zeros(3) if canvas.background is None else canvas.background
+        self._background = wp.vec3(*(float(x) for x in shown))
         self.planes = 4 if canvas.background is None else 3
         sizes = {"tiles": viewport.tile_count, "planes": self.planes}
         self.buffers = backend.allocate(FilmBuffers, sizes)
@@ -61,15 +64,24 @@ class Film:
             coverage.buffers,
             paint.buffers,
             lane_columns=self._backend.lane_size,
-            background=wp.vec3(*(float(x) for x in self._background)),
+            background=self._background,
             split=True,
         )
 
     def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
         plain = self._is_plain(paint)
+        kernel = composite.composite_backward if plain else composite_paint.paint_backward
+        more = {}
+        if self._opaque:
+            kernel = composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward
+            slots = bins.buffers.list_slot.shape[0]
+            more = {
+                "background": self._background,
+                "light": self._backend.array(column, slots, self._backend.lanes),
+            }
         program.launch(
-            composite.composite_backward if plain else composite_paint.paint_backward,
+            kernel,
             self._dim,
             self.buffers,
             bins.buffers,
@@ -79,6 +91,7 @@ class Film:
             law=coverage.law,
             sum_grad=coverage.buffers.coverage,
             split=True,
+            **more,
         )
 
     def removal_cost(

@@ -48,6 +48,7 @@ class Program:
         self.launches: list[Launch] = []
         # Recorded launches hold addresses only.
         self._arrays: list[Sequence[Any]] = []
+        self._commands: list[tuple[wp.Launch, ctypes.Structure | None]] = []
 
     def launch(
         self,
@@ -79,14 +80,31 @@ class Program:
         assert whole is not None
         count = min(self.threads * PIECES_PER_THREAD, shape[0]) if split and self.threads > 1 else 1
         if count == 1:
-            pieces: tuple[Callable[[], None], ...] = (whole.launch,)
+            commands: list[tuple[wp.Launch, ctypes.Structure | None]] = [(whole, None)]
         else:
             borders = [shape[0] * i // count for i in range(count + 1)]
-            pieces = tuple(
-                quick(part(whole, start, (stop - start, *shape[1:])))
-                for start, stop in itertools.pairwise(borders)
+            parts = (
+                part(whole, start, (stop - start, *shape[1:])) for start, stop in itertools.pairwise(borders)
             )
-        self.launches.append(Launch(self.stage, kernel.key, pieces))
+            commands = [(command, pack(command)) for command in parts]
+        self._commands += commands
+        self.launches.append(Launch(self.stage, kernel.key, tuple(itertools.starmap(replay, commands))))
+
+    def rebind(self, name: str, array: wp.array) -> None:
+        """From now on ``array``, of the same type as before, is the parameter ``name`` of all launches that
+        have one. Not kept alive: whoever runs the program does that.
+        """
+        for command, packed in self._commands:
+            for index, argument in enumerate(command.kernel.adj.args):
+                if argument.label == name:
+                    command.set_param_at_index(index, array)
+                    if packed is not None:
+                        setattr(packed, name, command.params[index + 1])
+
+    def memory(self) -> dict[int, int]:
+        """Bytes of the arrays of all launches, by address."""
+        arrays = (array for arguments in self._arrays for array in arguments if isinstance(array, wp.array))
+        return {array.ptr: array.capacity for array in arrays if array.ptr}
 
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
         """Append a host function that launches device work (a scan, a sort)."""
@@ -159,20 +177,26 @@ def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:
 
 
 QUICK_VERSIONS = ("1.19.",)
-"""Of Warp, in which CPU kernels are known to be called as ``quick`` does."""
+"""Of Warp, in which CPU kernels are known to be called as ``replay`` does."""
 
 
-def quick(command: wp.Launch) -> Callable[[], None]:
-    """What launches ``command`` on a CPU, without packing its arguments each time.
+def pack(command: wp.Launch) -> ctypes.Structure | None:
+    """The arguments of a launch on a CPU as its kernel takes them; None where that is not known.
 
     Packing takes 7 us a piece, in which it holds the interpreter lock that other threads wait for: up to a
     tenth of a step.
     """
     if not wp.__version__.startswith(QUICK_VERSIONS):
-        return command.launch
+        return None
     labels = (argument.label for argument in command.kernel.adj.args)
-    arguments = _layout(tuple(zip(labels, map(type, command.params[1:]), strict=True)))(*command.params[1:])
-    return functools.partial(command.hooks.forward, ctypes.byref(command.params[0]), ctypes.byref(arguments))
+    return _layout(tuple(zip(labels, map(type, command.params[1:]), strict=True)))(*command.params[1:])
+
+
+def replay(command: wp.Launch, packed: ctypes.Structure | None) -> Callable[[], None]:
+    """What launches ``command``, with its arguments as ``pack`` has them."""
+    if packed is None:
+        return command.launch
+    return functools.partial(command.hooks.forward, ctypes.byref(command.params[0]), ctypes.byref(packed))
 
 
 @functools.cache

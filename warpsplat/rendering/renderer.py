@@ -20,6 +20,7 @@ from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.tiles import from_tiles, to_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
+from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.scene.scene import IntArray
 
 GROWTH = 1.5
@@ -70,12 +71,21 @@ class Renderer:
         *,
         model: Model = EXACT,
         capacity: Capacity | None = None,
+        opaque: bool = False,
     ) -> None:
-        """Without ``capacity``, a guess that ``make_room`` mends."""
+        """Record the stages.
+
+        Args:
+            parameters: what is rendered.
+            viewport: the picture.
+            model: of coverage.
+            capacity: without, a guess that ``make_room`` mends.
+            opaque: whether shapes may have opacities beyond OPACITY_RANGE, and gradients even so.
+        """
         self.parameters, self.viewport = parameters, viewport
         self.backend = parameters.backend
-        self._model = model
-        self.film = Film(self.backend, viewport, parameters.canvas)
+        self._model, self._opaque = model, opaque
+        self.film = Film(self.backend, viewport, parameters.canvas, opaque=opaque)
         self.needed_samples = self.backend.array(wp.int32, 1)
         self.needed_slots = self.backend.array(wp.int32, 1)
         shapes = parameters.shape_count
@@ -88,7 +98,8 @@ class Renderer:
         """Make the stages for ``capacity`` and record their launches."""
         backend, p, v = self.backend, self.parameters, self.viewport
         self.capacity = capacity
-        self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots)
+        most = OPACITY_RANGE[1] if self._opaque else 1.0
+        self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, most=most)
         job = Job(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
         self.geometry, self.coverage = self._model.stages(job)
         self.paint = Painting(backend, p, v, self.bins, capacity.slots)
@@ -123,6 +134,10 @@ class Renderer:
         self.film.backward(program, self.bins, self.coverage, self.paint)  # image_grad -> by slot
         self.paint.backward(program)  # -> colours, opacities
         self.coverage.backward(program)  # -> samples -> points, widths
+
+    def bytes(self) -> int:
+        """Memory of all arrays that the programs work on."""
+        return sum((self.forward_program.memory() | self.backward_program.memory()).values())
 
     def forward(self) -> None:
         """Render into the film."""
