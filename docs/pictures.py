@@ -5,17 +5,22 @@
 
 from __future__ import annotations
 
+import re
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageFilter
 
+import warpsplat
 from warpsplat.svg.viewer import render_own
 
-FOLDER = Path(__file__).parent / "images" / "sources"
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "docs" / "images" / "sources"
 
 LOGO = """<svg xmlns="http://www.w3.org/2000/svg" width="240" height="240" viewBox="0 0 240 240">
 <rect x="12" y="12" width="216" height="216" rx="52" fill="#20304f"/>
@@ -144,14 +149,28 @@ def sources() -> None:
     mask().save(FOLDER / "mask.png", optimize=True)
 
 
+def own_loss() -> None:
+    """Run the Python of gradient.md, and write what it starts from and what it makes."""
+    page = (ROOT / "docs" / "gradient.md").read_text("utf-8")
+    code = "".join(re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE))
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copy(ROOT / CAT, folder)
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=folder)
+        shutil.copy(Path(folder, "own.svg"), ROOT / RESULTS)
+    warpsplat.save_svg(warpsplat.starting_scene(CAT, 64), f"{RESULTS}/own-start.svg")
+
+
 def main(names: list[str]) -> None:
     """Write the sources and the results of these names."""
     sources()
     for name in names:
+        if name == "own":
+            own_loss()
+            continue
         line = f"{COMMANDS[name]} -o {RESULTS}/{name}.svg"
         print(line, flush=True)
         subprocess.run([sys.executable, "-m", "warpsplat", *shlex.split(line)], check=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(COMMANDS))
+    main(sys.argv[1:] or [*COMMANDS, "own"])
