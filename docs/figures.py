@@ -133,7 +133,7 @@ def tiles(stages: Stages) -> str:
         closed = shape < len(stages.scene) - 1
         color, width = (RED, 4) if shape == BLOB else ("#8a93a3", 2)
         body.append(polygon(ZOOM * stages.vertices(shape), stroke=color, width=width, closed=closed))
-    return figure((0, 0, ZOOM * v.width, ZOOM * v.height), body, clip=True)
+    return figure((0, 0, ZOOM * v.width, ZOOM * v.height), body)
 
 
 def coverage(stages: Stages) -> str:
@@ -152,7 +152,7 @@ def coverage(stages: Stages) -> str:
     body.append(
         polygon(size * (stages.vertices(BLOB) - np.array([x0, y0], np.float32)), stroke=RED, width=2.5)
     )
-    return figure((0, 0, TILE * size, TILE * size), body, clip=True)
+    return figure((0, 0, TILE * size, TILE * size), body)
 
 
 def compositing(stages: Stages) -> str:
@@ -181,7 +181,7 @@ def adjoint(stages: Stages) -> str:
         f'<g stroke="{INK}" stroke-width="4" marker-end="url(#head)">{arrows}</g>',
         dots(points, 5, INK),
     ]
-    return figure((0, 0, ZOOM * v.width, ZOOM * v.height), body, clip=True)
+    return figure((0, -50, ZOOM * v.width, ZOOM * v.height), body)
 
 
 def gradients(stages: Stages, wanted: Array) -> tuple[Array, Array]:
@@ -234,14 +234,13 @@ ARROW = (
 )
 
 
-def figure(box: tuple[float, float, float, float], body: Iterable[str], *, clip: bool = False) -> str:
-    """An SVG of these elements; what lies beyond the box is not seen."""
+def figure(box: tuple[float, float, float, float], body: Iterable[str]) -> str:
+    """An SVG of these elements on white, which dark pages need; what lies beyond the box is not seen."""
+    size = f'width="{box[2]:.6g}" height="{box[3]:.6g}"'
     view = " ".join(f"{x:.6g}" for x in box)
-    overflow = "" if not clip else ' overflow="hidden"'
-    head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{view}" width="{box[2]:.6g}" height="{box[3]:.6g}"'
-    )
-    return f'{head}{overflow} font-family="sans-serif">\n' + "\n".join(body) + "\n</svg>\n"
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{view}" {size} font-family="sans-serif">'
+    paper = f'<rect x="{box[0]:.6g}" y="{box[1]:.6g}" {size} fill="#fff"/>'
+    return "\n".join([head, paper, *body, "</svg>\n"])
 
 
 def polyline(points: Iterable[Iterable[float]]) -> str:

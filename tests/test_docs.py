@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import runpy
 import shlex
 import shutil
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from PIL import Image
 from tests import ROOT
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
+from warpsplat.svg.viewer import render_svg
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 CAT = "docs/images/cat.jpg"
@@ -127,3 +129,14 @@ def test_words_of_the_pages_are_public() -> None:
                 assert name in {*public, "torch", "pydiffvg", "errors", "scene"}, (
                     f"{page.name}: warpsplat.{name}"
                 )
+
+
+def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
+    """All of them; the script holds its gradient against central differences."""
+    runpy.run_path(str(ROOT / "docs" / "figures.py"))["main"](tmp_path)
+    kept = ROOT / "docs" / "images" / "how"
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept.iterdir()}
+    for path in tmp_path.iterdir():
+        assert (
+            render_svg(path.read_text("utf-8")).size == render_svg((kept / path.name).read_text("utf-8")).size
+        )
