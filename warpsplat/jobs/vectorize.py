@@ -35,7 +35,7 @@ from warpsplat.scene.geometry import areas
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.page import placed
-from warpsplat.svg.write import minified
+from warpsplat.svg.write import minified, shortened
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,9 @@ def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: 
 
     def made() -> str:
         text = export(scene, settings, per_pixel, metadata)
-        return minified(text) if settings.minify else text
+        if settings.minify:
+            return minified(text)
+        return text if settings.size or settings.page or settings.units else shortened(text)
 
     svg = made()
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:

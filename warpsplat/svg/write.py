@@ -288,5 +288,39 @@ def read_metadata(text: str) -> str:
 
 def minified(text: str) -> str:
     """A file written here without the mark and line breaks, which show nothing."""
-    head, found, rest = text.partition(MARK)
+    head, found, rest = _plain(text).partition(MARK)
     return head + rest.partition("-->\n")[2].rstrip("\n") if found else text
+
+
+SHORT = 1500
+"""A file of fewer characters has no comment: the mark is the order of its attributes, which costs nothing
+(``files.output`` knows both)."""
+
+SHORT_HEAD = re.compile(
+    rf'<svg viewBox="0 0 ([\d.]+) ([\d.]+)" xmlns="{re.escape(NAMESPACE)}" height="(\d+)" width="(\d+)">'
+)
+"""How a short file begins."""
+
+
+def shortened(text: str) -> str:
+    """A file written here, where it is short without the comment and line breaks; one whose comment says more
+    than the mark stays as it is.
+    """
+    head = OUR_HEAD.match(text)
+    if not head or not text.startswith("-->\n", head.end()) or len(text) >= SHORT:
+        return text
+    width, height, *box = head.groups()
+    rest = text[head.end() + len("-->\n") :].rstrip("\n")
+    return f'<svg viewBox="0 0 {" ".join(box)}" xmlns="{NAMESPACE}" height="{height}" width="{width}">{rest}'
+
+
+def _plain(text: str) -> str:
+    """A short file with the comment again; any other as it is."""
+    head = SHORT_HEAD.match(text)
+    if not head:
+        return text
+    *box, height, width = head.groups()
+    return (
+        f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="0 0 {" ".join(box)}">'
+        f"{MARK}-->\n{text[head.end() :]}\n"
+    )
