@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import Refinement, matching
+from warpsplat.fit.export import finished
 from warpsplat.fit.loop import Fit, Progress
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.rounding import finest
@@ -34,10 +35,13 @@ def decided(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
     """
     if settings.subject != "auto":
         return settings, ""
-    fitted = settings.fitted_options()
+    # Of a size, drawings know as well: with fewer regions.
+    fitted = replace(settings, max_bytes=None).fitted_options()
     if fitted:
         return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
     guess = guess_subject(target)
+    if settings.max_bytes and guess.subject not in {"photo", "drawing"}:
+        return replace(settings, subject="photo"), "max-bytes is for fitted shapes and drawings"
     return replace(settings, subject=guess.subject), guess.why
 
 
@@ -62,9 +66,30 @@ def draw(
         return _made(scene, per_pixel, target, backend, interrupted=False)
     if settings.subject == "line":
         return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop)
-    traced = trace(target, most=None if settings.simplify else settings.curves)
+    most = None if settings.simplify else settings.curves
+    made = _drawn(target, settings, backend, most, over, stop)
+    for _ in range(FEWER_ROUNDS):
+        size = len(finished(made.scene, settings, made.per_pixel).encode())
+        count = len(made.scene)
+        if not settings.max_bytes or size <= settings.max_bytes or count <= 1 or over():
+            break
+        most = max(1, min(count - 1, math.floor(FEWER * count * settings.max_bytes / size)))
+        made = _drawn(target, settings, backend, most, over, stop)
+    return made
+
+
+FEWER, FEWER_ROUNDS = 0.9, 6
+"""Regions that are kept over those that would fill ``max_bytes``, and times at the most: the smallest go, and
+those that stay are the ones with long outlines."""
+
+
+def _drawn(
+    target: FloatArray, settings: Settings, backend: Backend, most: int | None, over: Stop, stop: Stop | None
+) -> Fit:
+    """A drawing of ``most`` regions, finished."""
+    traced = trace(target, most=most)
     scene = limited(traced.scene, settings)
-    finished = finish_drawing(
+    done = finish_drawing(
         target,
         Drawing(scene, traced.joints, traced.same),
         backend,
@@ -72,8 +97,8 @@ def draw(
         finest=finest(settings),
         stop=over,
     )
-    scene, per_pixel = finished.drawing.scene, finished.per_pixel
-    return _made(scene, per_pixel, target, backend, interrupted=bool(stop and stop()))
+    interrupted = bool(stop and stop())
+    return _made(done.drawing.scene, done.per_pixel, target, backend, interrupted=interrupted)
 
 
 def limited(scene: Scene, settings: Settings) -> Scene:

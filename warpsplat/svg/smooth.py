@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from warpsplat.svg.commands import Pair, Text, minus, row
@@ -19,7 +20,7 @@ def shortest_smooth(joints: Sequence[Pair], control: Pair) -> str:
     head = f"M{row(start, False)}"
     ways = {"q": (*minus(control, start), *minus(end, start)), "Q": (*control, *end)}
     best = {letter: _longer(Text(0, ""), head + letter + row(way, False)) for letter, way in ways.items()}
-    for before, after in zip(joints[1:], joints[2:], strict=False):
+    for before, after in itertools.pairwise(joints[1:]):
         found: dict[str, Text] = {}
         for way, numbers in (("t", minus(after, before)), ("T", after)):
             joined, fresh = row(numbers, True), way + row(numbers, False)
