@@ -279,6 +279,30 @@ def test_titles() -> None:
     assert len(back) == 2
 
 
+def test_fills_of_one_paint_that_lie_apart_are_one_path() -> None:
+    """It shows the same and is read as a shape of two contours; those that overlap stay two."""
+    scene = random_scene(Kind.FILL, count=2, basis=Basis.SPLINE)
+    points = scene.points - scene.points.mean(axis=0)
+    points *= 6 / np.abs(points).max()
+    rows = np.repeat([0, 1], scene.point_counts())
+    for gap, count in ((20, 1), (3, 2)):
+        places = np.array([[8, 20], [8 + gap, 20]])[rows]
+        alike = replace(
+            scene,
+            points=(points + places).astype(np.float32),
+            colors=np.repeat(scene.colors[:1], 2, axis=0),
+            opacities=np.full(2, 0.6, np.float32),
+        )
+        text = write_svg(alike, per_pixel=10)
+        assert text.count("<path") == count
+        shown = np.asarray(render_svg(text), np.int16)
+        named = np.asarray(render_svg(write_svg(alike, per_pixel=10, ids=True)), np.int16)
+        np.testing.assert_array_equal(shown, named)
+        back, _ = load_scene(text, scene.canvas.width, scene.canvas.height, "x.svg")
+        assert len(back) == count
+        assert (back.basis == Basis.SPLINE).all()
+
+
 @pytest.mark.parametrize("kind", list(Kind))
 def test_short_files_are_marked_by_the_order_of_their_attributes(kind: Kind, tmp_path: Path) -> None:
     """They show the same, are known again, and are no longer than without a mark."""

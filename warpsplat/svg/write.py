@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
 from warpsplat.svg.names import LEVEL_ID, path_names
@@ -188,13 +189,14 @@ def _groups(
     if scene.layer_names:
         names = [scene.layer_names[scene.layer[end - 1]] for end in (*ends, len(scene))]
     last = None
-    for (level, is_picture, in_group), shapes in itertools.groupby(
+    for (level, is_picture, in_group), run in itertools.groupby(
         np.flatnonzero(scene.twin == 0).tolist(),
         lambda i: (layer[i], pictures[i], strokes[i] and not has_twin[i]),
     ):
         if (ends or scene.layer_names) and level != last:
             yield ("" if last is None else "</g>") + f'<g id="{names[level]}">'
             last = level
+        shapes = list(run)
         if is_picture:
             yield from (_picture(scene.pictures[scene.picture[i]], scene, per_pixel) for i in shapes)
             continue
@@ -202,10 +204,38 @@ def _groups(
             _path(scene, i, data.of(i), colors[i], both[i], per_pixel, rest[i], in_group=in_group)
             for i in shapes
         ]
+        paths = _joined(scene, shapes, paths)
         group = (f"<g {STROKE_ATTRIBUTES}>", "</g>") if in_group else ("", "")
         yield from (group[0], *nested(paths), group[1])
     if last is not None:
         yield "</g>"
+
+
+APART = 1.0
+"""Shapes nearer to each other than this [px] share pixels."""
+
+
+def _joined(scene: Scene, shapes: list[int], paths: list[Path]) -> list[Path]:
+    """Neighbours among fitted fills that say the same and lie apart as one path, which shows the same.
+
+    Those of drawings stay: there a path is a region.
+    """
+    alike = [a.shared == b.shared and not (a.own or b.own) for a, b in itertools.pairwise(paths)]
+    if not any(alike):
+        return paths
+    chosen = (scene.kind[shapes] == Kind.FILL) & (scene.basis[shapes] == Basis.SPLINE)
+    boxes = bounds(scene)[shapes]
+    low, high = boxes[:, :2] - APART / 2, boxes[:, 2:] + APART / 2
+    found, first = [paths[0]], 0
+    for i, is_alike in enumerate(alike, 1):
+        before = slice(first, i)
+        apart = ((low[before] >= high[i]) | (low[i] >= high[before])).any(axis=1)
+        if is_alike and chosen[before].all() and chosen[i] and apart.all():
+            found[-1] = replace(found[-1], data=found[-1].data + paths[i].data)
+        else:
+            found.append(paths[i])
+            first = i
+    return found
 
 
 def write_svg(
