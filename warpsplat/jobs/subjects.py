@@ -68,19 +68,32 @@ def draw(
         return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop)
     most = None if settings.simplify else settings.curves
     made = _drawn(target, settings, backend, most, over, stop)
+    low, high = 0, len(made.scene)  # regions that fit into the size, and that do not
+    best, size = made, _size(made, settings)
+    if not settings.max_bytes or size <= settings.max_bytes:
+        return made
     for _ in range(FEWER_ROUNDS):
-        size = len(finished(made.scene, settings, made.per_pixel).encode())
-        count = len(made.scene)
-        if not settings.max_bytes or size <= settings.max_bytes or count <= 1 or over():
+        share = settings.max_bytes / size if not low else 0.5
+        count = min(max(low + round(share * (high - low)), low + 1), high - 1)
+        if count <= low or over():
             break
-        most = max(1, min(count - 1, math.floor(FEWER * count * settings.max_bytes / size)))
-        made = _drawn(target, settings, backend, most, over, stop)
-    return made
+        made = _drawn(target, settings, backend, count, over, stop)
+        size = _size(made, settings)
+        if size <= settings.max_bytes:
+            low, best = count, made
+        else:
+            high = count
+            best = best if low else made
+    return best
 
 
-FEWER, FEWER_ROUNDS = 0.9, 6
-"""Regions that are kept over those that would fill ``max_bytes``, and times at the most: the smallest go, and
-those that stay are the ones with long outlines."""
+def _size(made: Fit, settings: Settings) -> int:
+    """Bytes of the file."""
+    return len(finished(made.scene, settings, made.per_pixel).encode())
+
+
+FEWER_ROUNDS = 5
+"""Numbers of regions at the most that are tried for ``max_bytes``."""
 
 
 def _drawn(
