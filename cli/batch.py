@@ -90,26 +90,25 @@ def command(
     from warpsplat.cli.run import run_file
     from warpsplat.jobs.execute import Outcome, execute
     from warpsplat.jobs.plan import load_jobs
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.rendering.device import choose_device, start_warp
 
     todo = load_jobs(jobs)
     if not overwrite:
         check_ours(todo, jobs)
     start_warp()
-    names = {device or job.device for job in todo}
-    backends = {name: Backend.on(choose_device(name), threads) for name in names}
+    for name in {device or job.device for job in todo}:
+        choose_device(name)  # an unknown one is found before the first image
     outcomes: list[Outcome] = []
     talk = not quiet and not as_json
 
     def run(job: Job, data: bytes) -> Result:
-        backend = backends[device or job.device]
         return run_file(
             job.image,
             job.output,
             job.settings,
-            backend,
             data=data,
+            device=device or job.device,
+            threads=threads,
             importance=job.importance,
             keyed=True,
             quiet=quiet,

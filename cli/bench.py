@@ -32,6 +32,8 @@ def table(values: dict[str, Any], verbose: int) -> str:
     rows += [(f"  {name}", spread) for name, spread in values["stages"].items()]
     if verbose:
         rows += [(f"    {name}", spread) for name, spread in values["kernels"].items()]
+    both = values.get("through_torch", {})
+    rows += [(f"by turns, {name}", both[name]) for name in ("own", "torch") if both]
     memory = values["peak_memory"]
     where = values["device"] + (
         f", {values['threads']} threads" if values["device"] == "cpu" else f" ({values['device_name']})"
@@ -45,7 +47,8 @@ def table(values: dict[str, Any], verbose: int) -> str:
             *(f"{name:36}{s['median']:10.2f}{s['low']:10.2f}{s['high']:10.2f}" for name, s in rows),
             f"{values['megapixels_per_s']:.1f} megapixels/s, {values['us_per_curve']:.1f} us a curve, "
             f"{values['ns_per_pixel']:.1f} ns a pixel"
-            + (f", peak memory {memory / 1e6:.0f} MB" if memory else ""),
+            + (f", peak memory {memory / 1e6:.0f} MB" if memory else "")
+            + (f"; through PyTorch {both['ratio']:.2f} times as long" if both else ""),
         ]
     )
 
@@ -60,6 +63,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @threads_option
 @click.option("--repeats", type=click.IntRange(1, 10_000), default=20, show_default=True, metavar="N")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, metavar="N")
+@click.option("--torch", "through_torch", is_flag=True, help="Time PyTorch's passes beside the own ones.")
 @click.option("-v", "--verbose", count=True, help="List the kernels as well.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
@@ -72,8 +76,8 @@ def command(size: str, device: str, threads: int | None, verbose: int, as_json: 
     """
     width, height = parse_size(size)
     from warpsplat.jobs.bench import bench
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
 
     start_warp()
     values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)

@@ -144,8 +144,8 @@ def command(
     from warpsplat.files.output import write_result
     from warpsplat.jobs.compare import Comparison, compare, warm_up
     from warpsplat.jobs.vectorize import vectorize
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
 
     start_warp()
     backend = Backend.on(choose_device(device), threads)

@@ -9,7 +9,7 @@ import click
 
 from warpsplat.cli.options import FILE
 from warpsplat.cli.say import say
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import UsageError
 
 
 @click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
@@ -25,19 +25,12 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     for images of up to 4 million pixels. One of the two may be - for the
     standard input.
     """
-    from warpsplat.files.image import load_image
-    from warpsplat.files.inputs import STANDARD, input_name
-    from warpsplat.metrics import score_svg
-    from warpsplat.svg.inspect import read_svg_text
+    from warpsplat.api import score
+    from warpsplat.files.inputs import STANDARD
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")
-    target = load_image(image, paper=None)
-    text = read_svg_text(svg)
-    try:
-        values = score_svg(text, target).as_dict()
-    except ImageError as error:
-        raise ImageError(f"{input_name(svg)}: {error}") from error
+    values = score(svg, image).as_dict()
     if as_json:
         say(json.dumps({"image": str(image), "svg": str(svg), **values}))
         return

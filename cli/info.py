@@ -18,9 +18,9 @@ def command(as_json: bool) -> None:
 
     import warp as wp
 
-    from warpsplat import __version__
-    from warpsplat.render.backend import available_cores
-    from warpsplat.render.device import choose_device, start_warp
+    from warpsplat._version import __version__
+    from warpsplat.rendering.backend import available_cores
+    from warpsplat.rendering.device import choose_device, start_warp
 
     start_warp()
     values: dict[str, Any] = {

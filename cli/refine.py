@@ -12,7 +12,7 @@ from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
-from warpsplat.files.output import SVG_ENDINGS, check_output, write_svg_text
+from warpsplat.files.output import SVG_ENDINGS, check_output
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.options import BY_NAME
 
@@ -60,38 +60,33 @@ def command(
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
     check_output(output, svg, image, endings=SVG_ENDINGS, overwrite=overwrite)
+    from warpsplat.api import refine
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.vectorize import summary
-    from warpsplat.jobs.refine import refine
-    from warpsplat.jobs.vectorize import load_target
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
-    from warpsplat.svg.inspect import read_svg_text
+    from warpsplat.svg.inspect import MAX_BYTES
 
-    text = read_svg_text(svg)
-    target = load_target(read_input(image), input_name(image), settings.background)
-    start_warp()
-    backend = Backend.on(choose_device(device), threads)
+    data = read_input(svg, "an SVG", limit=MAX_BYTES)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as report:
-        refined = refine(
-            text,
-            target,
-            settings,
-            backend,
-            name=input_name(svg),
+        result = refine(
+            data,
+            image,
+            settings=settings,
             keep=keep,
-            report=report,
+            output=output,
+            device=device,
+            threads=threads,
+            callback=report,
             stop=interrupt,
+            name=input_name(svg),
         )
-        result, before = refined.result, refined.before
-        write_svg_text(output, result.svg)
-    if refined.kept and not quiet:
-        say(f"warpsplat: {input_name(svg)}: kept as it is: {refined.kept}", err=True)
+    before = result.before or 0.0
+    if result.kept and not quiet:
+        say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
-        values["kept"] = refined.kept
+        values["kept"] = result.kept
     if as_json:
         say(json.dumps(values), err=output == STANDARD)
     elif not quiet:

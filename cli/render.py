@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -25,40 +26,27 @@ from warpsplat.errors import ImageError, UsageError
 @click.option("--device", default="auto", show_default=True, help="Of exact and splat.")
 @threads_option
 def command(
-    svg: Path, output: Path, overwrite: bool, scale: float, renderer: str, device: str, threads: int | None
+    svg: Path, output: Path, overwrite: bool, scale: float, renderer: Any, device: str, threads: int | None
 ) -> None:
     """Render SVG (any, not only ours; - for the standard input) to a PNG."""
-    import math
-
     from warpsplat.files.inputs import input_name
     from warpsplat.files.output import check_output, mark_png, write_result
-    from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, read_svg_text, svg_size
+    from warpsplat.jobs.render import NO_GAUSSIANS, check_scale, to_png
+    from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
     from warpsplat.svg.viewer import draw_png
 
-    if not (math.isfinite(scale) and scale > 0):
-        raise UsageError(f"scale must be a positive number, not {scale}")
     if renderer == "gaussian":
-        raise UsageError(
-            "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of "
-            "each Gaussian; vectorize --renderer gaussian reports the figures of its own render"
-        )
+        raise UsageError(NO_GAUSSIANS)
     check_output(output, svg, endings=(".png",), overwrite=overwrite)
     text = read_svg_text(svg)
     try:
-        size = svg_size(inspect_svg(text).root)
-        if size and max(size[0], 1.0) * scale * max(size[1], 1.0) * scale > MAX_PIXELS:
-            raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
-        if size and min(max(1.0, side) for side in size) * scale < 0.5:
-            raise UsageError(f"scale {scale} leaves no pixel of {size[0]:g}x{size[1]:g}")
+        check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
         if renderer == "viewer":
-            png = draw_png(text, zoom=scale)
+            png = draw_png(text, zoom=scale)  # packed as it comes: a picture may have 200 million pixels
         else:
-            from warpsplat.jobs.render import draw_own
-            from warpsplat.render.backend import Backend
-            from warpsplat.render.device import choose_device, start_warp
+            from warpsplat.api import render
 
-            start_warp()
-            png = draw_own(text, renderer, scale, Backend.on(choose_device(device), threads))
+            png = to_png(render(text, scale=scale, renderer=renderer, device=device, threads=threads))
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
     write_result(output, mark_png(png))

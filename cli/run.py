@@ -10,14 +10,15 @@ from typing import Any
 
 import click
 
+from warpsplat.api import vectorize
 from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result, vectorize_file
-from warpsplat.render.backend import Backend
+from warpsplat.jobs.vectorize import Result
+from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
@@ -84,36 +85,39 @@ def run_file(
     source: Path,
     output: Path,
     settings: Settings,
-    backend: Backend,
     *,
     data: bytes,
+    device: str,
+    threads: int | None,
     importance: Path | None = None,
     keyed: bool = False,
     verbose: int = 0,
     quiet: bool = False,
 ) -> Result:
-    """``vectorize_file`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
+    """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask. ``keyed``: see ``vectorize_file``.
+    ``importance``: file of a mask. ``keyed``: see there.
     """
     pursued = settings.target_psnr or settings.max_bytes
+    start_warp()
     if verbose:
         number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
         if settings.simplify and pursued:
             number = "no more than needed"
         plural = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
-        say(f"{source}: {number} {plural} on {backend.device}", err=True)
+        say(f"{source}: {number} {plural} on {choose_device(device)}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
-        result = vectorize_file(
+        result = vectorize(
             data,
-            output,
-            settings,
-            backend,
+            settings=settings,
+            output=output,
+            device=device,
+            threads=threads,
             name=input_name(source),
             importance=importance,
             keyed=keyed,
-            report=report,
+            callback=report,
             stop=interrupt,
         )
     count = len(result.scene)

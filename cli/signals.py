@@ -59,7 +59,7 @@ def _exit(code: int) -> None:
 
 def leave_compiler(code: int) -> None:
     """End the process at once where kernels are being compiled: the compiler cannot be stopped."""
-    cache = sys.modules.get("warpsplat.render.kernel_cache")
+    cache = sys.modules.get("warpsplat.rendering.kernel_cache")
     if cache and cache.compiling():
         _exit(code)
 

@@ -97,16 +97,14 @@ def command(
     inputs = (image,) if importance is None else (image, importance)
     check_output(output, *inputs, endings=SVG_ENDINGS, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
-    from warpsplat.render.backend import Backend
-    from warpsplat.render.device import choose_device, start_warp
 
-    start_warp()
     result = run_file(
         image,
         output,
         settings,
-        Backend.on(choose_device(device), threads),
         data=data,
+        device=device,
+        threads=threads,
         importance=importance,
         verbose=verbose,
         quiet=quiet,

@@ -34,7 +34,7 @@ Conventions and glossary, here once:
 * Gradients are named after their value with ``_grad``. No kernel adds floats atomically: each output
   element has one writer, so results are the same bits on every run of one device, and a launch may be cut
   into pieces (``offset`` is the index of a piece's first thread) that run on different CPU threads.
-* A parameter has the name of the array that it is bound to (``render.program.bind``).
+* A parameter has the name of the array that it is bound to (``rendering.program.bind``).
 
 Data flow of a step (forward, then its adjoint in reverse order)::
 

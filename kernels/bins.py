@@ -147,6 +147,7 @@ def list_visible(
     opacities: wp.array[wp.float32],  # [shape_count]
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_last: wp.array[wp.int32],  # [tile_count]
+    most: wp.float32,  # of an opacity, for what lies behind; below 1, the lists go further back
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] HIDDEN added
     tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
@@ -169,6 +170,6 @@ def list_visible(
             if state == FULL:
                 list_slot[n] = -1 - slot
                 if paint[shape] == FLAT:
-                    light *= 1.0 - opacities[shape]
+                    light *= 1.0 - wp.min(opacities[shape], most)
             n += 1
     tile_stop[tile] = n

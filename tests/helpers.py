@@ -15,12 +15,12 @@ from tests.reference.composite import composite
 from tests.reference.curves import Tensors, tensors
 from tests.reference.grid import Plan
 from warpsplat.kernels.constants import TILE
-from warpsplat.render.backend import Backend, Viewport
-from warpsplat.render.grid import Grid, GridBuffers
-from warpsplat.render.models import EXACT, Model, SplatModel
-from warpsplat.render.outline import Outline, OutlineBuffers
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.renderer import Capacity, Renderer
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.grid import Grid, GridBuffers
+from warpsplat.rendering.models import EXACT, Model, SplatModel
+from warpsplat.rendering.outline import Outline, OutlineBuffers
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import Scene
 
 SPLAT = SplatModel()

@@ -12,9 +12,9 @@ import numpy as np
 from PIL import Image
 
 from tests.scenes import disc, mixed_scene, random_scene
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import EXACT, GaussianModel, Model, SplatModel
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg

@@ -26,21 +26,23 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "svg": ("errors", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
     "trace": ("alpha", "errors", "scene"),
-    "render": ("errors", "native", "scene", "kernels"),
-    "fit": ("alpha", "errors", "scene", "kernels", "render", "svg", "metrics"),
+    "rendering": ("errors", "native", "scene", "kernels"),
+    "fit": ("alpha", "errors", "scene", "kernels", "rendering", "svg", "metrics"),
     "jobs": (
         "alpha",
         "errors",
         "native",
         "scene",
         "kernels.constants",
-        "render",
+        "rendering",
         "fit",
         "trace",
         "files",
         "svg",
         "metrics",
+        "torch",
     ),
+    "torch": ("errors", "scene", "kernels", "rendering", "fit", "svg"),
 }
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.
 Those that are not named may import all but ``cli``."""
@@ -259,5 +261,5 @@ def test_kernels_are_launched_by_name_only() -> None:
                 name = ast.unparse(node.func)
                 homes += [module] if name in {"wp.launch", "wp.launch_tiled", "warp.launch"} else []
                 launches += name == "program.launch"
-    assert homes == ["render.program"]
+    assert homes == ["rendering.program"]
     assert launches > 25

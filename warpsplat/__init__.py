@@ -1,3 +1,64 @@
-"""warpsplat: raster image in, SVG of Bézier shapes out, by gradient descent."""
+"""warpsplat: raster image in, SVG of Bézier shapes out, by gradient descent.
+
+What this module offers is the public interface, together with ``warpsplat.errors``, ``warpsplat.scene``,
+``warpsplat.torch`` and ``warpsplat.pydiffvg``; it keeps to semantic versioning. All else may change.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from warpsplat._version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from warpsplat.api import load_image as load_image
+    from warpsplat.api import load_svg as load_svg
+    from warpsplat.api import refine as refine
+    from warpsplat.api import render as render
+    from warpsplat.api import save_svg as save_svg
+    from warpsplat.api import score as score
+    from warpsplat.api import starting_scene as starting_scene
+    from warpsplat.api import vectorize as vectorize
+    from warpsplat.errors import ImageError as ImageError
+    from warpsplat.errors import OutputError as OutputError
+    from warpsplat.errors import ResourceError as ResourceError
+    from warpsplat.errors import UsageError as UsageError
+    from warpsplat.errors import WarpsplatError as WarpsplatError
+    from warpsplat.fit.loop import Progress as Progress
+    from warpsplat.fit.settings import Settings as Settings
+    from warpsplat.fit.settings import make_settings as make_settings
+    from warpsplat.jobs.render import to_pillow as to_pillow
+    from warpsplat.jobs.vectorize import Result as Result
+    from warpsplat.metrics import Score as Score
+    from warpsplat.scene import Canvas as Canvas
+    from warpsplat.scene import Scene as Scene
+
+_HOMES = {
+    **dict.fromkeys(
+        ("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "starting_scene"),
+        "warpsplat.api",
+    ),
+    **dict.fromkeys(
+        ("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"), "warpsplat.errors"
+    ),
+    **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
+    **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
+    "Progress": "warpsplat.fit.loop",
+    "to_pillow": "warpsplat.jobs.render",
+    "Result": "warpsplat.jobs.vectorize",
+    "Score": "warpsplat.metrics",
+}
+"""Where each name comes from. They are imported when they are asked for: the command line starts light."""
+
+__all__ = ["__version__", *sorted(_HOMES)]  # noqa: PLE0604 - all are strings
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

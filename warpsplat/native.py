@@ -4,22 +4,48 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import Iterator
+
+_lock = threading.Lock()
+_hiding = 0
+"""Threads that have something to hide."""
+_saved = -1
+"""The process's standard error, meanwhile."""
 
 
 @contextlib.contextmanager
 def messages_hidden() -> Iterator[None]:
-    """Send the process's standard error to nowhere: native code writes there behind Python's back."""
+    """Send the process's standard error to nowhere: native code writes there behind Python's back.
+
+    It comes back when the last of all threads that ask for this is done.
+    """
+    _hide()
     try:
-        saved = os.dup(2)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-    except OSError:
-        yield
-        return
-    try:
-        os.dup2(nowhere, 2)
         yield
     finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(nowhere)
+        _show()
+
+
+def _hide() -> None:
+    global _hiding, _saved  # noqa: PLW0603 - a process has one standard error
+    with _lock:
+        if not _hiding:
+            try:
+                _saved = os.dup(2)
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, 2)
+                os.close(nowhere)
+            except OSError:
+                pass  # then they are seen
+        _hiding += 1
+
+
+def _show() -> None:
+    global _hiding, _saved  # noqa: PLW0603
+    with _lock:
+        _hiding -= 1
+        if not _hiding and _saved >= 0:
+            os.dup2(_saved, 2)
+            os.close(_saved)
+            _saved = -1

@@ -5,7 +5,8 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column, total
 
-wp.set_module_options(constants.MODULE_OPTIONS)
+# Unrolled, its loops over channels and columns take a minute to compile for CUDA.
+wp.set_module_options({**constants.MODULE_OPTIONS, "max_unroll": 1})
 
 TILE = wp.constant(constants.TILE)
 

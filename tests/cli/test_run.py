@@ -20,7 +20,7 @@ from warpsplat.cli.run import _quality, time_left
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.vectorize import vectorize
-from warpsplat.render.backend import THREADS_PER_CORE, Backend, available_cores
+from warpsplat.rendering.backend import THREADS_PER_CORE, Backend, available_cores
 from warpsplat.svg.viewer import render_svg
 
 

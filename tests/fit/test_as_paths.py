@@ -9,9 +9,9 @@ import pytest
 
 from tests.scenes import canvas, disc
 from warpsplat.fit.as_paths import as_paths
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import GaussianModel
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import GaussianModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Kind, Scene
 
 SOFT = GaussianModel()

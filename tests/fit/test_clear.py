@@ -10,7 +10,7 @@ from tests.scenes import disc, random_scene
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.settings import make_settings
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.svg.viewer import premultiplied, render_own
 from warpsplat.svg.write import rounded

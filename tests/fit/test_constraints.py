@@ -11,8 +11,8 @@ from tests.fit.drawings import drawing, logo, polygon, seam
 from tests.helpers import relative_error
 from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Joint, Keeper
 from warpsplat.kernels.constants import NONE
-from warpsplat.render.backend import Backend
-from warpsplat.render.parameters import Parameters
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.parameters import Parameters
 from warpsplat.scene import Canvas
 
 DRAWINGS: dict[str, Callable[[], Drawing]] = {"logo": logo, "seam": seam}

@@ -12,8 +12,8 @@ from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Joint
 from warpsplat.fit.drawing import Refinement, own_colors, refine_drawing
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 
 QUICK = Refinement(steps=60, point_rate=0.4)

@@ -11,7 +11,7 @@ from warpsplat.fit.goals import AIM_FULL, _curves_for, _next
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.pursuit import Change, Made
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 from warpsplat.svg.write import path_sizes
 

@@ -10,8 +10,8 @@ from warpsplat.fit.density import densify
 from warpsplat.fit.importance import LEAST, TEXTURE_NOISE, pixel_weights, weights_at
 from warpsplat.fit.loop import fit
 from warpsplat.fit.settings import make_settings
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 
 
 @pytest.mark.parametrize("size", [(12, 8), (6, 4), (24, 16), (18, 12), (7, 5)])

@@ -20,7 +20,7 @@ from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_levels
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity

@@ -52,3 +52,13 @@ def test_it_begins_and_ends_as_they_do() -> None:
 def test_points_without_extent() -> None:
     nothing = np.zeros((4, 2))
     assert not handles_through(nothing, nothing).any()
+
+
+def test_many_at_once_are_as_each_alone() -> None:
+    rng = np.random.default_rng(1)
+    first, second = rng.normal(0, 5, (2, 30, 4, 2))
+    second[:, 0] = first[:, 3]
+    first[::5, 1] = first[::5, 0]
+    first[7] = second[7] = 0
+    alone = [handles_through(a, b) for a, b in zip(first, second, strict=True)]
+    np.testing.assert_allclose(handles_through(first, second), alone, atol=1e-9)

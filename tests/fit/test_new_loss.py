@@ -11,10 +11,10 @@ from warpsplat.fit import losses
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.losses import LossInputs
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.render.backend import Backend
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import render
 
 
 def record_blue(program: Program, inputs: LossInputs) -> None:

@@ -13,8 +13,8 @@ from tests.fit.test_merge import halves
 from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
 from warpsplat.fit.tidy import apart, finish_drawing, tidied
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg

@@ -16,8 +16,8 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.jobs.vectorize import Result, vectorize
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Kind, Paint
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own

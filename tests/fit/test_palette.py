@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,16 @@ import pytest
 
 from tests.fit.pictures import picture
 from warpsplat.errors import UsageError
-from warpsplat.fit.palette import Palette, main_colors
+from warpsplat.fit.palette import CHOICE_INTERVAL, Palette, best_colors, main_colors
+from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_palette
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.vectorize import vectorize
-from warpsplat.render.backend import Backend
-from warpsplat.scene import Basis, Canvas, Kind, Scene
+from warpsplat.rendering.backend import Backend
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 
 COLOR = re.compile(r'(?:fill|stroke)="(#[0-9a-f]{3,6})"')
 
@@ -51,28 +54,75 @@ def test_a_file_has_no_other_colours(device: str, kind: Kind, given: dict[str, o
     assert result.score.psnr > 12
 
 
-def test_small_steps_towards_another_colour_add_up() -> None:
-    """Each alone would be taken back."""
-    state = FitState.start(squares([[0.1, 0.1, 0.1]]), Backend.on("cpu"), np.random.default_rng(0))
+def chooser(target: FloatArray, scene: Scene) -> Step:
+    state = FitState.start(scene, Backend.on("cpu"), np.random.default_rng(0))
+    height, width = target.shape[:2]
+    return Step(state, make_settings(texture=0.0), Target(target, Phase(width, height)))
+
+
+@pytest.mark.parametrize("transparent", [False, True])
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_the_error_is_least_at_the_best_colour(opacity: float, *, transparent: bool) -> None:
+    """Of one shape alone: in each channel it grows as much on one side as on the other."""
+    scene, target = squares([[0.2, 0.9, 0.4]]), picture()
+    scene = replace(scene, opacities=np.full(1, opacity, np.float32))
+    if transparent:
+        scene = replace(scene, canvas=replace(scene.canvas, background=None))
+        target = np.concatenate([0.7 * target, np.full_like(target[..., :1], 0.7)], axis=2)
+    step = chooser(target, scene)
+    best = best_colors(step, scene)
+
+    def error(colors: FloatArray) -> float:
+        step.state.parameters.assign(replace(scene, colors=colors))
+        step.render()
+        return step.square_error()
+
+    least = error(best)
+    for channel in range(3):
+        off = np.zeros((1, 3), np.float32)
+        off[0, channel] = 0.05
+        around = error(best + off), error(best - off)
+        assert min(around) > least
+        assert around[0] == pytest.approx(around[1], rel=1e-3)
+
+
+def test_shapes_choose_the_colour_with_the_least_error() -> None:
+    """Of all, tried one by one; and no nearer one where most of a shape is hidden."""
+    rng = np.random.default_rng(3)
+    colors = rng.random((4, 3)).astype(np.float32)
+    scene = squares(rng.random((5, 3)).tolist())
+    step = chooser(picture(), scene)
+    palette = Palette(colors)
+    palette.choose(step)
+    chosen = step.state.scene().colors
+    parameters = step.state.parameters
+    for i in range(len(scene)):
+        errors = []
+        for color in colors:
+            tried = scene.colors.copy()
+            tried[i] = color
+            parameters.assign(replace(scene, colors=tried))
+            step.render()
+            errors.append(step.square_error())
+        assert (chosen[i] == colors[int(np.argmin(errors))]).all()
+
+
+def test_what_is_hidden_keeps_its_colour() -> None:
+    scene = squares([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    points = np.concatenate([scene.points[:4], scene.points[:4] * [2, 2] - [16, 16]])
+    scene = replace(scene, points=np.asarray(points, np.float32))
+    assert (best_colors(chooser(picture(), scene), scene)[0] == scene.colors[0]).all()
+
+
+def test_new_shapes_choose_at_once() -> None:
+    scene = squares([[0.0, 0.0, 0.0]])
+    step = chooser(picture(), scene)
     palette = Palette(np.array([[0, 0, 0], [1, 1, 1]], np.float32))
-    shown = []
-    for _ in range(30):
-        palette.choose(state)
-        scene = state.scene()
-        shown.append(float(scene.colors[0, 0]))
-        state.parameters.groups["colors"].value.assign(scene.colors + np.float32(0.02))
-    assert shown[0] == 0
-    assert shown[-1] == 1
-    assert shown == sorted(shown)
-
-
-def test_colours_that_are_not_given_follow_the_shapes() -> None:
-    start = np.full((1, 3), 0.2, np.float32)
-    for given in (True, False):
-        state = FitState.start(squares([[0.5, 0.5, 0.5]]), Backend.on("cpu"), np.random.default_rng(0))
-        palette = Palette(start.copy(), given=given)
-        palette.choose(state)
-        assert (palette.colors > start).all() == (not given)
+    palette.choose(step)
+    step.state.step = CHOICE_INTERVAL + 1
+    assert not palette.is_due(step.state)
+    step.state.parameters.rearrange(np.arange(1), squares([[0.3, 0.3, 0.3]]))
+    assert palette.is_due(step.state)
 
 
 def test_main_colours_are_the_pictures_own() -> None:
@@ -90,6 +140,12 @@ def test_opaque_shapes_are_opaque(device: str) -> None:
     result = vectorize(picture(), make_settings(curves=16, iterations=60, opaque=True), Backend.on(device))
     assert "opacity" not in result.svg
     assert (result.scene.opacities > 0.99).all()
+
+
+def test_colours_of_a_palette_are_not_trained() -> None:
+    assert make_settings(colors=4, rates={"colors": 0.1, "points": 2.0}).rates["colors"] == 0
+    assert make_settings(colors=4, rates={"points": 2.0}).rates["points"] == 2
+    assert make_settings(opaque=True).rates["colors"] > 0
 
 
 def test_palettes_as_texts(tmp_path: Path) -> None:

@@ -19,9 +19,9 @@ from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import ExactModel
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import ExactModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import OPACITY_RANGE, Basis, FloatArray, Kind, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import GRIDS, rounded

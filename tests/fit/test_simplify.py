@@ -17,7 +17,7 @@ from warpsplat.fit.simplify import APART, LEAST_POINTS, simplify, without
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas, flatten
 

@@ -14,8 +14,8 @@ from warpsplat.fit.split import FADED, faded, opacities_by_third, split
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Kind, Scene
 
 

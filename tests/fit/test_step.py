@@ -22,9 +22,9 @@ from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import Capacity
-from warpsplat.render.tiles import from_tiles
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Capacity
+from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Paint, Picture, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.viewer import on_white, render_svg

@@ -11,8 +11,8 @@ from tests.scenes import disc, random_scene
 from warpsplat.fit.pursuit import smaller
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.tiny import FEW, OPACITY, for_few, grounded
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import path_sizes
 

@@ -13,9 +13,9 @@ from warpsplat.errors import UsageError
 from warpsplat.files.image import load_image
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.vectorize import Result, load_target, vectorize_file
+from warpsplat.jobs.vectorize import Result, load_target, vectorize_image
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own
 
@@ -38,7 +38,7 @@ def badge(opaque: bool = False) -> bytes:
 def made(tmp_path: Path, device: str, source: bytes, **settings: object) -> tuple[Result, str]:
     output = tmp_path / "o.svg"
     chosen = make_settings(curves=12, iterations=200, **settings)
-    return vectorize_file(source, output, chosen, Backend.on(device)), output.read_text()
+    return vectorize_image(source, chosen, Backend.on(device), output=output), output.read_text()
 
 
 @pytest.mark.slow

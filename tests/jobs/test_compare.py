@@ -21,7 +21,7 @@ from warpsplat.jobs.compare import OURS, compare, warm_up
 from warpsplat.jobs.tracer import VTRACER_SETTINGS, Options, vtracer
 from warpsplat.jobs.vectorize import Result, vectorize
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 

@@ -85,7 +85,7 @@ def test_whatever_an_image_throws_is_its_own_failure(
             raise error
         return np.full((24, 32, 3), 0.5, np.float32)
 
-    monkeypatch.setattr("warpsplat.jobs.vectorize.load_image", load)
+    monkeypatch.setattr("warpsplat.files.sources.load_image", load)
     text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
     assert run("batch", write(folder, text), "--json") == 5
     captured = capsys.readouterr()

@@ -12,8 +12,10 @@ import pytest
 from tests.trace.line_art import CROSS, TEE, drawn, grown, shown
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.vectorize import Result, vectorize, vectorize_file
-from warpsplat.render.backend import Backend
+from warpsplat.jobs.subjects import decided
+from warpsplat.jobs.vectorize import Result, vectorize, vectorize_image
+from warpsplat.rendering.backend import Backend
+from warpsplat.scene import Kind
 
 
 def lines_of(image: np.ndarray, device: str) -> Result:
@@ -64,11 +66,11 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
     assert ok
     for minify in (False, True):
         results = [
-            vectorize_file(
+            vectorize_image(
                 data.tobytes(),
-                tmp_path / f"{len(page)}.svg",
                 make_settings(subject="line", page=page, minify=minify),
                 Backend.on(device),
+                output=tmp_path / f"{len(page)}.svg",
                 name="a.png",
             )
             for page in ("", "a4")
@@ -84,3 +86,39 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
 def test_paper_without_ink_is_refused(device: str) -> None:
     with pytest.raises(ImageError, match="no lines"):
         lines_of(np.ones((40, 50, 3), np.float32), device)
+
+
+BLOB = (
+    '<circle cx="30" cy="36" r="16" fill="#000"/><path d="M30 36H88"/><path d="M70 8V64" stroke="#cc0000"/>'
+)
+
+
+def test_mixed_line_art_keeps_its_areas(device: str) -> None:
+    image = drawn(BLOB)
+    result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
+    assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
+    assert np.bincount(result.scene.kind).tolist() == [1, 2]
+    assert result.scene.point_counts()[0] <= 24  # a circle, cut where its line leaves it
+    assert result.score
+    assert result.score.psnr > 34
+    without = lines_of(image, device)
+    assert without.score
+    assert (without.scene.kind == Kind.STROKE).all()
+    assert result.score.psnr > without.score.psnr + 6
+
+
+def test_areas_alone_are_fills(device: str) -> None:
+    image = drawn('<circle cx="30" cy="36" r="20" fill="#000"/>')
+    result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
+    assert result.scene.kind.tolist() == [Kind.FILL]
+    assert result.score
+    assert result.score.psnr > 34
+
+
+def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
+    line = drawn("".join(f'<path d="M{x} 8L{90 - x} 64"/>' for x in (8, 20, 50, 70)))
+    settings = make_settings(mixed=True)
+    assert decided(line, settings)[0].subject == "line"
+    noise = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
+    chosen, why = decided(noise, settings)
+    assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")

@@ -13,8 +13,8 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.refine import refine
 from warpsplat.jobs.vectorize import Result
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import load_kept
@@ -26,7 +26,8 @@ def improved(
     text: str, target: np.ndarray, settings: Settings, device: str, **how: bool
 ) -> tuple[Result, float]:
     refined = refine(text, target, settings, Backend.on(device), name="a.svg", **how)
-    return refined.result, refined.before
+    assert refined.before is not None
+    return refined, refined.before
 
 
 def test_nothing_is_added(device: str) -> None:

@@ -9,7 +9,7 @@ import pytest
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.subjects import decided
 from warpsplat.jobs.vectorize import vectorize
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 COLORS = ("e00", "0a0", "00e", "ea0", "0ae", "a0e", "555", "000")

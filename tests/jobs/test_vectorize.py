@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -17,7 +18,7 @@ from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
 from warpsplat.jobs.vectorize import has_time_for_eyes, render_figures, vectorize
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 
@@ -229,3 +230,13 @@ def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str)
     assert result.render_psnr > result.estimated_psnr + 0.1
     wrong = abs(result.estimated_psnr - result.score.psnr)
     assert wrong < 0.5 * abs(result.render_psnr - result.score.psnr)
+
+
+def test_shapes_of_one_colour_are_named_groups(device: str) -> None:
+    """Brought together where that shows the same: more share a group than would by chance."""
+    settings = make_settings(subject="photo", curves=16, colors=2, iterations=40, ids=True)
+    text = vectorize(picture(), settings, Backend.on(device)).svg
+    paths = len(re.findall("<path", text))
+    grouped = sum(inner.count("<path") for inner in re.findall(r'<g id="[a-z]+-group.*?</g>', text))
+    assert paths == 16
+    assert grouped >= 12

@@ -13,9 +13,9 @@ from tests.reference.curves import tensors
 from tests.scenes import mixed_scene, random_scene
 from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
-from warpsplat.render.tiles import to_tiles
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
+from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Basis, Kind, Scene
 
 

@@ -1,4 +1,4 @@
-"""Kernels of the trials: a coverage (``tests/render/test_new_coverage.py``), two losses
+"""Kernels of the trials: a coverage (``tests/rendering/test_new_coverage.py``), two losses
 (``tests/fit/test_new_loss.py``), an attribute (``tests/scene/test_new_attribute.py``).
 """
 

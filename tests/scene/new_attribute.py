@@ -19,9 +19,9 @@ from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.render.backend import Backend
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
 from warpsplat.scene import Kind, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg

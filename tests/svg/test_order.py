@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, random_scene
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.svg import order
-from warpsplat.svg.order import MARGIN, by_opacity
+from warpsplat.svg.order import MARGIN, by_color, by_opacity
 from warpsplat.svg.write import write_svg
 
 WIDTH, HEIGHT = 192, 160
@@ -129,3 +129,19 @@ def test_many_shapes_are_ordered_in_blocks(block: int, monkeypatch: pytest.Monke
     check(scene, found)
     np.testing.assert_array_equal(found // block, np.arange(len(scene)) // block)
     assert (runs(scene.take(found)) == whole) == (block >= len(scene))
+
+
+def test_colours_are_brought_together_where_nothing_lies_between() -> None:
+    scene = scattered(60, seed=2, levels=1)
+    rng = np.random.default_rng(0)
+    scene = replace(scene, colors=np.eye(3, dtype=np.float32)[rng.integers(0, 3, len(scene))])
+    found = by_color(scene)
+    assert sorted(found.tolist()) == list(range(len(scene)))
+    place = np.argsort(found)
+    assert all(place[i] < place[j] for i, j in overlapping(bounds(scene)))
+
+    def colour_runs(order: IndexArray) -> int:
+        said = zip(scene.kind[order].tolist(), scene.colors[order].tolist(), strict=True)
+        return len(list(itertools.groupby(said)))
+
+    assert colour_runs(found) < 0.7 * colour_runs(np.arange(len(scene)))

@@ -11,8 +11,8 @@ import resvg_py
 from PIL import Image
 
 from tests.scenes import mixed_scene, random_scene, with_gradients
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, Kind, Paint
 from warpsplat.svg.write import rounded, write_svg
 

@@ -8,8 +8,8 @@ import pytest
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg

@@ -16,8 +16,8 @@ from PIL import Image
 from tests.svg.foreign import HEAD
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.svg.document import Document
 from warpsplat.svg.excerpts import Excerpts
 from warpsplat.svg.read import load_scene

@@ -18,9 +18,9 @@ from tests.scenes import disc, mixed_scene, random_scene, started_alike, with_gr
 from warpsplat.files.output import may_replace
 from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import SplatModel
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import SplatModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.svg.data import PathData, integers, spline_data
 from warpsplat.svg.numbers import hex_colors, number
@@ -389,3 +389,30 @@ def test_paths_are_named_by_their_colours() -> None:
     assert write_svg(back, per_pixel=5) == plain
     ramps = write_svg(with_gradients(random_scene(Kind.FILL, 3)), ids=True)
     assert ' id="gradient"' in ramps and ' id="g0"' in ramps
+
+
+def test_neighbours_of_one_colour_share_a_named_group() -> None:
+    scene = mixed_scene(seed=3)
+    fills = scene.take(np.flatnonzero(scene.kind == Kind.FILL)[[0, 1, 2, 0, 1, 2]])
+    navy, gold = [0, 0, 0.5], [1, 0.84, 0]
+    fills = replace(fills, colors=np.array([navy, navy, gold, navy, navy, gold], np.float32))
+    text = write_svg(fills, per_pixel=5, ids=True)
+    groups = re.findall(r'<g id="([^"]*)" fill="([^"]*)">(.*?)</g>(?=<g id|<path|</svg)', text)
+    assert [(name, fill) for name, fill, _ in groups] == [
+        ("navy-group", "#000080"),
+        ("navy-group-2", "#000080"),
+    ]
+    assert [re.findall('<path[^>]* id="([^"]*)"', inner) for _, _, inner in groups] == [
+        ["navy", "navy-2"],
+        ["navy-3", "navy-4"],
+    ]
+    assert 'fill="#000080"' not in "".join(inner for _, _, inner in groups)
+    assert (np.asarray(render_svg(text)) == np.asarray(render_svg(write_svg(fills, per_pixel=5)))).all()
+
+
+def test_pens_are_groups_already() -> None:
+    scene = mixed_scene(seed=3)
+    strokes = scene.take(np.flatnonzero(scene.kind == Kind.STROKE)[[0, 0]])
+    text = write_svg(replace(strokes, layer_names=("pen-1-000000",)), per_pixel=5, ids=True)
+    assert "-group" not in text
+    assert '<g id="pen-1-000000">' in text

@@ -8,9 +8,10 @@ import pytest
 from warpsplat.errors import ImageError
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray
+from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 from warpsplat.trace import pixels
-from warpsplat.trace.pixels import find_cells, outlines, trace_pixels
+from warpsplat.trace.pixels import find_cells, outlines, polygons, trace_pixels
 
 
 def noise(side: int, colors: int, seed: int = 0) -> FloatArray:
@@ -85,3 +86,22 @@ def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pixels, "MOST_CELLS", 100)
     with pytest.raises(ImageError, match="16x16 cells of 2 px, more than pixel art may have"):
         trace_pixels(enlarged(noise(16, 3), 2))
+
+
+@pytest.mark.parametrize("most", [4, 12, 60])
+def test_a_colour_of_many_corners_has_several_shapes(most: int) -> None:
+    image = np.random.default_rng(4).integers(0, 2, (12, 15, 1)).repeat(3, axis=2).astype(np.float32)
+    whole, _ = trace_pixels(image)
+    scene, per_pixel = trace_pixels(image, most=most)
+    assert len(whole) == 1
+    assert len(scene) > 1
+    assert (scene.point_counts() <= 3 * most).all()
+    shown = np.asarray(render_svg(write_svg(scene, per_pixel=per_pixel)).convert("RGB"))
+    assert (shown == np.round(255 * image)).all()
+
+
+def test_ever_smaller_parts_end_with_cells() -> None:
+    inside = np.ones((3, 2), np.bool_)
+    assert sorted(polygons(inside, 1)) == sorted(
+        [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]] for x in range(2) for y in range(3)
+    )

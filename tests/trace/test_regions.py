@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.trace.drawings import LOGO, draw, ground, levels, photograph
+from tests.trace.drawings import LOGO, draw, ground, levels, photograph, star
 from warpsplat.scene import Paint
 from warpsplat.trace.fewer import fewer_regions
 from warpsplat.trace.regions import Regions, find_regions
@@ -68,6 +68,14 @@ def test_what_jpeg_leaves_is_no_region(quality: int) -> None:
     assert len(shown) == len(found.paint) == 3
     wanted = [(0x26, 0x46, 0x53), (0xE7, 0x6F, 0x51), (0xE9, 0xC4, 0x6A)]
     assert np.abs(np.array(shown)[:, :3] - wanted).max() <= 6
+
+
+@pytest.mark.parametrize("quality", [50, 60, 75, 85])
+@pytest.mark.parametrize(("tips", "inner"), [(6, 19), (5, 14)])
+def test_tips_that_jpeg_tints_are_no_regions(quality: int, tips: int, inner: float) -> None:
+    body = ground("#ffffff") + f'<polygon points="{star(48, 48, 45, inner, tips)}" fill="#c1121f"/>'
+    found = find_regions(levels(draw(body, jpeg=quality)))
+    assert len(found.paint) == 2
 
 
 def test_every_pixel_has_a_region() -> None:

@@ -10,7 +10,8 @@ from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray, Paint
 from warpsplat.svg.write import write_svg
 from warpsplat.trace import joints
-from warpsplat.trace.trace import Traced, trace
+from warpsplat.trace.regions import Coloring, Regions, components
+from warpsplat.trace.trace import Traced, trace, trace_regions
 
 
 def decibels(traced: Traced, image: FloatArray) -> float:
@@ -159,3 +160,29 @@ def test_photographs_are_traced_too() -> None:
     traced = trace(image, most=40)
     assert len(traced.scene) <= 40
     assert decibels(traced, image) > 12
+
+
+def test_regions_of_single_pixels_are_traced() -> None:
+    """Around one pixel an outline has no direction."""
+    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 200, 255]], np.float32)
+    painted = np.random.default_rng(0).integers(0, 3, (4, 4)).astype(np.int32)
+    image = palette[painted]
+    labels = components(painted, image)
+    paint = np.zeros(labels.max() + 1, np.int32)
+    paint[labels] = painted
+    regions = Regions(labels, image, paint, [Coloring(color) for color in palette], 0.0)
+    with np.errstate(all="raise"):
+        traced = trace_regions(image, regions)
+    assert np.isfinite(traced.scene.points).all()
+
+
+def test_a_ground_is_the_canvas_although_a_seed_was_given_up() -> None:
+    """A colouring that no region has says nothing of opacity."""
+    painted = np.zeros((12, 12), np.int32)
+    painted[3:9, 3:9] = 1
+    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 0, 0]], np.float32)
+    image = palette[painted]
+    regions = Regions(painted, image, np.arange(2, dtype=np.int32), [Coloring(c) for c in palette], 0.0)
+    scene = trace_regions(image, regions).scene
+    assert scene.canvas.background is not None
+    assert len(scene) == 1

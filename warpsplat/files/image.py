@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import threading
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -64,7 +65,7 @@ def load_image(
     try:
         # Pillow warns of what it can read all the same (odd metadata), and of bombs, which are refused;
         # libtiff prints what is wrong with a file, whether or not it can be read.
-        with warnings.catch_warnings(), _pixel_limit(), messages_hidden():
+        with _decoding, warnings.catch_warnings(), _pixel_limit(), messages_hidden():
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(source)) as opened:
@@ -92,6 +93,10 @@ def load_image(
     except Exception as error:  # Pillow's decoders raise nearly every kind of exception on broken data
         cause = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ImageError(f"{name}: damaged or unsupported image: {cause}") from error
+
+
+_decoding = threading.Lock()
+"""Pillow's limit and Python's warnings are those of the process: one thread at a time changes them."""
 
 
 @contextlib.contextmanager
@@ -157,10 +162,10 @@ def to_srgb(image: Image.Image, paper: float | FloatArray | None = 1.0) -> Float
     """
     if image.mode == "F" or image.mode.startswith("I"):
         grey, opacity = _grey(image)
-        return _composited([(slice(None), np.repeat(grey, 3, axis=2), opacity)], image.size, paper)
+        return composited([(slice(None), np.repeat(grey, 3, axis=2), opacity)], image.size, paper)
     transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
     if transparent:
-        return _composited(_straight_strips(image), image.size, paper)
+        return composited(_straight_strips(image), image.size, paper)
     out = np.empty((image.height, image.width, 3), np.float32)
     for rows, part in _strips(image):
         np.divide(np.asarray(part.convert("RGB")), np.float32(255), out=out[rows])
@@ -177,7 +182,7 @@ def _straight_strips(image: Image.Image) -> Iterator[Strip]:
         yield rows, rgba[..., :3], rgba[..., 3:]
 
 
-def _composited(
+def composited(
     strips: Iterable[Strip], size: tuple[int, int], paper: float | FloatArray | None
 ) -> FloatArray:
     """On ``paper``; without, premultiplied and with opacity, if not all is opaque."""

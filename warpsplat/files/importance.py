@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.files.image import load_image
-from warpsplat.files.inputs import input_name
+from warpsplat.files.sources import ImageSource, image_of, source_name
 from warpsplat.scene import FloatArray
 
 
-def load_importance(source: Path | bytes, width: int, height: int, name: str | None = None) -> FloatArray:
+def load_importance(source: ImageSource, width: int, height: int, name: str | None = None) -> FloatArray:
     """Read the mask of an image of ``width`` x ``height`` px: its grey values in [0, 1], at its own size.
 
     Any image will do, of any size of the same proportions: of colours the luma counts (ITU-R BT.601), and
     where it is transparent nothing was painted, which is black.
 
     Raises:
-        ImageError: as ``load_image``, or other proportions than the image has.
+        ImageError: as ``image_of``, or other proportions than the image has.
     """
-    name = name or (input_name(source) if isinstance(source, Path) else "the mask")
-    mask = load_image(source, name, paper=0.0)
+    name = name or source_name(source, "the mask")
+    mask = image_of(source, name, paper=0.0)
     tall, wide = mask.shape[:2]
     # A reduced side may be rounded to either neighbour.
     if abs(wide - tall * width / height) >= 1 and abs(tall - wide * height / width) >= 1:

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from warpsplat.fit.export import export, show
 from warpsplat.fit.settings import Settings
-from warpsplat.render.backend import Backend, Viewport
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.write import rounded
 

@@ -12,8 +12,8 @@ import warp as wp
 
 from warpsplat.kernels import constraints as kernels
 from warpsplat.kernels.constants import NONE
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
 from warpsplat.scene import Basis, Canvas, FloatArray, Scene
 
 Ints = npt.NDArray[np.int32]

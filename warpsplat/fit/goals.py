@@ -18,7 +18,7 @@ from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.fit.tiny import FEW, for_few
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.settings import Settings
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
 Report = Callable[[Progress], None]

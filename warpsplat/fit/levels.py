@@ -9,10 +9,10 @@ from warpsplat.fit.losses import Aim, LossInputs
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.kernels import levels
-from warpsplat.render.backend import Viewport
-from warpsplat.render.models import Model
-from warpsplat.render.program import Program
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.models import Model
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import Renderer
 
 
 @dataclass(frozen=True)

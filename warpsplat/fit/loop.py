@@ -28,7 +28,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
 
@@ -123,9 +123,9 @@ def fit(
             first = step is None and below is not None
             step = Step(state, settings, Target(image, phase, weights))
             step = operate(step, grows=True) if first else step
+        if palette and not rounding and palette.is_due(state):
+            palette.choose(step)
         step.advance()
-        if palette and not rounding:
-            palette.choose(state)
         done, finest = state.step, phase is plan[-1]
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:
             step.make_room()
@@ -142,8 +142,6 @@ def fit(
             if not rounding:
                 state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
                 rounding = True
-                if palette:
-                    palette.hold(state)
             hold_stage(step, stage)
         exact = settings.renderer == "exact"
         if finish and exact and not settled and done >= max(opacities_at(settings), begin + 1):

@@ -14,11 +14,11 @@ import warp as wp
 from warpsplat.fit.settings import Settings
 from warpsplat.kernels.loss import alpha, image, shape
 from warpsplat.kernels.tile import column
-from warpsplat.render.backend import Backend, Viewport, buffer
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
-from warpsplat.render.renderer import Renderer
-from warpsplat.render.tiles import to_tiles
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import Renderer
+from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 
 

@@ -32,6 +32,9 @@ CELL = 2
 NEAR = (-1, 0, 1)
 """Steps from a cell to those that an outline in it may change as well."""
 
+AT_ONCE = 512
+"""Candidates that are measured in one go: bounds their memory to some megabytes."""
+
 CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
 """What a cubic, a line, the handles of a cubic and a number take in a file."""
 
@@ -141,36 +144,64 @@ class Outlines:
     def edits(self) -> list[Edit]:
         """All candidates."""
         found: list[Edit] = []
+        merged = self._merged()
         done: set[int] = set()
         for p in self.on:
             if self.place[p] in done:
                 continue
             done.add(self.place[p])
-            found += [*self._without(p), *self._level_tangent(p)]
-        for a in self.on:
-            if min(self.members(a + 1) + self.members(a + 2)) >= a:  # once for all shapes
-                found += [*self._level_line(a)] if self.is_line[a] else [*self._straight(a)]
+            if p in merged:
+                found.append(self._without(p, *merged[p]))
+            found += self._level_tangent(p)
+        # Once for all shapes.
+        firsts = [a for a in self.on if min(self.members(a + 1) + self.members(a + 2)) >= a]
+        thirds = self._thirds([a for a in firsts if not self.is_line[a]])
+        for a in firsts:
+            if self.is_line[a]:
+                found += self._level_line(a)
+            elif a in thirds:
+                found.append(self._straight(a, *thirds[a]))
         return found
 
-    def _without(self, p: int) -> Iterator[Edit]:
+    def _is_spare(self, p: int) -> bool:
+        """Whether the pieces that meet in ``p`` meet nothing else there."""
+        ends = {self.place[self.previous[p]], self.place[self.next[p]]}
+        if len(ends) < 2:
+            return False
+        return all(
+            m not in self._firsts
+            and self._sizes[m] > 6
+            and {self.place[self.previous[m]], self.place[self.next[m]]} == ends
+            for m in self.members(p)
+        )
+
+    def _merged(self) -> dict[int, tuple[Floats, float]]:
+        """Points that need not be: the handles of one piece in place of the two that meet there, and how far
+        it moves the outline.
+
+        All at once: there are hundreds, and each alone takes a millisecond.
+        """
+        done: set[int] = set()
+        spare = []
+        for p in self.on:
+            if self.place[p] not in done and self._is_spare(p):
+                spare.append(p)
+            done.add(self.place[p])
+        if not spare:
+            return {}
+        first = np.stack([self.corners(self.previous[p]) for p in spare])
+        second = np.stack([self.corners(p) for p in spare])
+        straight = np.array([self.is_line[self.previous[p]] and self.is_line[p] for p in spare])
+        whole = np.stack([first[:, 0], second[:, 3]], axis=1)
+        handles = np.where(straight[:, None, None], thirds_between(whole), handles_through(first, second))
+        off = _apart(np.concatenate([whole[:, :1], handles, whole[:, 1:]], axis=1), first, second)
+        return {spare[i]: (handles[i], float(off[i])) for i in np.flatnonzero(off <= MOST_OFF).tolist()}
+
+    def _without(self, p: int, handles: Floats, off: float) -> Edit:
         """The two pieces that meet in ``p`` as one."""
         members = self.members(p)
-        a, b = self.previous[p], self.next[p]
-        ends = {self.place[a], self.place[b]}
-        for m in members:
-            around = {self.place[self.previous[m]], self.place[self.next[m]]}
-            if m in self._firsts or self._sizes[m] <= 6 or around != ends or len(ends) < 2:
-                return
+        a = self.previous[p]
         lines = self.is_line[a] + self.is_line[p]
-        first, second = self.corners(a), self.corners(p)
-        if lines == 2:
-            handles = np.stack([(2 * first[0] + second[3]) / 3, (first[0] + 2 * second[3]) / 3])
-        else:
-            handles = handles_through(first, second)
-        made = np.stack([first[0], *handles, second[3]])
-        off = _apart(made, first, second)
-        if off > MOST_OFF:
-            return
         points, joints, removed = {}, {}, []
         kind = Joint.LINE_HANDLE if lines == 2 else Joint.FREE
         for m in members:
@@ -180,15 +211,21 @@ class Outlines:
             joints[before + 1] = joints[m + 2] = kind
             removed += [before + 2, m, m + 1]
         saved = (LINE_BYTES if lines else CUBIC_BYTES) * len(members)
-        yield Edit("without", self._at(p), self.cells(a, p), off, saved, points, joints, tuple(removed))
+        return Edit("without", self._at(p), self.cells(a, p), off, saved, points, joints, tuple(removed))
 
-    def _straight(self, a: int) -> Iterator[Edit]:
+    def _thirds(self, starts: Sequence[int]) -> dict[int, tuple[Floats, float]]:
+        """Of the cubics that begin at ``starts`` those that are about lines: their thirds, and how far off
+        the line is.
+        """
+        if not starts:
+            return {}
+        corners = np.stack([self.corners(a) for a in starts])
+        thirds = thirds_between(corners[:, [0, 3]])
+        off = _apart(np.concatenate([corners[:, :1], thirds, corners[:, 3:]], axis=1), corners)
+        return {starts[i]: (thirds[i], float(off[i])) for i in np.flatnonzero(off <= MOST_OFF).tolist()}
+
+    def _straight(self, a: int, thirds: Floats, off: float) -> Edit:
         """A cubic as a line."""
-        corners = self.corners(a)
-        thirds = np.stack([(2 * corners[0] + corners[3]) / 3, (corners[0] + 2 * corners[3]) / 3])
-        off = _apart(np.stack([corners[0], *thirds, corners[3]]), corners)
-        if off > MOST_OFF:
-            return
         saved = HANDLES_BYTES * len(self.members(a + 1))
         points, joints = {}, {}
         for handle, third in zip((a + 1, a + 2), thirds, strict=True):
@@ -198,7 +235,7 @@ class Outlines:
         for end, beyond in ((a, self.previous[a]), (b, b)):
             if self.is_line[beyond]:
                 joints |= dict.fromkeys(self.members(end), Joint.CORNER)
-        yield Edit("straight", self._at(a + 1), self.cells(a), off, saved, points, joints)
+        return Edit("straight", self._at(a + 1), self.cells(a), off, saved, points, joints)
 
     def _level_line(self, a: int) -> Iterator[Edit]:
         """A line that is almost level or upright, so."""
@@ -253,13 +290,21 @@ class Outlines:
         )
 
 
-def _apart(made: Floats, *pieces: Floats) -> float:
-    """Largest distance of points of ``pieces`` from the cubic ``made``, about."""
+def thirds_between(ends: Floats) -> Floats:
+    """Points at the thirds of lines, shape (line, 2, 2), between their ``ends``, in the same shape."""
+    return (2 * ends + ends[:, ::-1]) / 3
+
+
+def _apart(made: Floats, *pieces: Floats) -> Floats:
+    """Largest distance of points of ``pieces`` from the cubics ``made``, about; all (cubic, 4, 2)."""
     t = np.linspace(0, 1, 17)[:, None]
-    curve = points_at(made, t)
-    samples = np.concatenate([points_at(piece, t[1:-1:2]) for piece in pieces])
-    ways = np.diff(curve, axis=0)
-    behind = samples[:, None] - curve[:-1]
-    along = (behind * ways).sum(axis=2) / np.maximum((ways**2).sum(axis=1), 1e-12)
-    apart = behind - np.clip(along, 0, 1)[..., None] * ways
-    return float(np.linalg.norm(apart, axis=2).min(axis=1).max())
+    samples = np.concatenate([points_at(piece, t[1:-1:2]) for piece in pieces], axis=1)
+    found = []
+    for first in range(0, len(made), AT_ONCE):
+        curve = points_at(made[first : first + AT_ONCE], t)[:, None]
+        ways = np.diff(curve, axis=2)
+        behind = samples[first : first + AT_ONCE, :, None] - curve[:, :, :-1]
+        along = (behind * ways).sum(axis=3) / np.maximum((ways**2).sum(axis=3), 1e-12)
+        apart = behind - np.clip(along, 0, 1)[..., None] * ways
+        found.append(np.linalg.norm(apart, axis=3).min(axis=2).max(axis=1))
+    return np.concatenate(found)

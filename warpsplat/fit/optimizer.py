@@ -10,9 +10,9 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.units import Units
 from warpsplat.kernels import adam
 from warpsplat.kernels.paint import ramp
-from warpsplat.render.backend import buffer
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.program import Program
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
 
 
 @dataclass

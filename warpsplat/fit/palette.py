@@ -11,14 +11,18 @@ from warpsplat.alpha import straight
 from warpsplat.fit.place import survey
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step
 from warpsplat.scene import Canvas, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas
 
 ROUNDS = 20
 """Of k-means."""
 
-FOLLOWED = 0.01
-"""Share of the way to what shapes would like that the colours of a palette go at each choice."""
+CHOICE_INTERVAL = 5
+"""Steps between two choices of colours: a look at all that is seen takes as long as a step."""
+
+UNSEEN = 1e-6
+"""Pixels, by the squares of their shares, below which a shape asks for no colour."""
 
 SOLID = 0.5
 """Opacity from which on a pixel's colour counts."""
@@ -30,17 +34,15 @@ Floats = npt.NDArray[np.floating]
 class Palette:
     """The colours that shapes may have.
 
-    Shapes are rendered in these colours only, and each step trains their own from there. What a shape would
-    like is remembered, so that many small steps towards another colour of the palette add up (the
-    straight-through estimator of Bengio et al. 2013).
+    Each shape has the one with which the error is least, all else as it is. Another colour changes the
+    squared error by a paraboloid that is as steep in all channels, around the colour that would be best: so
+    that of the palette is best which is nearest to it. It is chosen anew every few steps, at once for all
+    shapes; in between they are trained as they are.
     """
 
-    def __init__(self, colors: FloatArray, *, given: bool = True) -> None:
-        """``colors``: sRGB in [0, 1], shape (color, 3); where they were not ``given``, they are a start."""
+    def __init__(self, colors: FloatArray) -> None:
+        """``colors``: sRGB in [0, 1], shape (color, 3)."""
         self.colors = colors
-        self._given = given
-        self._wanted: FloatArray | None = None
-        self._shown: FloatArray | None = None
         self._revision = -1
 
     @staticmethod
@@ -54,9 +56,7 @@ class Palette:
         pixels = small.reshape(-1, small.shape[2])
         if target.shape[2] == 4:
             pixels = pixels[pixels[:, 3] > SOLID]
-        return Palette(
-            main_colors(straight(pixels), np.ones(len(pixels), np.int64), settings.colors), given=False
-        )
+        return Palette(main_colors(straight(pixels), np.ones(len(pixels), np.int64), settings.colors))
 
     @staticmethod
     def of_scene(settings: Settings, scene: Scene) -> Palette | None:
@@ -80,36 +80,16 @@ class Palette:
             return canvas
         return replace(canvas, background=self.colors[self.nearest(canvas.background[None])[0]])
 
-    def choose(self, state: FitState) -> None:
-        """Give each shape the colour that is nearest to what it would like to have."""
-        scene = state.scene()
-        if self._wanted is None or self._shown is None or self._revision != state.parameters.revision:
-            wanted = scene.colors
-        else:
-            wanted = self._wanted + (scene.colors - self._shown)
-        self._wanted = np.clip(wanted, 0, 1)
-        self._revision = state.parameters.revision
-        if not self._given:
-            self._follow(areas(scene))
-        self._shown = self.colors[self.nearest(self._wanted)]
-        state.parameters.assign(replace(scene, colors=self._shown))
+    def is_due(self, state: FitState) -> bool:
+        """Whether it is time to choose: every few steps, and at once where shapes have come or gone."""
+        return state.step % CHOICE_INTERVAL == 0 or self._revision != state.parameters.revision
 
-    def _follow(self, seen: FloatArray) -> None:
-        """Take for each colour the mean of what the shapes that have it would like, by the areas ``seen``."""
-        assert self._wanted is not None
-        which, count = self.nearest(self._wanted), len(self.colors)
-        total = np.bincount(which, weights=seen, minlength=count)
-        for channel in range(3):
-            sums = np.bincount(which, weights=seen * self._wanted[:, channel], minlength=count)
-            mean = np.where(total > 0, sums / np.maximum(total, 1e-9), self.colors[:, channel])
-            self.colors[:, channel] += FOLLOWED * (mean - self.colors[:, channel])
-
-    def hold(self, state: FitState) -> None:
-        """The colours stay from now on, as a file can say them."""
-        self._given = True
-        self.colors = np.asarray(np.round(self.colors * 255) / 255, np.float32)
-        self.choose(state)
-        state.parameters.hold("colors", np.ones(len(state.scene()), np.bool_))
+    def choose(self, step: Step) -> None:
+        """Give each shape the colour with which the error is least."""
+        parameters = step.state.parameters
+        scene = step.state.scene()
+        parameters.assign(replace(scene, colors=self.colors[self.nearest(best_colors(step, scene))]))
+        self._revision = parameters.revision
 
     def limited(self, scene: Scene) -> Scene:
         """A scene in these colours, without gradients."""
@@ -129,6 +109,28 @@ class Palette:
             colors=self.colors[self.nearest(mean_colors(scene))],
             opacities=np.ones_like(scene.opacities),
         )
+
+
+def best_colors(step: Step, scene: Scene) -> FloatArray:
+    """Of each shape, the colour with which the weighted squared error would be least, all else as it is.
+
+    By least squares over what is seen of it; its own where nothing is. Copies what is seen to the host: for
+    use between steps.
+
+    Returns:
+        sRGB, not clipped, shape (shape, 3).
+    """
+    step.render()
+    seen = step.renderer.visible()
+    weighted = step.weights()[seen.tile] * seen.share
+    squares = (weighted * seen.share).sum(axis=(1, 2), dtype=np.float64)
+    pulls = np.einsum("sij,scij->sc", weighted, step.lacking()[seen.tile])
+    total = np.bincount(seen.shape, weights=squares, minlength=len(scene))
+    colors = scene.colors.copy()
+    for channel in range(3):
+        pull = np.bincount(seen.shape, weights=pulls[:, channel], minlength=len(scene))
+        colors[:, channel] += np.where(total > UNSEEN, pull / np.maximum(total, UNSEEN), 0)
+    return colors
 
 
 def mean_colors(scene: Scene) -> FloatArray:

@@ -23,7 +23,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.tiny import FEW, grounded
 from warpsplat.metrics import score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity

@@ -84,12 +84,8 @@ class Survey:
         self._viewport = renderer.viewport
         self._visible = renderer.visible()
         self._gradient = np.isin(self.scene.paint, GRADIENTS)
-        lacking = step.aim.target.numpy() - renderer.film.buffers.image.numpy()
-        if lacking.shape[1] == 4:  # the error is the mean of those on black and on white
-            lacking = lacking[:, :3] - 0.5 * lacking[:, 3:]
-        self._lacking = lacking
-        weights = step.aim.importance if step.aim.weighted else renderer.film.buffers.inside
-        self._importance = weights.numpy()
+        self._lacking = step.lacking()
+        self._importance = step.weights()
         boxes = bounds(self.scene).astype(np.float64)
         self._middle = 0.5 * (boxes[:, :2] + boxes[:, 2:])
         self._half = np.maximum(0.5 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1), 0.5)

@@ -181,7 +181,8 @@ class Settings:
     units: str = ""
     """In which the file says its size; empty: pixels, millimetres of a sheet."""
     ids: bool = False
-    """Whether paths have identifiers, by their colours, in the file."""
+    """Whether paths have identifiers, by their colours, and those of one colour groups, in the file: they are
+    brought together where nothing lies between."""
     minify: bool = False
     """Whether the file has neither line breaks nor the mark that it was written here."""
     precision: int | None = None
@@ -259,6 +260,8 @@ class Settings:
         if (self.opaque or self.is_limited) and self.renderer == "gaussian":
             raise UsageError("opaque fills and the renderer gaussian do not go together")
         fitted = self.fitted_options()
+        if self.subject == "line":
+            fitted = [name for name in fitted if name != "mixed"]
         if self.subject not in {"auto", "photo"} and fitted:
             raise UsageError(f"subject {self.subject} and {fitted[0]} do not go together")
         choices = (
@@ -417,6 +420,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         preset = replace(preset, rates={**preset.rates, "stop_opacities": 0.0, "stop_offsets": 0.0})
     if "rates" in given:
         given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
+    if given.get("colors") or given.get("palette"):  # colours are chosen, not trained
+        given["rates"] = {**given.get("rates", preset.rates), "colors": 0.0}
     if isinstance(given.get("density"), Mapping):
         names = tuple(f.name for f in fields(Density))
         given["density"] = replace(preset.density, **_known("density", given["density"], names))

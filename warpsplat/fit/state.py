@@ -8,8 +8,8 @@ import numpy as np
 import warp as wp
 
 from warpsplat.fit.constraints import Keeper
-from warpsplat.render.backend import Backend
-from warpsplat.render.parameters import Parameters
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.parameters import Parameters
 from warpsplat.scene import Scene
 from warpsplat.svg.write import GRIDS
 

@@ -18,10 +18,10 @@ from warpsplat.fit.schedule import Phase, fold_weight
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
-from warpsplat.render.backend import Viewport
-from warpsplat.render.models import ExactModel, GaussianModel, Model, SplatModel
-from warpsplat.render.program import Program, capture
-from warpsplat.render.renderer import Capacity, Renderer
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.models import ExactModel, GaussianModel, Model, SplatModel
+from warpsplat.rendering.program import Program, capture
+from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
 
 
@@ -177,6 +177,24 @@ class Step:
         difference = self.renderer.film.buffers.image.numpy() - self.aim.target.numpy()
         errors = squares(difference, axis=1) * self.renderer.film.buffers.inside.numpy()
         return float(errors.sum(dtype="float64")) / self.aim.value_count
+
+    def lacking(self) -> FloatArray:
+        """What the last render lacks of what it is compared with, by colour.
+
+        Of a transparent picture, the mean of what it lacks on black and on white. Copies both to the host.
+
+        Returns:
+            shape (tile, 3, TILE, TILE).
+        """
+        lacking = self.aim.target.numpy() - self.renderer.film.buffers.image.numpy()
+        if lacking.shape[1] == 4:
+            lacking = lacking[:, :3] - 0.5 * lacking[:, 3:]
+        return np.asarray(lacking, np.float32)
+
+    def weights(self) -> FloatArray:
+        """What the error of each pixel counts, 0 outside of the image, shape (tile, TILE, TILE)."""
+        weights = self.aim.importance if self.aim.weighted else self.renderer.film.buffers.inside
+        return np.asarray(weights.numpy(), np.float32)
 
     def psnr(self) -> float:
         """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first

@@ -15,10 +15,10 @@ from warpsplat.fit.drawing import Refinement, matching, refine_drawing
 from warpsplat.fit.nodes import CELL, Edit, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
-from warpsplat.render.backend import Backend, Viewport
-from warpsplat.render.models import EXACT
-from warpsplat.render.parameters import Parameters
-from warpsplat.render.renderer import Renderer
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.models import EXACT
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 

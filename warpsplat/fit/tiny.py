@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.fit.settings import Settings
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 
 FEW = 32

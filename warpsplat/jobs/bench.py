@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import statistics
 import sys
-import time
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,13 +10,16 @@ import cv2
 import numpy as np
 import warp as wp
 
+from warpsplat.errors import UsageError
 from warpsplat.fit.place import STROKE_CUBICS, circle_outlines
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Density, Settings, default_rates
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.jobs.options import KINDS
-from warpsplat.render.backend import Backend
+from warpsplat.jobs.timing import WARM_UP, Spread, timed
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 
 STAGES = ("outline", "bins", "forward", "loss", "backward", "update")
@@ -37,24 +38,6 @@ JITTER = 0.2
 
 SMOOTH = 8.0
 """Standard deviation of the blur of the random target image [px]."""
-
-
-WARM_UP = 3
-"""Steps that are not counted."""
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Of repeated timings [ms]."""
-
-    median: float
-    low: float
-    high: float
-
-    @staticmethod
-    def of(seconds: list[float]) -> Spread:
-        """Median, lowest and highest."""
-        return Spread(*(round(1e3 * f(seconds), 3) for f in (statistics.median, min, max)))
 
 
 def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float, seed: int) -> Scene:
@@ -111,11 +94,16 @@ def bench(
     opacity: float,
     repeats: int,
     seed: int,
+    through_torch: bool = False,
 ) -> dict[str, Any]:
     """Time ``repeats`` steps after a warm-up. The scene stays as it is: all rates are 0.
 
     Returns:
-        ``step``, ``forward_backward`` and each of ``stages`` as median, low and high [ms]; counts; memory.
+        ``step``, ``forward_backward`` and each of ``stages`` as median, low and high [ms]; counts; memory;
+        ``through_torch``, where that is asked for, as ``bench_torch`` has it.
+
+    Raises:
+        UsageError: PyTorch is asked for and not installed.
     """
     settings = Settings(
         kind=KINDS[kind],
@@ -146,8 +134,17 @@ def bench(
         "megapixels_per_s": round(width * height / 1e3 / whole.median, 3),
         "us_per_curve": round(1e3 * whole.median / curves, 3),
         "ns_per_pixel": round(1e6 * whole.median / (width * height), 3),
+        **({"through_torch": _through_torch(step.renderer, renderer, repeats)} if through_torch else {}),
         "peak_memory": peak_memory(backend.device),
     }
+
+
+def _through_torch(own: Renderer, renderer: Any, repeats: int) -> dict[str, Any]:
+    try:
+        from warpsplat.jobs.bench_torch import bench_torch
+    except ImportError as error:
+        raise UsageError(str(error)) from None
+    return bench_torch(own, renderer, repeats)
 
 
 @dataclass(frozen=True)
@@ -183,8 +180,8 @@ def time_steps(step: Step, repeats: int) -> Times:
     device, renderer = step.renderer.backend.device, step.renderer
     times = Times([], [], [])
     for i in range(repeats + WARM_UP):
-        whole = _timed(device, step.advance)
-        both = _timed(device, renderer.forward) + _timed(device, renderer.backward)
+        whole = timed(device, step.advance)
+        both = timed(device, renderer.forward) + timed(device, renderer.backward)
         kernels: dict[tuple[str, str], float] = {}
         for program in step.programs:
             for key, value in program.run_timed().items():
@@ -194,10 +191,3 @@ def time_steps(step: Step, repeats: int) -> Times:
             times.both.append(both)
             times.kernels.append(kernels)
     return times
-
-
-def _timed(device: wp.Device, function: Any) -> float:
-    begin = time.perf_counter()
-    function()
-    wp.synchronize_device(device)
-    return time.perf_counter() - begin

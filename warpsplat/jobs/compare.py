@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from warpsplat import __version__
+from warpsplat._version import __version__
 from warpsplat.errors import ImageError, Stopped, printable
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.tracer import Tracer
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, vectorize
 from warpsplat.metrics import Score, score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 OURS = "warpsplat"

@@ -9,11 +9,13 @@ import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Fit, Progress, fit
+from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.render.backend import Backend
+from warpsplat.jobs.areas import filled
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.trace.ink import Ink, find_ink
-from warpsplat.trace.lines import rejoined, trace_ink
+from warpsplat.trace.lines import TracedLines, rejoined, trace_ink
 from warpsplat.trace.tour import toured
 
 STEPS = 80
@@ -40,27 +42,65 @@ def draw_lines(
 ) -> Fit:
     """Trace line art as strokes, and refine them against its ink; arguments are those of ``fit``.
 
-    The strokes of a pen are a layer, ``pen-1-rrggbb`` of the one that is used most, in an order of little way
-    with the pen lifted.
+    What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: if the settings say mixed its
+    filled areas, and strokes in an order of little way with the pen lifted.
 
     Raises:
         ImageError: there is no ink.
     """
-    ink = find_ink(target)
+    ink = find_ink(target, mixed=settings.mixed)
     color = solid_color(settings.background)
     if color is not None or settings.background == "none":
         ink = replace(ink, paper=color)
-    traced = trace_ink(ink).scene
-    if not len(traced):
+    traced = trace_ink(ink, mixed=settings.mixed)
+    if not len(traced.scene) and not traced.areas:
         raise ImageError("no lines found: nothing is darker than the paper around it")
-    start = replace(
-        traced, layer=np.zeros_like(traced.layer), canvas=replace(traced.canvas, background=_paper(ink))
+    fills = filled(traced, backend, finest(settings), stop) if traced.areas else None
+    made = _fitted(ink, traced, settings, backend, seconds=seconds, report=report, stop=stop)
+    if fills:
+        both = fills.scene.append(made.scene)
+        made = replace(
+            made,
+            scene=both.take(np.argsort(both.layer, kind="stable")),
+            per_pixel=max(made.per_pixel, fills.per_pixel),
+        )
+    layer = np.unique(made.scene.layer, return_inverse=True)[1].astype(np.int32)
+    scene = replace(made.scene, layer=layer)
+    return replace(made, scene=replace(scene, layer_names=pen_names(scene)))
+
+
+def _fitted(
+    ink: Ink,
+    traced: TracedLines,
+    settings: Settings,
+    backend: Backend,
+    *,
+    seconds: float | None,
+    report: Callable[[Progress], None] | None,
+    stop: Callable[[], bool] | None,
+) -> Fit:
+    """The strokes of ``traced``, refined and in the order of a tour."""
+    lines = traced.scene
+    if not len(lines):
+        return Fit(lines, 1.0, 0.0, 0.0, 0, False)
+    canvas = replace(lines.canvas, background=_paper(ink))
+    start = replace(lines, layer=np.zeros_like(lines.layer), canvas=canvas)
+    importance = None
+    if traced.areas:  # into which strokes reach
+        importance = 1 - traced.areas.cover
+        ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
+    made = fit(
+        inked(ink, lines),
+        line_settings(settings, len(lines)),
+        backend,
+        scene=start,
+        importance=importance,
+        seconds=seconds,
+        report=report,
+        stop=stop,
     )
-    chosen = line_settings(settings, len(traced))
-    made = fit(inked(ink, traced), chosen, backend, scene=start, seconds=seconds, report=report, stop=stop)
-    scene = replace(made.scene, layer=traced.layer, colors=traced.colors, canvas=traced.canvas)
-    scene = replace(rejoined(traced, scene), layer_names=pen_names(traced))
-    return replace(made, scene=toured(scene))
+    scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas)
+    return replace(made, scene=toured(rejoined(lines, scene)))
 
 
 def line_settings(settings: Settings, count: int) -> Settings:
@@ -74,6 +114,7 @@ def line_settings(settings: Settings, count: int) -> Settings:
         fine_pixels=min(settings.fine_pixels, FINE_PIXELS),
         density=Density(interval=0),
         rates={**still, "points": POINT_RATE, "widths": WIDTH_RATE},
+        mixed=False,
         renderer="exact",
         texture=0.0,
         viewer=False,  # colours of the file are not those of the picture, but the pens'

@@ -68,7 +68,11 @@ OPTIONS = (
     ),
     Option("closed", bool, "Filled shapes.", "yes", kind=Kind.FILL),
     Option("open", bool, "Strokes.", kind=Kind.STROKE),
-    Option("mixed", bool, "Fills, and strokes where they remove more error."),
+    Option(
+        "mixed",
+        bool,
+        "Fills, and strokes where they remove more error; of line art, fills where it is filled.",
+    ),
     Option("quality", str, "Effort.", DEFAULT_QUALITY, choices=QUALITIES),
     Option(
         "renderer",
@@ -105,7 +109,7 @@ OPTIONS = (
     Option("size", str, "Size that the picture fills, for plotters: 200x150mm.", metavar="WxH"),
     Option("page", str, "Sheet that it fills but for margins: a3, a4, a5, letter.", metavar="NAME"),
     Option("units", str, "Units of the file's size: mm, cm, in, pt, px.", metavar="UNIT"),
-    Option("ids", bool, "Name paths by their colours, for editors."),
+    Option("ids", bool, "Name paths by their colours, and group neighbours of one, for editors."),
     Option("minify", bool, "Smallest text: no line breaks, no mark that warpsplat wrote it."),
     Option("precision", int, "Most decimals of a pixel in coordinates.", "auto", "N"),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,24 +15,12 @@ from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, training_seconds
 from warpsplat.metrics import psnr, score_svg
-from warpsplat.render.backend import Backend
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import KeptScene, load_kept
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import minified, shortened, write_svg
-
-
-@dataclass(frozen=True)
-class Refined:
-    """What came of an SVG."""
-
-    result: Result
-    """One that is no better is the SVG unchanged."""
-    before: float
-    """PSNR of the SVG itself [dB]."""
-    kept: str
-    """What was kept as it is, for people; empty: nothing."""
 
 
 def refine(
@@ -45,8 +33,10 @@ def refine(
     keep: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
-) -> Refined:
+) -> Result:
     """Improve the SVG ``text`` against ``target``; its shapes stay, none is added or removed.
+
+    A result that is no better is the SVG unchanged.
 
     Args:
         text: the SVG.
@@ -76,7 +66,14 @@ def refine(
         texture=0.0,  # whether a result is better is for the PSNR to say
     )
     seconds = training_seconds(settings, target, started)
-    made = fit(target, settings, backend, scene=scene, seconds=seconds, report=report, stop=stop)
+    history: list[Progress] = []
+
+    def note(progress: Progress) -> None:
+        history.append(progress)
+        if report:
+            report(progress)
+
+    made = fit(target, settings, backend, scene=scene, seconds=seconds, report=note, stop=stop)
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
         refined = clear_empty(refined, target, settings, backend, made.per_pixel)
@@ -90,7 +87,7 @@ def refine(
     if eyes and not better:
         before = score_svg(text, target)
     seconds = time.monotonic() - started
-    result = Result(
+    return Result(
         svg=svg if better else text,
         scene=refined if better else scene,
         score=score if better else before,
@@ -100,8 +97,10 @@ def refine(
         seconds=seconds,
         stopped=made.interrupted,
         missed=missed_goals(settings, score, seconds),
+        history=tuple(history),
+        before=before.psnr,
+        kept=base.kept,
     )
-    return Refined(result, before.psnr, base.kept)
 
 
 def _load(

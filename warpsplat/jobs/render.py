@@ -5,53 +5,93 @@ from __future__ import annotations
 import io
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from warpsplat.errors import ImageError
-from warpsplat.render.backend import Backend
-from warpsplat.render.models import EXACT, Model, SplatModel
-from warpsplat.render.renderer import render
+from warpsplat.errors import ImageError, UsageError
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import EXACT, Model, SplatModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.scene.chains import as_chains
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 from warpsplat.svg.read import scene_of
 from warpsplat.svg.structure import read_shapes
+from warpsplat.svg.viewer import premultiplied, render_svg
+
+RendererName = Literal["exact", "splat", "gaussian", "viewer"]
+"""The models of coverage, and resvg."""
 
 MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel()}
 
+NO_GAUSSIANS = (
+    "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of each "
+    "Gaussian; vectorize --renderer gaussian reports the figures of its own render"
+)
 
-def draw_own(text: str, model: str, scale: float, backend: Backend) -> bytes:
-    """The SVG ``text`` as a PNG of the size that resvg gives it, drawn by one of ``MODELS``.
+
+def drawn(text: str, renderer: RendererName, scale: float, backend: Backend) -> FloatArray:
+    """The SVG ``text`` at the size that resvg gives it, as ``Renderer.read_image`` has it.
 
     Raises:
         ImageError: not an SVG, or with something that the model cannot show.
+        UsageError: a scale that leaves no pixel or too many, or Gaussians, which no SVG holds.
     """
+    if renderer == "gaussian":
+        raise UsageError(NO_GAUSSIANS)
     size = svg_size(inspect_svg(text).root)
     if size is None:
         raise ImageError("says neither its size nor a viewBox")
+    check_scale(size, scale)
+    if renderer == "viewer":
+        return (premultiplied(render_svg(text, zoom=scale)) / 255).astype(np.float32)
     width, height = (max(1, math.floor(math.floor(side + 0.5) * scale + 0.5)) for side in size)
     if width * height > MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
     scene, has_background = scene_of(read_shapes(text, width, height, scale), width, height)
     if not has_background:
         scene = replace(scene, canvas=replace(scene.canvas, background=None))
-    if model == "splat":
+    if renderer == "splat":
         try:
             scene = as_chains(scene)
         except ValueError as error:
             raise ImageError(f"{error}, not supported by the splat renderer") from None
     if len(scene):
-        image = render(scene, model=MODELS[model], backend=backend)
-    else:
-        background = scene.canvas.background
-        image = np.zeros((height, width, 4), np.float32)
-        image = image if background is None else image[..., :3] + background
+        return render(scene, model=MODELS[renderer], backend=backend)
+    background = scene.canvas.background
+    image = np.zeros((height, width, 4), np.float32)
+    return image if background is None else np.asarray(image[..., :3] + background, np.float32)
+
+
+def check_scale(size: tuple[float, float], scale: float) -> None:
+    """Whether a picture of ``size``, magnified, has pixels, and not too many.
+
+    Raises:
+        UsageError: it has not.
+    """
+    if not (math.isfinite(scale) and scale > 0):
+        raise UsageError(f"scale must be a positive number, not {scale}")
+    if max(size[0], 1.0) * scale * max(size[1], 1.0) * scale > MAX_PIXELS:
+        raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
+    if min(max(1.0, side) for side in size) * scale < 0.5:
+        raise UsageError(f"scale {scale} leaves no pixel of {size[0]:g}x{size[1]:g}")
+
+
+def to_png(image: FloatArray) -> bytes:
+    """A rendered image as a PNG."""
     packed = io.BytesIO()
-    Image.fromarray(to_bytes(image)).save(packed, "PNG")
+    to_pillow(image).save(packed, "PNG")
     return packed.getvalue()
+
+
+def to_pillow(image: FloatArray) -> Image.Image:
+    """What ``render`` returns in 8 bits: RGB where all is opaque, else RGBA with straight opacity."""
+    pixels = to_bytes(image)
+    opaque = (pixels[..., 3:] == 255).all()
+    return Image.fromarray(pixels[..., :3] if opaque else pixels)
 
 
 def to_bytes(image: FloatArray) -> npt.NDArray[np.uint8]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from warpsplat import __version__
+from warpsplat._version import __version__
 from warpsplat.jobs.compare import OURS, Comparison, Row
 from warpsplat.jobs.tracer import Options, require
 

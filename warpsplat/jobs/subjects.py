@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import Refinement, matching
 from warpsplat.fit.export import finished
@@ -17,10 +19,10 @@ from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.tidy import finish_drawing
 from warpsplat.jobs.line import draw_lines
 from warpsplat.metrics import psnr
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
-from warpsplat.scene import FloatArray, Scene
-from warpsplat.trace.pixels import trace_pixels
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.trace.pixels import cell_size, trace_pixels
 from warpsplat.trace.subject import guess_subject
 from warpsplat.trace.trace import trace
 
@@ -31,15 +33,16 @@ Stop = Callable[[], bool]
 def decided(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
     """``settings`` with a subject, and why it is that; the reason is empty where it was given.
 
-    What only a fit can do makes a photograph of any image: strokes, levels, a goal.
+    What only a fit can do makes a photograph of any image: strokes, levels, a goal. Line art may
+    be mixed.
     """
     if settings.subject != "auto":
         return settings, ""
     # Of a size, drawings know as well: with fewer regions.
     fitted = replace(settings, max_bytes=None).fitted_options()
-    if fitted:
+    guess = guess_subject(target) if fitted in ([], ["mixed"]) else None
+    if guess is None or (fitted and guess.subject != "line"):
         return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
-    guess = guess_subject(target)
     if settings.max_bytes and guess.subject not in {"photo", "drawing"}:
         return replace(settings, subject="photo"), "max-bytes is for fitted shapes and drawings"
     return replace(settings, subject=guess.subject), guess.why
@@ -100,6 +103,8 @@ def _drawn(
     target: FloatArray, settings: Settings, backend: Backend, most: int | None, over: Stop, stop: Stop | None
 ) -> Fit:
     """A drawing of ``most`` regions, finished."""
+    size = enlargement(target)
+    shown, target = target, np.ascontiguousarray(target[::size, ::size])
     traced = trace(target, most=most)
     scene = limited(traced.scene, settings)
     done = finish_drawing(
@@ -110,8 +115,27 @@ def _drawn(
         finest=finest(settings),
         stop=over,
     )
-    interrupted = bool(stop and stop())
-    return _made(done.drawing.scene, done.per_pixel, target, backend, interrupted=interrupted)
+    scene, per_pixel = enlarged(done.drawing.scene, size), done.per_pixel / size
+    return _made(scene, per_pixel, shown, backend, interrupted=bool(stop and stop()))
+
+
+LEAST_SIDE = 96
+"""Of a picture that an enlarged one is reduced to [px]: what is smaller says little of outlines."""
+
+
+def enlargement(image: FloatArray) -> int:
+    """How many times an image was enlarged by repeating its pixels: its antialiasing is that of the smaller
+    one, and the steps of its pixels are no part of what it shows.
+    """
+    size, side = cell_size(image), min(image.shape[:2])
+    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_SIDE)
+    return max(fits, default=1)
+
+
+def enlarged(scene: Scene, size: int) -> Scene:
+    """A scene of fills, ``size`` times as large."""
+    canvas = Canvas(scene.canvas.width * size, scene.canvas.height * size, scene.canvas.background)
+    return replace(scene, canvas=canvas, points=scene.points * size, frames=scene.frames * size)
 
 
 def limited(scene: Scene, settings: Settings) -> Scene:

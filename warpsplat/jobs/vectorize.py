@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
-from warpsplat import __version__
+from warpsplat._version import __version__
 from warpsplat.errors import Stopped
-from warpsplat.files.image import load_image
 from warpsplat.files.importance import load_importance
-from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.output import write_svg_text
+from warpsplat.files.sources import ImageSource, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
@@ -28,12 +29,12 @@ from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.step import model_for
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
-from warpsplat.render.backend import Backend
-from warpsplat.render.renderer import render
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.scene.scene import level_ends
-from warpsplat.svg.order import by_opacity
+from warpsplat.svg.order import by_color, by_opacity
 from warpsplat.svg.page import placed
 
 
@@ -78,6 +79,21 @@ class Result:
     """What the image was taken for ..."""
     why: str = ""
     """... and why; empty where it was given."""
+    history: tuple[Progress, ...] = field(default=(), repr=False)
+    """What was reported of the training, in order."""
+    before: float | None = None
+    """Of a refined SVG, its own PSNR [dB]."""
+    kept: str = ""
+    """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the SVG; a name that ends in ``.svgz`` has it gzipped. An existing file is replaced in one
+        step: it is there as it was, or whole.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        write_svg_text(Path(path), self.svg)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
@@ -176,6 +192,8 @@ def vectorize(
     if target.shape[2] == 4 and not traced and not made.interrupted:
         clear = clear_empty(made.scene, target, settings, backend, made.per_pixel)
         made = replace(made, scene=clear)
+    if settings.ids and settings.subject != "line" and settings.renderer != "gaussian":
+        made = replace(made, scene=made.scene.take(by_color(made.scene)))
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
@@ -305,27 +323,27 @@ def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tup
     return tuple(missed)
 
 
-def load_target(source: bytes, name: str | None, background: str) -> FloatArray:
+def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
     """An image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
 
     Raises:
-        ImageError: as ``load_image``.
+        ImageError: as ``image_of``.
     """
     color = solid_color(background)
-    image = load_image(source, name, paper=color)
+    image = image_of(source, name, paper=color)
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
 
 
-def vectorize_file(
-    source: Path | bytes,
-    output: Path,
+def vectorize_image(
+    source: ImageSource,
     settings: Settings,
     backend: Backend,
     *,
+    output: Path | None = None,
     name: str | None = None,
-    importance: Path | None = None,
+    importance: ImageSource | None = None,
     keyed: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -333,13 +351,14 @@ def vectorize_file(
     """Read an image, vectorize it, write ``output`` atomically, and score it.
 
     Args:
-        source: the image's file, or its bytes.
-        output: the SVG; ``-`` is the standard output.
+        source: the image.
         settings: all that decides the result.
         backend: where to compute.
-        name: how messages call the image; default: the file's name.
-        importance: file of a mask, see ``load_importance``.
-        keyed: whether the file names the job that made it (``job_key``), for batches to go on from.
+        output: the SVG; ``-`` is the standard output; None: it is not written.
+        name: how messages call the image; default: its file's name.
+        importance: a mask, see ``load_importance``.
+        keyed: whether the file names the job that made it (``job_key``), for batches to go on from; image and
+            mask are files then.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
 
@@ -347,12 +366,21 @@ def vectorize_file(
         ImageError: ``source`` or the mask cannot be read, or their proportions differ.
         OutputError: ``output`` cannot be written.
     """
-    if isinstance(source, Path):
-        name, source = name or input_name(source), read_input(source)
+    name = name or source_name(source)
+    mask_name = source_name(importance, "the mask")
+    key = ""
+    if keyed:
+        source, importance = _bytes(source), None if importance is None else _bytes(importance)
+        key = job_key(settings, source, importance)
     target = load_target(source, name, settings.background)
-    mask, mask_name = (read_input(importance), input_name(importance)) if importance else (None, "")
     height, width = target.shape[:2]
     chosen, why = decided(target, settings)
+    history: list[Progress] = []
+
+    def note(progress: Progress) -> None:
+        history.append(progress)
+        if report:
+            report(progress)
 
     def on_paper(svg: str) -> str:
         return placed(svg, settings.size, settings.page, settings.units)
@@ -361,10 +389,15 @@ def vectorize_file(
         target,
         chosen,
         backend,
-        metadata=job_key(settings, source, mask) if keyed else "",
-        importance=None if mask is None else load_importance(mask, width, height, mask_name),
-        report=report,
+        metadata=key,
+        importance=None if importance is None else load_importance(importance, width, height, mask_name),
+        report=note,
         stop=stop,
-        write=lambda svg: write_svg_text(output, on_paper(svg)),
+        write=None if output is None else lambda svg: write_svg_text(output, on_paper(svg)),
     )
-    return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why)
+    return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
+
+
+def _bytes(source: ImageSource) -> bytes:
+    assert not isinstance(source, (np.ndarray, Image.Image)), "pixels have no key"
+    return source_bytes(source)

@@ -43,8 +43,15 @@ def read_svg_text(path: Path) -> str:
     Raises:
         ImageError: missing, unreadable, larger than ``MAX_BYTES`` or not text; the message names ``path``.
     """
-    data = read_input(path, "an SVG", limit=MAX_BYTES)
-    name = input_name(path)
+    return svg_text(read_input(path, "an SVG", limit=MAX_BYTES), input_name(path))
+
+
+def svg_text(data: bytes, name: str) -> str:
+    """Text of the bytes of an SVG file, which messages call ``name``; see ``read_svg_text``.
+
+    Raises:
+        ImageError: larger than ``MAX_BYTES`` or not text.
+    """
     try:
         if data[:2] == b"\x1f\x8b":
             with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:

@@ -6,6 +6,8 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from warpsplat.svg.names import GROUP, Names
+
 
 @dataclass(frozen=True)
 class Path:
@@ -19,6 +21,30 @@ class Path:
     def __str__(self) -> str:
         outermost, *inner = self.shared
         return f'<path d="{self.data}"{"".join(inner)}{self.own}{outermost}/>'
+
+
+PAINT = 1
+"""Which of the attributes in common says the paint."""
+
+
+def painted(paths: Sequence[Path], colors: Sequence[str], names: Names) -> list[str]:
+    """The elements of ``paths``, neighbours of one paint in groups that say it and are named after it.
+
+    Args:
+        paths: in painter's order.
+        colors: what the paint of each is called.
+        names: of groups so far.
+    """
+    elements = []
+    for paint, run in itertools.groupby(zip(paths, colors, strict=True), lambda one: one[0].shared[PAINT]):
+        alike = list(run)
+        if len(alike) == 1:
+            elements.append(str(alike[0][0]))
+            continue
+        left = [replace(p, shared=(*p.shared[:PAINT], "", *p.shared[PAINT + 1 :])) for p, _ in alike]
+        name = names.next(alike[0][1] + GROUP)
+        elements += [f'<g id="{name}"{paint}>', *nested(left), "</g>"]
+    return elements
 
 
 def nested(paths: Sequence[Path], level: int = 0) -> list[str]:

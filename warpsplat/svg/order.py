@@ -1,7 +1,7 @@
-"""An order of painting that shows the same and takes fewer characters.
+"""An order of painting that shows the same and in which neighbours are alike.
 
 Shapes that do not overlap may change places. So those of one opacity are brought together, for a group to say
-it of all of them.
+it of all of them, or those of one colour, for a group to be edited as one.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import FloatArray, IndexArray, Scene
+from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 
@@ -29,8 +29,19 @@ def by_opacity(scene: Scene) -> IndexArray:
     Overlapping shapes keep their order, and all their layers. Greedy: of the shapes that nothing unpainted
     lies below, the kind and opacity come next that make the longest run.
     """
+    return _by(scene, list(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True)))
+
+
+def by_color(scene: Scene) -> IndexArray:
+    """The same of equal kind, paint and colour in 8 bits."""
+    levels = np.round(255 * scene.colors).astype(np.int64) @ [1 << 16, 1 << 8, 1]
+    kinds = scene.kind.astype(np.int64) + len(Kind) * scene.paint
+    return _by(scene, list(zip(kinds.tolist(), levels.astype(np.float64).tolist(), strict=True)))
+
+
+def _by(scene: Scene, keys: Sequence[tuple[int, float]]) -> IndexArray:
+    """Order in which runs of equal keys are long."""
     boxes = bounds(scene)
-    keys = list(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True))
     order: list[int] = []
     for start, end in itertools.pairwise((0, *level_ends(scene), len(scene))):
         for first in range(start, end, BLOCK):

@@ -15,10 +15,11 @@ from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, R
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
-from warpsplat.svg.names import LEVEL_ID, path_names
-from warpsplat.svg.nest import Path, nested
+from warpsplat.svg.names import LEVEL_ID, Names, color_names
+from warpsplat.svg.nest import Path, nested, painted
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
+from warpsplat.svg.parts import in_parts
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
@@ -172,15 +173,17 @@ def _groups(
 ) -> Iterator[str]:
     """Layers are groups with their names; those without, where there are several, say how many shapes they
     complete. In them strokes that are neighbours share a group, and neighbours that say the same of
-    themselves where that is shorter. Twins are one path, pictures what they are.
+    themselves where that is shorter. Twins are one path, pictures what they are. ``ids``: paths have names,
+    and neighbours of one paint share a group with one, unless that is what layers are.
     """
     colors, opacities = _colors(scene, ramps), _opacities(scene, opacity_scale)
     data = PathData(scene, per_pixel)
     has_twin = np.append(scene.twin[1:], 0).tolist()
     strokes = (scene.kind == Kind.STROKE).tolist()
     rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
+    called, path_names, group_names = color_names(scene) if ids else [], Names(), Names()
     if ids:
-        rest = [f' id="{name}"{more}' for name, more in zip(path_names(scene), rest, strict=True)]
+        rest = [f' id="{path_names.next(name)}"{more}' for name, more in zip(called, rest, strict=True)]
     both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
     pictures = (scene.paint == Paint.PICTURE).tolist()
     ends = level_ends(scene)
@@ -206,7 +209,9 @@ def _groups(
         ]
         paths = _joined(scene, shapes, paths)
         group = (f"<g {STROKE_ATTRIBUTES}>", "</g>") if in_group else ("", "")
-        yield from (group[0], *nested(paths), group[1])
+        by_color = ids and not scene.layer_names
+        inner = painted(paths, [called[i] for i in shapes], group_names) if by_color else nested(paths)
+        yield from (group[0], *inner, group[1])
     if last is not None:
         yield "</g>"
 
@@ -248,7 +253,8 @@ def write_svg(
     title: str = "",
     ids: bool = False,
 ) -> str:
-    """The scene as an SVG document: a background and one path a shape, in painter's order.
+    """The scene as an SVG document: a background and one path a shape, in painter's order; but for shapes of
+    very many nodes (``in_parts``).
 
     Args:
         scene: what to write; canvas units become user units.
@@ -260,8 +266,9 @@ def write_svg(
         background: whether to write it, if the canvas has one; without, the picture is transparent where no
             shape is.
         title: of the picture; empty: none.
-        ids: whether paths have identifiers, by their colours.
+        ids: whether paths have identifiers, by their colours, and neighbours of one colour a group with one.
     """
+    scene = in_parts(scene)
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
     behind = ""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 
 from warpsplat.scene import FloatArray
+from warpsplat.trace.areas import Areas, is_beside, parted, reaching
 from warpsplat.trace.blobs import hollowed
 from warpsplat.trace.grids import Floats, Ints
 from warpsplat.trace.ink import Ink
@@ -54,19 +55,35 @@ class Drawing:
     lines: list[Line]
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
+    areas: Areas | None = None
+    """What is filled instead, where that was asked for and there is some."""
+    area_pens: Ints = field(default_factory=lambda: np.zeros(0, np.intp))
+    """Row of the pens' colours of each area."""
 
 
-def find_lines(ink: Ink) -> Drawing:
-    """Centre lines of ``ink``, through junctions where they go straight on."""
+def find_lines(ink: Ink, *, mixed: bool = False) -> Drawing:
+    """Centre lines of ``ink``, through junctions where they go straight on.
+
+    Args:
+        ink: of the picture.
+        mixed: whether its broad parts stay areas; else rings fill them.
+    """
     whole = ink
-    ink, rings, width = hollowed(whole)
+    rings: list[Floats] = []
+    width, areas = 0.0, None
+    if mixed:
+        ink, areas = parted(whole)
+    else:
+        ink, rings, width = hollowed(whole)
+    outlines, away = (areas.outlines(), areas.away()) if areas else ([], None)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
     mask = ink.mask if fine == 1 else _enlarged(ink, fine)
     graph, radii = find_graph(mask)
     if len(graph.edges) > MOST:
         longest = np.argsort([-edge.length() for edge in graph.edges], kind="stable")[:MOST]
         graph = Graph([graph.edges[i] for i in np.sort(longest)], graph.places, graph.radii)
-    colors, weights = line_colors([*(edge.points / fine for edge in graph.edges), *rings], whole)
+    edges = [edge.points / fine for edge in graph.edges]
+    colors, weights = line_colors([*edges, *rings, *outlines], whole)
     pens, owner = find_pens(colors, weights)
     lines = []
     for chain in _chains(graph, owner):
@@ -74,11 +91,20 @@ def find_lines(ink: Ink) -> Drawing:
         if line is not None:
             points, widths, closed = line
             points, widths = measured(points / fine, widths / fine, closed, ink.cover)
+            if away is not None and is_beside(points, widths, away):
+                continue
+            if away is not None and not closed:
+                points, widths = reaching(points, widths, away)
             lines.append(Line(points, widths, closed, int(owner[chain[0][0]])))
-    for ring, pen in zip(rings, owner[len(graph.edges) :].tolist(), strict=True):
+    filled = owner[len(edges) :]
+    for ring, pen in zip(rings, filled[: len(rings)].tolist(), strict=True):
         points, widths, closed = _smoothed(ring, np.full(len(ring), width), closed=True)
         lines.append(Line(points, widths, closed, pen))
-    return Drawing(lines, pens)
+    area_pens = filled[len(rings) :]
+    if areas:  # which show their colour better than lines do
+        for pen in np.unique(area_pens):
+            pens[pen] = areas.color(whole.shown, 1 + np.flatnonzero(area_pens == pen))
+    return Drawing(lines, pens, areas, area_pens)
 
 
 FINE = 1100

@@ -70,11 +70,12 @@ class Ink:
     """The paper's colour, sRGB in [0, 1], shape (3,); None: transparent."""
 
 
-def find_ink(image: FloatArray) -> Ink:
+def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     """Tell ink and paper apart; paper may be coloured, in places and unevenly lit.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
+        mixed: whether broad ink may be alone and have any colour.
     """
     shown, is_clear = _shown(image)
     paper = np.asarray(np.median(shown.reshape(-1, 3)[:: max(1, shown.size // 300_000)], axis=0), np.float32)
@@ -89,7 +90,7 @@ def find_ink(image: FloatArray) -> Ink:
     floor = max(FAINTEST, NOISE * noise)
     dark = contrast[contrast > floor]
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
-    contrast = _with_solid(contrast, light, strong, in_all=is_textured)
+    contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed, alone=mixed)
     seed = max(floor, (TEXTURED_SEED if is_textured else SEED) * strong)
     near = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(near, seed), floor)
@@ -138,17 +139,19 @@ def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArr
     return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
 
-def _with_solid(contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool) -> FloatArray:
+def _with_solid(
+    contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool, alone: bool
+) -> FloatArray:
     """The contrast with the whole picture's paper where that is as strong as lines have it: what is broad and
-    as dark as ink is no paper.
+    as dark as ink is no paper. ``alone``: or as strong as anything has it, where there are no lines.
     """
     paper = np.median(light.reshape(-1, 3)[:: max(1, light.size // 300_000)], axis=0)
     away = np.clip(paper - light, 0, 1)
     whole = away.min(axis=2) if in_all else away.max(axis=2)
     lines = contrast > 0.5 * strong
-    if not lines.any():
+    if not lines.any() and not alone:
         return contrast
-    solid = whole > SOLID * float(np.median(whole[lines]))
+    solid = whole > SOLID * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
     return np.asarray(np.where(solid, np.maximum(contrast, whole), contrast), np.float32)
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
+from warpsplat.trace.areas import Areas
 from warpsplat.trace.centerlines import Line, find_lines
 from warpsplat.trace.curves import Pieces, Run, fit_runs
-from warpsplat.trace.grids import Floats
+from warpsplat.trace.grids import Floats, Ints
 from warpsplat.trace.ink import Ink, find_ink
 from warpsplat.trace.pens import width_steps
 
@@ -27,7 +28,12 @@ class TracedLines:
 
     scene: Scene
     """Strokes; ``layer`` is the pen of each."""
-    ink: Ink
+    pens: FloatArray
+    """sRGB in [0, 1], shape (pen, 3)."""
+    areas: Areas | None = None
+    """What is filled besides."""
+    area_pens: Ints = field(default_factory=lambda: np.zeros(0, np.intp))
+    """The pen of each area."""
 
 
 @dataclass(frozen=True)
@@ -47,14 +53,15 @@ def trace_lines(image: FloatArray) -> Scene:
     return trace_ink(find_ink(image)).scene
 
 
-def trace_ink(ink: Ink) -> TracedLines:
-    """The same, of ink that is known."""
-    drawing = find_lines(ink)
+def trace_ink(ink: Ink, *, mixed: bool = False) -> TracedLines:
+    """The same, of ink that is known; if ``mixed``, of what is no filled area."""
+    drawing = find_lines(ink, mixed=mixed)
     strokes = [stroke for line in drawing.lines for stroke in _strokes(line)]
     strokes.sort(key=lambda stroke: stroke.pen)
     fitted = fit_runs([_run(stroke) for stroke in strokes], TOLERANCE)
     height, width = ink.mask.shape
-    return TracedLines(_scene(Canvas(width, height, ink.paper), strokes, fitted, drawing.pens), ink)
+    scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, drawing.pens)
+    return TracedLines(scene, drawing.pens, drawing.areas, drawing.area_pens)
 
 
 def rejoined(before: Scene, after: Scene) -> Scene:

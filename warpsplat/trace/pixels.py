@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.alpha import straight
 from warpsplat.errors import ImageError
@@ -15,6 +17,9 @@ from warpsplat.trace.grids import Bools, Floats, Ints
 
 MOST_CELLS = 1 << 18
 """Of pixel art: a picture with more has outlines that nobody would edit."""
+
+MOST_CORNERS = 32_000
+"""Of a shape."""
 
 SAME = 0.5 / 255
 """Colours that differ by less are one in 8 bits."""
@@ -43,18 +48,24 @@ def find_cells(image: FloatArray) -> Cells:
     Raises:
         ImageError: there are more than ``MOST_CELLS``.
     """
-    height, width, channels = image.shape
+    channels = image.shape[2]
     shown = np.concatenate([straight(image), image[..., 3:]], axis=2)
     levels = np.round(shown * 255).astype(np.uint8)  # as a file can say them
-    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
-    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
-    size = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
+    size = cell_size(levels)
     cells = levels[::size, ::size]
     if cells.shape[0] * cells.shape[1] > MOST_CELLS:
         shape = f"{cells.shape[1]}x{cells.shape[0]}"
         raise ImageError(f"{shape} cells of {size} px, more than pixel art may have ({MOST_CELLS})")
     palette, colors = np.unique(cells.reshape(-1, channels), axis=0, return_inverse=True)
     return Cells(colors.reshape(cells.shape[:2]), np.asarray(palette / 255, np.float32), size)
+
+
+def cell_size(levels: npt.NDArray[Any]) -> int:
+    """Side of the largest cells of one colour each of an image, shape (height, width, channel) [px]."""
+    height, width = levels.shape[:2]
+    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
+    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
+    return int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
 
 
 def outlines(inside: Bools) -> list[list[Point]]:
@@ -104,6 +115,27 @@ def _corners(ring: list[Point]) -> list[Point]:
     return [b for a, b, c in around if (b[0] - a[0], b[1] - a[1]) != (c[0] - b[0], c[1] - b[1])]
 
 
+def polygons(inside: Bools, most: int = MOST_CORNERS) -> list[list[list[Point]]]:
+    """The cells ``inside``, shape (row, column), as sets of polygons with no more than ``most`` corners each.
+
+    One set where that is enough; else the picture is halved, across its longer side, until it is.
+    """
+    whole = outlines(inside)
+    height, width = inside.shape
+    if sum(map(len, whole)) <= most or inside.size == 1:
+        return [whole]
+    if height >= width:
+        halves = [(inside[: height // 2], 0, 0), (inside[height // 2 :], 0, height // 2)]
+    else:
+        halves = [(inside[:, : width // 2], 0, 0), (inside[:, width // 2 :], width // 2, 0)]
+    return [
+        [[(x + left, y + top) for x, y in ring] for ring in rings]
+        for half, left, top in halves
+        for rings in polygons(half, most)
+        if rings
+    ]
+
+
 def _lines(corners: list[Point], size: int) -> Floats:
     """A polygon as a ring of cubics, handles at the thirds of its lines."""
     start = np.asarray(corners, np.float64) * size
@@ -111,12 +143,15 @@ def _lines(corners: list[Point], size: int) -> Floats:
     return np.stack([start, start + way / 3, start + way * 2 / 3], axis=1).reshape(-1, 2)
 
 
-def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tuple[Scene, float]:
-    """A scene that shows the very image, one shape a colour.
+def trace_pixels(
+    image: FloatArray, background: FloatArray | None = None, *, most: int = MOST_CORNERS
+) -> tuple[Scene, float]:
+    """A scene that shows the very image, one shape a colour; several, where that has very many corners.
 
     Args:
         image: as in ``find_cells``.
         background: colour of an opaque image's canvas; without, the colour with the longest outline.
+        most: corners of a shape.
 
     Returns:
         the scene, and units of the view box a pixel that its points lie on.
@@ -125,18 +160,22 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         ImageError: as ``find_cells``.
     """
     cells = find_cells(image)
-    rings = [outlines(cells.colors == i) for i in range(len(cells.palette))]
-    seen = np.ones(len(rings), np.bool_)
+    sets = [polygons(cells.colors == i, most) for i in range(len(cells.palette))]
+    seen = np.ones(len(sets), np.bool_)
     height, width = image.shape[:2]
     if image.shape[2] == 4:
         seen = cells.palette[:, 3] > 0
     elif background is None:
-        ground = int(np.argmax([sum(map(len, ring)) for ring in rings]))
+        corners = [sum(len(ring) for rings in own for ring in rings) for own in sets]
+        ground = int(np.argmax(corners))
         seen[ground], background = False, np.asarray(cells.palette[ground], np.float32)
     else:
         seen = (np.abs(cells.palette - background) > SAME).any(axis=1)
-    contours = [[_lines(corners, cells.size) for corners in rings[i]] for i in np.flatnonzero(seen)]
-    palette = np.asarray(cells.palette[seen], np.float32)
+    owner = [i for i in np.flatnonzero(seen).tolist() for _ in sets[i]]
+    contours = [
+        [_lines(ring, cells.size) for ring in rings] for i in np.flatnonzero(seen) for rings in sets[i]
+    ]
+    palette = np.asarray(cells.palette[owner], np.float32)
     opacities = palette[:, 3] if image.shape[2] == 4 else np.ones(len(palette), np.float32)
     flat = list(itertools.chain.from_iterable(contours))
     scene = Scene.of(

@@ -65,6 +65,11 @@ UNSEEN = 120.0
 UNSEEN_EACH = 40.0
 """The same for each pixel of a speck [levels]."""
 
+MOSTLY = 0.4
+"""Share of a small region's pixels in a noisy picture that are mixtures, for these to be no part of it: JPEG
+tints the tips of stars, and of long ones not all is near what they are tips of.
+"""
+
 MOST_THIN = 4000
 """Thin parts that are looked at; a picture with more is no drawing."""
 
@@ -313,7 +318,7 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> Bools:
         the pixels of these, shape (height, width).
     """
     given_up = np.zeros(painted.shape, np.bool_)
-    for most, reach in SMALL:
+    for most, reach in SMALL if noise == 0 else (SMALL[0], *SMALL):
         regions = components(painted, image)
         small = np.bincount(regions.reshape(-1)) <= most
         doubtful = small[regions]
@@ -327,6 +332,9 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> Bools:
         energy = np.bincount(owner, seen, len(small))
         pixels = np.bincount(owner, minlength=len(small))
         gone = (energy <= np.maximum(UNSEEN, UNSEEN_EACH * np.minimum(pixels, SPECK)))[owner]
+        if noise:
+            tinted = np.bincount(owner, seen == 0, len(small)) >= MOSTLY * pixels
+            gone |= tinted[owner] & (seen == 0)
         rows, columns = rows[gone], columns[gone]
         painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
         given_up[rows, columns] = True

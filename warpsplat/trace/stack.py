@@ -267,9 +267,11 @@ class Tracer:
 
     def _middles(self, region: int, cracks: Ints) -> Floats:
         """Points beyond cracks, halfway through what lies above the region there, shape (crack, 2)."""
-        trend = self.trend[cracks]
-        outward = np.stack([trend[:, 1], -trend[:, 0]], axis=1) / np.hypot(*trend.T)[:, None]
         steps = STEPS[self.loops.ways[cracks]]
+        trend = self.trend[cracks]
+        # Around a single pixel there may be none.
+        trend = np.where(np.abs(trend).max(axis=1, keepdims=True) > 0, trend, steps)
+        outward = np.stack([trend[:, 1], -trend[:, 0]], axis=1) / np.hypot(*trend.T)[:, None]
         middle = self.loops.vertices[cracks] + 0.5 * steps
         reach, open_ = np.full(len(cracks), NEAR), np.ones(len(cracks), np.bool_)
         for depth in np.arange(NEAR, DEEP, 0.5):

@@ -140,7 +140,7 @@ def tolerance_of(offsets: Floats, loops: Loops, noise: float) -> float:
 def _ground(regions: Regions, tree: Tree, *, grounded: bool) -> tuple[Bools, Coloring | None]:
     """Regions that are not painted, and the colour of the canvas, None if it is transparent."""
     clear = np.array([coloring.clear for coloring in regions.colorings])
-    opaque = all(c.color[3] >= OPAQUE for c in regions.colorings)
+    opaque = all(regions.colorings[paint].color[3] >= OPAQUE for paint in np.unique(regions.paint))
     if not grounded or not opaque or clear[regions.paint].any():
         return clear[regions.paint], None
     painted = regions.paint[regions.labels]

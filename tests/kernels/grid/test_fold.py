@@ -11,7 +11,7 @@ from tests.helpers import grid_of, plans_of, relative_error, renderer_for
 from tests.reference.curves import tensors
 from tests.reference.grid import fold_area, grids
 from tests.scenes import disc, points_by_shape, random_scene, with_points
-from warpsplat.render.models import SplatModel
+from warpsplat.rendering.models import SplatModel
 from warpsplat.scene import Kind, Scene
 
 

@@ -16,7 +16,7 @@ from tests.reference.grid import grids, runs_of
 from tests.scenes import disc, mixed_scene, points_by_shape, random_scene, with_points
 from warpsplat.kernels import constants
 from warpsplat.kernels.grid.strips import row_position
-from warpsplat.render.models import SplatModel
+from warpsplat.rendering.models import SplatModel
 from warpsplat.scene import Kind, Scene
 
 SCENES = {

@@ -10,7 +10,7 @@ from tests.helpers import run
 from warpsplat.alpha import on, squares, straight
 from warpsplat.kernels.loss.alpha import alpha_loss
 from warpsplat.kernels.tile import column
-from warpsplat.render.tiles import from_tiles, to_tiles
+from warpsplat.rendering.tiles import from_tiles, to_tiles
 
 
 def test_loss_and_gradient_on_black_and_on_white(device: str) -> None:

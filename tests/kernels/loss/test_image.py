@@ -12,7 +12,7 @@ from tests.helpers import relative_error, run
 from tests.reference import losses
 from warpsplat.kernels.loss import image as kernels
 from warpsplat.kernels.tile import column
-from warpsplat.render.tiles import from_tiles, to_tiles
+from warpsplat.rendering.tiles import from_tiles, to_tiles
 from warpsplat.scene import FloatArray
 
 WIDTH, HEIGHT = 37, 27

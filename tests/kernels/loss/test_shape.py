@@ -9,8 +9,8 @@ from tests.helpers import relative_error, run
 from tests.reference import losses
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.kernels.loss import shape as kernels
-from warpsplat.render.backend import Backend
-from warpsplat.render.parameters import Parameters
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.parameters import Parameters
 from warpsplat.scene import Basis, Kind, Scene
 
 SCENES = ["fills", "strokes", "splined fills", "splined strokes", "mixed"]

@@ -1,0 +1,148 @@
+"""Scenes of shapes of different kinds, bases and lengths: image and adjoint, for both models of coverage."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import torch
+
+from tests.helpers import SPLAT, compare, pieces_of, reference_image, renderer_for
+from tests.reference import exact
+from tests.reference.composite import composite
+from tests.scenes import MIXED_CUBICS, Outline, mixed_scene, ragged_scene, random_scene
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.models import EXACT, Model, SplatModel
+from warpsplat.rendering.renderer import Capacity, render
+from warpsplat.scene import Basis, Kind, Scene
+
+CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
+ODD: dict[str, list[Outline]] = {
+    "fills": [(Kind.FILL, CUBIC, n) for n in (1, 3, 2, 5, 4)],
+    "strokes": [(Kind.STROKE, CUBIC, n) for n in (4, 1, 3, 2, 5)],
+    "mixed": [*MIXED_CUBICS, (Kind.FILL, CUBIC, 1), (Kind.STROKE, CUBIC, 4), (Kind.FILL, CUBIC, 3)],
+    "splined fills": [(Kind.FILL, SPLINE, n) for n in (5, 3, 12, 4, 8)],
+    "splined strokes": [(Kind.STROKE, SPLINE, n) for n in (4, 1, 9, 2, 3)],
+    "both bases": [
+        (kind, basis, n)
+        for n in (3, 4)
+        for kind, basis in (
+            (Kind.STROKE, SPLINE),
+            (Kind.FILL, CUBIC),
+            (Kind.FILL, SPLINE),
+            (Kind.STROKE, CUBIC),
+        )
+    ],
+}
+
+
+def scene_for(model: Model, width: int = 40, height: int = 36, *, seed: int) -> Scene:
+    """Mixed as far as the model can show it."""
+    return mixed_scene(width, height, seed=seed, splines=model is EXACT)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_exact(device: str, seed: int) -> None:
+    compare(mixed_scene(seed=seed), device)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shapes", ODD.values(), ids=ODD.keys())
+@pytest.mark.parametrize("scale", [1.0, 1.6])
+def test_exact_of_any_lengths(device: str, shapes: list[Outline], scale: float) -> None:
+    compare(ragged_scene(shapes, seed=1), device, scale)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("through_scales", [True, False])
+def test_splat(device: str, seed: int, through_scales: bool) -> None:
+    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
+def test_sixteen_lanes_against_the_reference(device: str, model: Model) -> None:
+    compare(scene_for(model, seed=2), device, model=model, lanes=16)
+
+
+@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
+def test_depth_is_the_order_of_rows_whatever_the_kind(device: str, model: Model) -> None:
+    """Turned round, the scene is another picture, and the right one."""
+    scene = scene_for(model, seed=3)
+    turned = scene.take(np.arange(len(scene))[::-1])
+    a, b = (renderer_for(s, device, model=model).read_image() for s in (scene, turned))
+    assert np.abs(a - b).max() > 0.1
+    compare(turned, device, model=model)
+
+
+def test_a_stroke_between_two_fills(device: str) -> None:
+    """Composited by hand, the reference's coverages in the order of the rows."""
+    scene = ragged_scene([(Kind.FILL, CUBIC, 4), (Kind.STROKE, CUBIC, 3), (Kind.FILL, SPLINE, 10)], seed=5)
+    for start, stop in itertools.pairwise(scene.first):
+        scene.points[start:stop] += np.array([20, 18], np.float32) - scene.points[start:stop].mean(axis=0)
+    renderer = renderer_for(scene, device)
+    p, image = reference_image(scene, renderer)
+    covers = exact.coverages(scene, p, pieces_of(renderer), 40, 36, 1.0)
+    both = torch.minimum(covers[0], covers[1]) * covers[2]
+    assert int((both > 0.5).sum()) > 5, "the three overlap"
+    swapped = {name: value[[0, 2, 1]] if len(value) == len(scene) else value for name, value in p.items()}
+    wrong = composite([covers[0], covers[2], covers[1]], swapped, scene)
+    assert float((image - wrong).detach().abs().max()) > 0.05
+    np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-4)
+
+
+@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
+def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> None:
+    """The gradient of a shape that nothing overlaps does not depend on what else is in the arrays."""
+    scene = scene_for(model, 250, 40, seed=4)
+    for i in range(len(scene)):
+        points = scene.points_of(i)
+        points += np.array([25 * i + 12, 20], np.float32) - points.mean(axis=0)
+        points[:, 0] = np.clip(points[:, 0], 25 * i + 5, 25 * i + 20)
+    weights = np.random.default_rng(0).normal(size=(40, 250, 3)).astype(np.float32)
+    whole = renderer_for(scene, device, model=model)
+    whole.write_image_grad(weights)
+    whole.backward()
+    together = whole.parameters.gradients()
+    for i in range(len(scene)):
+        one = renderer_for(scene.take(np.array([i])), device, model=model)
+        one.write_image_grad(weights)
+        one.backward()
+        alone = one.parameters.gradients()
+        np.testing.assert_allclose(
+            together["points"][scene.first[i] : scene.first[i + 1]], alone["points"], atol=1e-4
+        )
+        for name in ("colors", "opacities", "widths"):
+            np.testing.assert_allclose(together[name][i], alone[name][0], rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
+def test_mixed_scenes_that_outgrow_the_arrays(device: str, model: Model) -> None:
+    scene = scene_for(model, seed=1)
+    whole = render(scene, model=model, backend=Backend.on(device))
+    small = renderer_for(scene, device, model=model, capacity=Capacity(50, 5))
+    np.testing.assert_array_equal(small.read_image(), whole)
+
+
+@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
+def test_same_bits_for_any_number_of_threads(device: str, model: Model) -> None:
+    scene = scene_for(model, 90, 70, seed=6)
+    outcomes = []
+    for threads in (1, 3):
+        renderer = renderer_for(scene, device, model=model, threads=threads)
+        renderer.film.buffers.image_grad.assign(renderer.film.buffers.image)
+        renderer.backward()
+        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
+    for a, b in zip(*outcomes, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_fills_have_no_gradient_of_a_width(device: str) -> None:
+    scene = mixed_scene().append(random_scene(Kind.FILL, 2, seed=9))
+    renderer = renderer_for(scene, device)
+    renderer.write_image_grad(np.ones((36, 40, 3), np.float32))
+    renderer.backward()
+    gradient = renderer.parameters.gradients()["widths"]
+    assert not gradient[scene.kind == Kind.FILL].any()
+    assert gradient[scene.kind == Kind.STROKE].all()

@@ -1,0 +1,164 @@
+"""What a further model of coverage takes: here axis-parallel boxes, which no file of the package knows.
+
+A shape covers the box of its control points. The area of a pixel inside a box is a product of two clamped
+differences, so that image and gradients have short formulas to be held against.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import warp as wp
+
+from tests.fit.pictures import picture
+from tests.helpers import renderer_for
+from tests.kernels import trials
+from tests.scenes import random_scene
+from warpsplat.fit.loop import fit
+from warpsplat.fit.settings import make_settings
+from warpsplat.kernels import constants
+from warpsplat.rendering.backend import Backend, buffer
+from warpsplat.rendering.coverage import Coverage, CoverageBuffers
+from warpsplat.rendering.models import Geometry, Job
+from warpsplat.rendering.program import Program
+from warpsplat.scene import Kind, Scene
+
+
+@dataclass
+class BoxBuffers:
+    corner_first: wp.array = buffer(wp.int32, "shapes")
+    corner_last: wp.array = buffer(wp.int32, "shapes")
+    corner: wp.array = buffer(wp.vec2, "corners")
+    extent: wp.array = buffer(wp.vec2, "corners")
+
+
+class BoxGeometry:
+    """The corners by which a shape's tiles are found."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        count = job.parameters.shape_count
+        self.buffers = job.backend.allocate(BoxBuffers, {"shapes": count, "corners": 2 * count})
+
+    def samples(self) -> dict[str, wp.array]:
+        b = self.buffers
+        return {
+            "sample_first": b.corner_first,
+            "sample_last": b.corner_last,
+            "position": b.corner,
+            "extent": b.extent,
+        }
+
+    def forward(self, program: Program) -> None:
+        parameters = self._job.parameters
+        program.launch(
+            trials.corners,
+            parameters.shape_count,
+            parameters.arrays,
+            self._job.viewport,
+            self.buffers,
+            split=True,
+        )
+
+
+class BoxCoverage:
+    """What compositing asks for."""
+
+    law = constants.AREA
+
+    def __init__(self, job: Job, geometry: BoxGeometry) -> None:
+        self._job = job
+        self.buffers = job.backend.allocate(CoverageBuffers, {"slots": job.slots})
+        self._sources = (job.bins.buffers, geometry.buffers, job.viewport)
+
+    def states(self, program: Program) -> None:
+        program.launch(trials.boxes_forward, self._job.slots, *self._sources, self.buffers, split=True)
+
+    def values(self, program: Program) -> None:
+        """All are there."""
+
+    def backward(self, program: Program) -> None:
+        parameters = self._job.parameters
+        program.launch(
+            trials.boxes_backward,
+            parameters.shape_count,
+            *self._sources,
+            parameters.arrays,
+            sum_grad=self.buffers.coverage_pixels,
+            split=True,
+        )
+
+
+@dataclass(frozen=True)
+class BoxModel:
+    samples_per_shape: int = 2
+
+    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+        geometry = BoxGeometry(job)
+        return geometry, BoxCoverage(job, geometry)
+
+
+def expected(scene: Scene, scale: float) -> np.ndarray:
+    """The image by the formula, in float64."""
+    width, height = round(scene.canvas.width * scale), round(scene.canvas.height * scale)
+    assert scene.canvas.background is not None
+    image = np.tile(scene.canvas.background.astype(np.float64), (height, width, 1))
+    for i in range(len(scene)):
+        low, high = (scale * f(scene.points_of(i).astype(np.float64), axis=0) for f in (np.min, np.max))
+        across, down = (
+            np.clip(
+                np.minimum(high[axis], np.arange(count) + 1) - np.maximum(low[axis], np.arange(count)), 0, 1
+            )
+            for axis, count in ((0, width), (1, height))
+        )
+        alpha = (scene.opacities[i] * down[:, None] * across)[..., None]
+        image += alpha * (scene.colors[i] - image)
+    return image
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_boxes_are_rendered(device: str, scale: float) -> None:
+    scene = random_scene(Kind.FILL, count=5)
+    made = renderer_for(scene, device, scale, model=BoxModel()).read_image()
+    np.testing.assert_allclose(made, expected(scene, scale), atol=1e-5)
+
+
+def test_their_adjoint_reaches_every_attribute(device: str) -> None:
+    """Against central differences: between two pixel borders the image is linear in each side."""
+    scene = random_scene(Kind.FILL, count=3)
+    renderer = renderer_for(scene, device, model=BoxModel())
+    weights = np.random.default_rng(1).normal(size=renderer.read_image().shape).astype(np.float32)
+    renderer.write_image_grad(weights)
+    renderer.backward()
+    step = 1e-3
+    gradients = renderer.parameters.gradients()
+    for name in ("points", "colors", "opacities"):  # flat boxes have no others
+        got = gradients[name]
+        value = getattr(scene, name)
+        want = np.zeros_like(got)
+        for index in np.ndindex(value.shape):
+            sides = []
+            for sign in (1, -1):
+                moved = value.copy()
+                moved[index] += sign * step
+                sides.append((weights * expected(replace(scene, **{name: moved}), 1.0)).sum())
+            want[index] = (sides[0] - sides[1]) / (2 * step)
+        assert np.abs(want).max() > 0.1, name
+        np.testing.assert_allclose(got, want, atol=2e-3 * np.abs(want).max(), err_msg=name)
+
+
+def test_a_run_trains_them(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Surgery, growth and looks at the loss know no model."""
+    monkeypatch.setattr("warpsplat.fit.step.model_for", lambda *_: BoxModel())
+    seen = []
+    settings = make_settings(curves=12, iterations=100, viewer=False)
+    done = fit(picture(), settings, Backend.on(device), report=lambda progress: seen.append(progress.psnr))
+    assert len(done.scene) == 12
+    assert seen[-1] > seen[0] + 3
+    np.testing.assert_allclose(
+        renderer_for(done.scene, device, model=BoxModel()).read_image(),
+        expected(done.scene, 1.0),
+        atol=1e-4,
+    )

@@ -1,0 +1,132 @@
+"""Gradients and transparent canvases: image and adjoint against the reference."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers import compare, renderer_for
+from tests.scenes import disc, mixed_scene, random_scene, with_gradients, with_two_stops
+from warpsplat.rendering.tiles import from_tiles
+from warpsplat.scene import Canvas, Kind, Paint, Scene, Spread
+
+
+def transparent(scene: Scene) -> Scene:
+    return replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("scale", [1.0, 1.7])
+def test_gradients(device: str, lanes: int, scale: float) -> None:
+    compare(with_gradients(mixed_scene(seed=1)), device, scale, lanes=lanes)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+def test_transparent_canvas(device: str, lanes: int) -> None:
+    compare(transparent(with_gradients(mixed_scene(seed=2))), device, lanes=lanes)
+    compare(transparent(random_scene(Kind.FILL)), device, lanes=lanes)
+
+
+@pytest.mark.parametrize("spread", Spread)
+@pytest.mark.parametrize("paint", [Paint.LINEAR, Paint.RADIAL])
+def test_spread(device: str, paint: Paint, spread: Spread) -> None:
+    scene = with_gradients(random_scene(Kind.FILL, 3, seed=4), seed=5)
+    both = {"paint": paint, "spread": spread}
+    traits = {name: np.where(scene.paint > 0, value, 0).astype(np.int32) for name, value in both.items()}
+    compare(replace(scene, **traits), device)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("clear", [False, True])
+def test_ramps(device: str, lanes: int, clear: bool) -> None:
+    """Two ascending stops, padded, from a circle's centre: the way for these is a shorter one."""
+    scene = with_two_stops(random_scene(Kind.FILL, 6, seed=10), seed=11)
+    compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
+
+
+def test_what_is_seen_is_what_colours_are_multiplied_with(device: str) -> None:
+    scene = with_two_stops(mixed_scene(seed=4), seed=5)
+    scene.opacities[:] = 0.6
+    before = renderer_for(scene, device)
+    visible = before.visible()
+    step = 0.125
+    for shape in range(len(scene)):
+        own = np.arange(len(scene)) == shape
+        stops = np.repeat(own, np.diff(scene.stop_first))[:, None]
+        brighter = replace(
+            scene, colors=scene.colors + step * own[:, None], stop_colors=scene.stop_colors + step * stops
+        )
+        grown = renderer_for(brighter, device).read_image() - before.read_image()
+        tiles = np.zeros((before.viewport.tile_count, 1, 16, 16), np.float32)
+        tiles[visible.tile[visible.shape == shape], 0] = visible.share[visible.shape == shape]
+        seen = from_tiles(tiles, before.viewport.width, before.viewport.height)
+        np.testing.assert_allclose(grown, step * np.broadcast_to(seen, grown.shape), atol=1e-6)
+
+
+def test_stops_out_of_order(device: str) -> None:
+    """One that lies before the one before it counts as lying there, and does not move by itself."""
+    scene = with_gradients(random_scene(Kind.FILL, 4, seed=6), seed=7)
+    offsets = scene.stop_offsets.copy()
+    third = slice(int(scene.stop_first[2]), int(scene.stop_first[3]))
+    offsets[third] = [0.2, 0.7, 0.4]
+    compare(replace(scene, stop_offsets=offsets), device)
+
+
+def test_two_stops_in_one_place_are_a_step(device: str) -> None:
+    """Also at either end, where what lies beyond has the outer one's colour."""
+    colors = np.eye(3, dtype=np.float32)[[0, 1, 1, 2]]
+    scene = replace(
+        disc(60, 40, 20),
+        paint=np.array([Paint.LINEAR], np.int32),
+        frames=np.array([[10, 0, 20, 0, 0, 20]], np.float32),
+        stop_first=np.array([0, 4], np.int32),
+        stop_offsets=np.array([0, 0, 1, 1], np.float32),
+        stop_colors=colors,
+        stop_opacities=np.ones(4, np.float32),
+    )
+    row = renderer_for(scene, device).read_image()[20]
+    np.testing.assert_allclose(row[[9, 10, 29, 30]], colors, atol=1e-6)
+
+
+def test_what_is_empty_stays_exactly_empty(device: str) -> None:
+    image = renderer_for(transparent(disc(9, 40, 20)), device).read_image()
+    assert image.shape == (40, 40, 4)
+    assert not image[:8].any()
+    np.testing.assert_allclose(image[20, 20], np.ones(4), atol=1e-6)
+
+
+def test_on_any_background_it_is_the_opaque_picture(device: str) -> None:
+    scene = with_gradients(mixed_scene(seed=3))
+    clear = renderer_for(transparent(scene), device).read_image()
+    opaque = renderer_for(scene, device).read_image()
+    assert scene.canvas.background is not None
+    on = clear[..., :3] + (1 - clear[..., 3:]) * scene.canvas.background
+    np.testing.assert_allclose(on, opaque, atol=1e-5)
+
+
+@pytest.mark.parametrize("opaque", [True, False])
+def test_removal_costs(device: str, opaque: bool) -> None:
+    """Measured by taking shapes away; of a transparent canvas on black and on white."""
+    scene = with_gradients(random_scene(Kind.FILL, 4, seed=8), seed=9)
+    scene = scene if opaque else transparent(scene)
+    renderer = renderer_for(scene, device)
+    target = np.random.default_rng(0).uniform(0, 1, renderer.read_image().shape).astype(np.float32)
+    aim = type(renderer.film.buffers.image)
+
+    def error(image: np.ndarray) -> float:
+        difference = (image - target).astype(np.float64)
+        if opaque:
+            return float((difference**2).mean())
+        black, white = difference[..., :3], difference[..., :3] - difference[..., 3:]
+        return float((black**2).mean() + (white**2).mean()) / 2
+
+    from warpsplat.kernels.tile import column
+    from warpsplat.rendering.tiles import to_tiles
+
+    costs = renderer.removal_costs(aim(to_tiles(target), dtype=column, device=device))
+    for i in range(len(scene)):
+        without = scene.take(np.delete(np.arange(len(scene)), i))
+        grown = error(renderer_for(without, device).read_image()) - error(renderer.read_image())
+        assert costs[i] == pytest.approx(grown, rel=1e-3, abs=1e-6)

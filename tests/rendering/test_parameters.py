@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import mixed_scene, point_count, random_scene
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
+
+SCENES = {
+    "fills": (random_scene(Kind.FILL, count=6), random_scene(Kind.FILL, count=2, seed=1)),
+    "strokes": (random_scene(Kind.STROKE, count=6), random_scene(Kind.STROKE, count=2, seed=1)),
+    "mixed": (mixed_scene(), mixed_scene(seed=1).take(np.arange(2))),
+}
+
+
+@pytest.mark.parametrize(("scene", "added"), SCENES.values(), ids=SCENES.keys())
+def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scene) -> None:
+    parameters = Parameters(scene, Backend.on(device))
+    rng = np.random.default_rng(0)
+    before = {}
+    for name, group in parameters.groups.items():
+        before[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
+        group.moment1.assign(before[name][0])
+        group.moment2.assign(before[name][1])
+    parameters.arrays["ages"].assign(np.arange(10, 10 + len(scene), dtype=np.int32))
+    keep = np.array([4, 0, 3, 5])
+    parameters.rearrange(keep, added)
+    after, wanted = parameters.scene(), scene.take(keep).append(added)
+    for name in ("kind", "basis", "first", *(a.name for a in ATTRIBUTES)):
+        np.testing.assert_array_equal(getattr(after, name), getattr(wanted, name))
+    np.testing.assert_array_equal(parameters.arrays["ages"].numpy(), [14, 10, 13, 15, 0, 0])
+    for attribute in ATTRIBUTES:
+        group = parameters.groups[attribute.name]
+        rows = scene.rows(attribute, keep)
+        for moment, old in zip((group.moment1, group.moment2), before[attribute.name], strict=True):
+            np.testing.assert_array_equal(moment.numpy()[: len(rows)], old[rows])
+            assert not moment.numpy()[len(rows) :].any()
+    assert parameters.revision == 1
+
+
+def test_layout(device: str) -> None:
+    """What kernels find a shape's points and Béziers by."""
+    scene = mixed_scene()
+    parameters = Parameters(scene, Backend.on(device))
+    arrays = {name: array.numpy() for name, array in parameters.arrays.items()}
+    for shape in range(len(scene)):
+        own = np.flatnonzero(arrays["point_shape"] == shape)
+        np.testing.assert_array_equal(own, np.arange(*arrays["point_first"][shape : shape + 2]))
+        beziers = np.flatnonzero(arrays["bezier_contour"] == shape)
+        np.testing.assert_array_equal(beziers, np.arange(*arrays["bezier_first"][shape : shape + 2]))
+        kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
+        assert (arrays["kind"][shape], arrays["basis"][shape]) == (kind, basis)
+        assert len(own) == point_count(kind, basis, len(beziers))
+    assert parameters.bezier_count == len(arrays["bezier_contour"])
+    assert parameters.kinds == {Kind.FILL, Kind.STROKE}
+
+
+def test_fewer_points_keep_their_moments(device: str) -> None:
+    """Shapes, their order and their ages stay; the rows of what has rows by shape, too."""
+    scene = random_scene(Kind.FILL, count=3, basis=Basis.SPLINE, beziers=6).append(mixed_scene())
+    parameters = Parameters(scene, Backend.on(device))
+    rng = np.random.default_rng(0)
+    moments = {}
+    for name, group in parameters.groups.items():
+        moments[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
+        group.moment1.assign(moments[name][0])
+        group.moment2.assign(moments[name][1])
+    ages = np.arange(10, 10 + len(scene), dtype=np.int32)
+    parameters.arrays["ages"].assign(ages)
+    keep = np.delete(np.arange(len(scene.points)), [1, 4, 13])
+    mask = np.isin(np.arange(len(scene.points)), keep)
+    parameters.reshape(replace(scene, points=scene.points + 1).without_points(mask), keep)
+    points = scene.points[keep] + 1
+    after = parameters.scene()
+    assert after.point_counts()[:4].tolist() == [4, 6, 5, 12]
+    np.testing.assert_array_equal(after.points, points)
+    np.testing.assert_array_equal(parameters.arrays["ages"].numpy(), ages)
+    for attribute in ATTRIBUTES:
+        group = parameters.groups[attribute.name]
+        rows = keep if attribute.per == "point" else np.arange(len(moments[attribute.name][0]))
+        for moment, old in zip((group.moment1, group.moment2), moments[attribute.name], strict=True):
+            np.testing.assert_array_equal(moment.numpy(), old[rows])
+    assert parameters.revision == 1
+
+
+def test_held_rows_until_the_next_surgery(device: str) -> None:
+    scene = mixed_scene()
+    parameters = Parameters(scene, Backend.on(device))
+    assert not any(group.held.numpy().any() for group in parameters.groups.values())
+    rows = np.arange(len(scene.points)) % 3 == 1
+    parameters.hold("points", rows)
+    np.testing.assert_array_equal(parameters.groups["points"].held.numpy(), rows)
+    assert not parameters.groups["colors"].held.numpy().any()
+    parameters.rearrange(np.arange(3), scene.take(np.arange(1)))
+    assert not parameters.groups["points"].held.numpy().any()
+
+
+def test_assigned_values_leave_all_else_as_it_is(device: str) -> None:
+    scene = mixed_scene()
+    parameters = Parameters(scene, Backend.on(device))
+    group = parameters.groups["points"]
+    group.moment1.fill_(2.0)
+    address = group.value.ptr
+    other = replace(scene, points=scene.points + 1, colors=scene.colors * 0.5)
+    parameters.assign(other)
+    for attribute in ATTRIBUTES:
+        np.testing.assert_array_equal(
+            getattr(parameters.scene(), attribute.name), getattr(other, attribute.name)
+        )
+    assert parameters.groups["points"].value.ptr == address
+    assert (parameters.groups["points"].moment1.numpy() == 2).all()
+    assert parameters.revision == 0
+
+
+def test_kernels_and_optimiser_share_memory(device: str) -> None:
+    parameters = Parameters(mixed_scene(), Backend.on(device))
+    for name, group in parameters.groups.items():
+        assert parameters.arrays[name].ptr == group.value.ptr
+        assert parameters.arrays[f"{name}_grad"].ptr == group.grad.ptr

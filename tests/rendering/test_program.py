@@ -1,0 +1,100 @@
+"""Launches bound by name; graphs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warpsplat.rendering.program import Program, bind, capture
+
+
+@wp.kernel
+def affine(
+    # In:
+    offset: wp.int32,
+    slope: wp.array[wp.float32],  # [n]
+    shift: wp.array[wp.float32],  # [n], of the same type: a swap compiles
+    factor: wp.float32,
+    # Out:
+    result: wp.array[wp.float32],  # [n]
+) -> None:
+    i = offset + wp.tid()
+    result[i] = factor * slope[i] + shift[i]  # type: ignore[index]
+
+
+@dataclass
+class Buffers:
+    shift: wp.array
+    result: wp.array
+    slope: wp.array
+
+
+def floats(*values: float, device: str = "cpu") -> wp.array:
+    return wp.array(values, dtype=wp.float32, device=device)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_arguments_go_where_their_names_are(device: str, threads: int) -> None:
+    """Whatever the order of fields, of sources and of keywords."""
+    slope, shift, result = (floats(*x, device=device) for x in ([1, 2, 3], [10, 20, 30], [0, 0, 0]))
+    for sources, values in (
+        ((Buffers(shift, result, slope),), {"factor": 2.0}),
+        (({"shift": shift}, {"result": result, "slope": slope}), {"factor": 2.0}),
+        (({"factor": 2.0, "unused": 7},), {"result": result, "shift": shift, "slope": slope}),
+    ):
+        result.zero_()
+        program = Program(wp.get_device(device), threads)
+        program.launch(affine, 3, *sources, split=True, **values)
+        program.run()
+        np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
+
+
+COMPLETE: dict[str, Any] = {"slope": 1, "shift": 2, "factor": 3, "result": 4}
+
+
+def test_order_is_the_kernels() -> None:
+    assert bind(affine, [dict(reversed(COMPLETE.items()))], {}) == [1, 2, 3, 4]
+    assert bind(affine, [COMPLETE], {"shift": 9}) == [1, 9, 3, 4], "a keyword goes over the sources"
+
+
+@pytest.mark.parametrize("name", COMPLETE)
+def test_a_missing_name_is_refused(name: str) -> None:
+    rest = {other: value for other, value in COMPLETE.items() if other != name}
+    with pytest.raises(TypeError, match=f"affine.*: parameter {name} is missing"):
+        bind(affine, [rest], {})
+    with pytest.raises(TypeError, match=f"parameter {name} is missing"):
+        bind(affine, [], rest)
+
+
+def test_a_misspelt_keyword_is_refused() -> None:
+    with pytest.raises(TypeError, match="no parameter slpoe"):
+        bind(affine, [COMPLETE], {"slpoe": 1})
+    with pytest.raises(TypeError, match="no parameter offset"):
+        bind(affine, [COMPLETE], {"offset": 1})
+
+
+def test_a_name_in_two_sources_is_refused() -> None:
+    with pytest.raises(TypeError, match="parameter shift is ambiguous"):
+        bind(affine, [COMPLETE, Buffers(1, 2, 3)], {"slope": 1, "result": 1})
+    assert bind(affine, [COMPLETE, {"shift": 8}], {"shift": 9}) == [1, 9, 3, 4]
+
+
+def test_nothing_is_recorded_for_a_refused_launch() -> None:
+    program = Program(wp.get_device("cpu"))
+    with pytest.raises(TypeError):
+        program.launch(affine, 3, COMPLETE, shfit=1)
+    assert not program.launches
+
+
+def test_an_empty_range_is_left_out() -> None:
+    program = Program(wp.get_device("cpu"))
+    program.launch(affine, (0, 4), COMPLETE)
+    assert not program.launches
+
+
+def test_several_cpu_threads_are_not_given_up_for_a_graph() -> None:
+    assert capture(wp.get_device("cpu"), [Program(wp.get_device("cpu"), 2)]) is None

@@ -1,0 +1,101 @@
+"""Shapes of many nodes as several paths that show the same."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes import mixed_scene
+from warpsplat.scene import Basis, Canvas, Kind, Rule, Scene
+from warpsplat.scene.scene import starts_of
+from warpsplat.svg.parts import in_parts
+from warpsplat.svg.viewer import render_svg
+from warpsplat.svg.write import write_svg
+
+
+def square(x: float, y: float, side: float) -> np.ndarray:
+    """A ring of four lines as cubics."""
+    corners = np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side]])
+    way = np.roll(corners, -1, axis=0) - corners
+    return np.stack([corners, corners + way / 3, corners + way * 2 / 3], axis=1).reshape(-1, 2)
+
+
+def squares(rings: list[np.ndarray], *, opacity: float = 0.5) -> Scene:
+    """One even-odd shape between two others."""
+    shapes = [[square(0, 0, 60)], rings, [square(4, 4, 20)]]
+    flat = list(itertools.chain.from_iterable(shapes))
+    return Scene.of(
+        Canvas(64, 48, np.ones(3, np.float32)),
+        np.full(3, Kind.FILL, np.int32),
+        starts_of(np.array([sum(map(len, own)) for own in shapes])),
+        np.full(3, Basis.CUBIC, np.int32),
+        starts=starts_of(np.array([len(ring) for ring in flat])),
+        closed=np.ones(len(flat), np.int32),
+        points=np.concatenate(flat).astype(np.float32),
+        colors=np.array([[0.9, 0.8, 0.2], [0, 0.2, 0.8], [1, 0, 0]], np.float32),
+        opacities=np.array([1, opacity, 0.4], np.float32),
+        rule=np.full(3, Rule.EVENODD, np.int32),
+    )
+
+
+GRID = [square(x, y, 8) for y in (2, 14, 26) for x in (2, 14, 26, 38)]
+HOLES = [square(x + 2, y + 2, 4) for y in (2, 14, 26) for x in (2, 14, 26, 38)]
+
+
+def pixels(text: str) -> np.ndarray:
+    return np.asarray(render_svg(text))
+
+
+@pytest.mark.parametrize("most", [8, 16, 40])
+def test_parts_show_the_same_and_are_small(most: int) -> None:
+    scene = squares([*GRID, *HOLES])
+    whole = write_svg(scene, per_pixel=10)
+    made = in_parts(scene, most)
+    contours = np.diff(np.searchsorted(made.starts, made.first))
+    assert (4 * contours <= most).all()
+    assert len(made) == 2 + -(-96 // (most // 8 * 8))
+    assert (pixels(write_svg(made, per_pixel=10)) == pixels(whole)).all()
+
+
+def test_a_hole_stays_with_what_is_around_it() -> None:
+    scene = squares([square(2, 2, 40), square(10, 10, 8), square(50, 10, 4)])
+    made = in_parts(scene, 4)
+    assert np.diff(np.searchsorted(made.starts, made.first)).tolist() == [1, 2, 1, 1]
+    assert made.colors[1:3].tolist() == [scene.colors[1].tolist()] * 2
+
+
+def test_what_is_linked_by_a_third_stays_together() -> None:
+    scene = squares([square(2, 2, 8), square(30, 2, 8), square(6, 6, 28)])
+    assert len(in_parts(scene, 4)) == 3
+
+
+def test_what_nearly_touches_stays_together() -> None:
+    assert len(in_parts(squares([square(2, 2, 8), square(10.9, 2, 8)]), 4)) == 3
+    assert len(in_parts(squares([square(2, 2, 8), square(11.1, 2, 8)]), 4)) == 4
+
+
+def test_small_shapes_stay_as_they_are() -> None:
+    scene = mixed_scene(seed=3)
+    assert in_parts(scene) is scene
+    empty = scene.take(np.zeros(0, np.intp))
+    assert in_parts(empty) is empty
+
+
+def test_filled_and_stroked_shapes_stay_whole() -> None:
+    scene = squares(GRID).take(np.array([1, 1]))
+    twins = replace(scene, twin=np.array([0, 1], np.int32), kind=np.array([Kind.FILL, Kind.STROKE], np.int32))
+    assert in_parts(twins, 8) is twins
+
+
+def test_files_have_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = squares([*GRID, *HOLES])
+    assert write_svg(scene, per_pixel=10).count("<path") == 3
+    monkeypatch.setattr(in_parts, "__defaults__", (40,))
+    text = write_svg(scene, per_pixel=10, ids=True)
+    assert text.count("<path") == 5
+    names = re.findall(r'<path[^>]* id="([^"]*)"', text)
+    assert len(set(names)) == 5

@@ -1,0 +1,113 @@
+"""The examples run, and what they fit gets better."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+import warpsplat
+from tests import ROOT
+
+EXAMPLES = ROOT / "examples"
+STEPS = 25
+CURVES = 12
+
+
+@pytest.fixture(scope="module")
+def cat(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The picture that the examples use, at 48 px."""
+    path = tmp_path_factory.mktemp("examples") / "cat.png"
+    image = cv2.imread(str(ROOT / "docs/images/cat.jpg"))
+    assert image is not None
+    height, width = image.shape[:2]
+    cv2.imwrite(str(path), cv2.resize(image, (48, 48 * height // width), interpolation=cv2.INTER_AREA))
+    return str(path)
+
+
+def example(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", ["own_loss", "painterly", "masked_strokes"])
+def test_an_image_is_fitted(name: str, cat: str, tmp_path: Path) -> None:
+    losses = example(name).main(cat, str(tmp_path / "a.svg"), STEPS, curves=CURVES)
+    assert len(losses) == STEPS
+    assert losses[-1] < 0.9 * losses[0]
+    assert warpsplat.load_svg(tmp_path / "a.svg").canvas.width == 48
+
+
+def test_strokes_keep_to_a_mask_from_a_file(cat: str, tmp_path: Path) -> None:
+    mask = tmp_path / "mask.png"
+    height, width = warpsplat.load_image(cat).shape[:2]
+    white = np.zeros((height, width), np.uint8)
+    white[4:, 4 : width // 2 + 1] = 255
+    cv2.imwrite(str(mask), white)
+    example("masked_strokes").main(cat, str(tmp_path / "a.svg"), 40, str(mask))
+    opacity = warpsplat.render(tmp_path / "a.svg")[..., 3]
+    assert opacity[6:-6, 8 : width // 2 - 4].mean() > 0.5
+    assert opacity[:, width // 2 + 6 :].mean() < 0.1
+
+
+def test_two_pictures_are_morphed(cat: str, tmp_path: Path) -> None:
+    other = tmp_path / "other.png"
+    Image.open(cat).transpose(Image.Transpose.FLIP_TOP_BOTTOM).save(other)
+    errors = example("morph").main(cat, str(other), str(tmp_path / "a.webp"), STEPS, 40)
+    assert max(errors) < 0.03
+    with Image.open(tmp_path / "a.webp") as moving:
+        assert getattr(moving, "n_frames", 1) == 24
+
+
+def test_a_network_compares(cat: str, tmp_path: Path) -> None:
+    torch.manual_seed(3)
+    sizes = [3, 4, 4, 6, 6, 8, 8, 8]
+    state: dict[str, Any] = {}
+    for i, (before, after) in enumerate(pairwise(sizes)):
+        state[f"features.{2 * i}.weight"] = torch.randn(after, before, 3, 3) / before**0.5
+        state[f"features.{2 * i}.bias"] = torch.zeros(after)
+    torch.save(state, tmp_path / "weights.pth")
+    path = str(tmp_path / "weights.pth")
+    losses = example("perceptual_loss").main(cat, str(tmp_path / "a.svg"), path, STEPS, CURVES)
+    assert losses[-1] < 0.8 * losses[0]
+
+
+def test_the_notebook_runs(cat: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its cells, with stand-ins for what shows pictures."""
+    shown: list[object] = []
+    handle = SimpleNamespace(display=shown.append, update=shown.append)
+    display = ModuleType("IPython.display")
+    display.__dict__.update(SVG=shown.append, Image=bytes, DisplayHandle=lambda: handle)
+    monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    cells = json.loads((EXAMPLES / "live.ipynb").read_text())["cells"]
+    scope: dict[str, Any] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]
+            exec("".join(cell["source"]), scope)
+            if "SOURCE" in scope and scope["SOURCE"] != cat:
+                scope.update(SOURCE=cat, STEPS=20)
+    assert len(shown) == 4
+    assert scope["losses"][-1] < scope["losses"][0]
+    assert str(shown[-1]).startswith("<svg")
+
+
+def test_all_examples_are_listed() -> None:
+    names = {path.name for path in EXAMPLES.iterdir() if path.suffix in {".py", ".ipynb"}}
+    listed = (EXAMPLES / "README.md").read_text()
+    assert all(f"`{name}`" in listed for name in names)

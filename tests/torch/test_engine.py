@@ -1,0 +1,112 @@
+"""Renderers that are kept: as few as needed, no more than allowed, for ever."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from tests.scenes import random_scene, styled_scene
+from warpsplat.rendering import kernel_cache
+from warpsplat.scene import Cap, Join, Kind, Scene
+from warpsplat.torch import SceneTensors, clear_cache, engine, render
+
+
+def step(scene: Scene, width: int = 40) -> torch.Tensor:
+    tensors = SceneTensors.of(scene, requires_grad=True)
+    loss = render(tensors, width).square().sum()
+    loss.backward()
+    return loss.detach()
+
+
+def live(kind: type) -> int:
+    gc.collect()
+    return sum(type(each) is kind for each in gc.get_objects())  # others dislike being asked
+
+
+@pytest.fixture(autouse=True)
+def empty() -> None:
+    clear_cache()
+
+
+def test_scenes_of_one_structure_share_a_renderer() -> None:
+    scene = random_scene(Kind.FILL)
+    for by in range(4):
+        step(replace(scene, points=scene.points + np.float32(by), first=scene.first.copy()))
+    assert live(engine.Engine) == 1
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        lambda scene: random_scene(Kind.STROKE),
+        lambda scene: replace(scene, rule=1 - scene.rule),
+        lambda scene: replace(scene, canvas=replace(scene.canvas, background=np.zeros(3, np.float32))),
+        lambda scene: replace(scene, canvas=replace(scene.canvas, width=39)),
+        lambda scene: replace(scene, cap=scene.cap + 1),
+    ],
+)
+def test_another_structure_has_a_renderer_of_its_own(other: object) -> None:
+    assert callable(other)
+    scene = random_scene(Kind.FILL)
+    changed = other(scene)
+    images = [render(SceneTensors.of(each)) for each in (scene, changed, scene)]
+    assert torch.equal(images[0], images[2])
+    assert live(engine.Engine) == 2
+
+
+def test_patterns_of_dashes_belong_to_the_structure() -> None:
+    scene = styled_scene(Cap.BUTT, Join.BEVEL, 1)
+    first = step(scene)
+    other = replace(scene, dashes=tuple((offset, 2.0, 9.0) for offset, *_ in scene.dashes))
+    assert step(other) != first
+    assert step(scene) == first
+
+
+def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    step(random_scene(Kind.FILL, 2))
+    monkeypatch.setattr(kernel_cache, "_wait_for", None)  # what compiles
+    monkeypatch.setattr(engine, "KEPT", 3)
+    tensors = []
+    for counts in (range(3, 8), range(8, 13)):
+        for count in counts:
+            step(random_scene(Kind.FILL, count))
+        assert live(engine.Engine) == 3
+        tensors.append(live(torch.Tensor))
+    assert tensors[0] == tensors[1]
+
+
+def test_little_memory_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "KEPT_BYTES", 1)
+    for count in (2, 3, 4):
+        step(random_scene(Kind.FILL, count))
+    assert live(engine.Engine) == 1
+
+
+def test_the_bytes_are_counted_and_grow_with_the_picture() -> None:
+    scene = random_scene(Kind.FILL, 2)
+    step(scene)
+    step(scene, 800)
+    small, large = (each.bytes for each in engine.ENGINES._kept.values())
+    assert 50_000 < small < large / 20
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks the system for the size of the process")
+def test_many_steps_need_no_more_memory() -> None:
+    """Images of a quarter of a megabyte, and their gradients: one kept in five would be seen."""
+
+    def resident() -> int:
+        with open("/proc/self/statm", encoding="ascii") as sizes:
+            return int(sizes.read().split()[1]) * 4096
+
+    scene = random_scene(Kind.FILL, 3, 128, 128)
+    for _ in range(30):
+        step(scene, 128)
+    before = resident()
+    for _ in range(80):
+        step(scene, 128)
+    assert resident() - before < 4e6

@@ -1,0 +1,112 @@
+"""Gradients through torch against float64 autograd, for all shapes, paints and models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from tests.scenes import (
+    contours_scene,
+    mixed_scene,
+    random_scene,
+    styled_scene,
+    with_gradients,
+    with_two_stops,
+)
+from tests.torch.helpers import compare
+from warpsplat.scene import Canvas, Cap, Join, Kind, Rule, Scene
+from warpsplat.torch import SceneTensors, render
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "fills": lambda: random_scene(Kind.FILL),
+    "strokes": lambda: random_scene(Kind.STROKE),
+    "mixed": lambda: mixed_scene(seed=1).take(np.arange(6)),
+    "holes": lambda: contours_scene(Kind.FILL, Rule.EVENODD),
+    "styled": lambda: styled_scene(Cap.SQUARE, Join.MITER),
+    "dashed": lambda: styled_scene(Cap.BUTT, Join.BEVEL, 1),
+    "gradients": lambda: with_gradients(mixed_scene(seed=2).take(np.arange(6))),
+    "ramps": lambda: with_two_stops(random_scene(Kind.FILL, 5, seed=3)),
+}
+
+
+def clear(scene: Scene) -> Scene:
+    return replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact(name: str) -> None:
+    compare(SCENES[name](), tolerance=3e-3 if name in ("styled", "dashed") else 1e-3)
+
+
+def test_transparent_canvas() -> None:
+    compare(clear(SCENES["mixed"]()), scale=1.2)
+
+
+@pytest.mark.parametrize(("name", "transparent"), [("mixed", False), ("holes", False), ("gradients", True)])
+def test_opacities_of_one(name: str, transparent: bool) -> None:
+    """What lies behind an opaque shape has no gradient, but says what the shape's opacity is worth."""
+    scene = SCENES[name]()
+    opacities = np.where(np.arange(len(scene)) % 3 == 1, scene.opacities, 1).astype(np.float32)
+    scene = replace(scene, opacities=opacities)
+    compare(clear(scene) if transparent else scene)
+
+
+def test_opaque_splats() -> None:
+    scene = mixed_scene(seed=0, splines=False)
+    compare(replace(scene, opacities=np.ones_like(scene.opacities)), "splat")
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_opaque_shapes_behind_one_another(kind: Kind) -> None:
+    """Three in one place: the front one is seen, the next one says what its opacity is worth."""
+    one = random_scene(kind, 1, seed=2)
+    scene = replace(one.append(one).append(one), opacities=np.ones(3, np.float32))
+    scene = replace(scene, widths=np.full(3, 30 if kind == Kind.STROKE else 0, np.float32))
+    scene.colors[:] = np.eye(3)
+    found = compare(scene)
+    opacities, colors = found.values["opacities"].grad, found.values["colors"].grad
+    assert opacities is not None and colors is not None
+    assert opacities[2] != 0
+    assert abs(colors[2]).max() > 0
+
+
+def test_splats() -> None:
+    compare(mixed_scene(seed=0, splines=False), "splat")
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_soft_gaussians(kind: Kind) -> None:
+    scene = random_scene(kind, 3, seed=7)
+    fades = np.random.default_rng(0).uniform(-0.35, 0.04, (3, 3)) * (kind == Kind.STROKE)
+    compare(replace(scene, fades=fades.astype(np.float32)), "gaussian", tolerance=2e-3)
+
+
+def test_only_what_is_asked_for_is_found_and_it_is_the_same() -> None:
+    scene = with_gradients(mixed_scene(seed=2))
+    whole = SceneTensors.of(scene, requires_grad=True)
+    render(whole).square().sum().backward()
+    for name in ("points", "frames", "stop_colors"):
+        some = SceneTensors.of(scene)
+        some.values[name].requires_grad_()
+        render(some).square().sum().backward()
+        assert [key for key, value in some.values.items() if value.grad is not None] == [name]
+        torch.testing.assert_close(some.values[name].grad, whole.values[name].grad, rtol=0, atol=0)
+
+
+def test_through_what_made_the_attributes() -> None:
+    """A tensor that is no leaf, and a view that is not contiguous."""
+    scene = random_scene(Kind.FILL, 4)
+    shift = torch.zeros(2, dtype=torch.float32, requires_grad=True)
+    colors = torch.tensor(scene.colors.T.copy(), requires_grad=True)
+    values = {"points": torch.tensor(scene.points) + shift, "colors": colors.T}
+    render(SceneTensors(scene, values)).square().sum().backward()
+    whole = SceneTensors.of(scene, requires_grad=True)
+    render(whole).square().sum().backward()
+    points = whole.values["points"].grad
+    assert points is not None and shift.grad is not None and colors.grad is not None
+    torch.testing.assert_close(shift.grad, points.sum(dim=0), rtol=1e-4, atol=1e-3)
+    torch.testing.assert_close(colors.grad.T, whole.values["colors"].grad, rtol=0, atol=0)

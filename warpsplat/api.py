@@ -1,0 +1,491 @@
+"""The library: what ``import warpsplat`` offers, and what the commands are made of.
+
+Nothing is printed and no file is written unless asked for. Functions may be called from several threads: on a
+CPU they run side by side, on a GPU one after the other. Warp starts with the first call.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.errors import ImageError, UsageError
+from warpsplat.files.output import write_svg_text
+from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
+from warpsplat.fit.export import export
+from warpsplat.fit.loop import Progress
+from warpsplat.fit.place import grid_scene
+from warpsplat.fit.rounding import finest
+from warpsplat.fit.settings import Painting, Quality, Renderer, Settings, Subject, make_settings
+from warpsplat.fit.step import model_for
+from warpsplat.jobs.options import settings_from
+from warpsplat.jobs.refine import refine as refine_scene
+from warpsplat.jobs.render import RendererName, drawn
+from warpsplat.jobs.vectorize import Result, load_target, vectorize_image
+from warpsplat.metrics import Score, score_svg
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.rendering.renderer import render_into
+from warpsplat.rendering.turns import turn
+from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.write import minified
+
+SvgSource = str | os.PathLike[str] | bytes | Readable
+"""An SVG: its text (a string with a ``<`` in it), its file's path, its bytes, or a file open for reading;
+gzipped or not."""
+
+Callback = Callable[[Progress], bool | None]
+"""Called with each report of a run; one that returns True ends it with the shapes as they are."""
+
+
+def vectorize(
+    image: ImageSource,
+    curves: int | None = None,
+    *,
+    subject: Subject | None = None,
+    closed: bool | None = None,
+    open: bool | None = None,
+    mixed: bool | None = None,
+    quality: Quality | None = None,
+    renderer: Renderer | None = None,
+    paint: Painting | None = None,
+    layered: bool | None = None,
+    levels: Sequence[int] | str | None = None,
+    colors: int | None = None,
+    palette: Sequence[str] | str | None = None,
+    opaque: bool | None = None,
+    iterations: int | None = None,
+    target_psnr: float | None = None,
+    time_budget: float | str | None = None,
+    max_bytes: int | str | None = None,
+    seed: int | None = None,
+    background: str | None = None,
+    title: str | None = None,
+    size: str | None = None,
+    page: str | None = None,
+    units: str | None = None,
+    ids: bool | None = None,
+    minify: bool | None = None,
+    precision: int | None = None,
+    settings: Settings | None = None,
+    importance: ImageSource | None = None,
+    output: str | os.PathLike[str] | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
+    stop: Callable[[], bool] | None = None,
+    name: str | None = None,
+    keyed: bool = False,
+) -> Result:
+    """Turn an image into an SVG, and measure how good it is.
+
+    What is None is chosen as the command line chooses it; there and in the README's table of settings each is
+    explained under the same name.
+
+    Args:
+        image: a path, the bytes of an image file, a file open for reading, a Pillow image, or an array of
+            shape (height, width[, channels]) of uint8, uint16, bool, or floats in [0, 1].
+        curves: number of shapes; of drawings and with a goal, the most.
+        subject: what the image shows: ``auto``, ``photo``, ``drawing``, ``line`` or ``pixel``.
+        closed: filled shapes, the default ...
+        open: ... or strokes.
+        mixed: fills, and strokes where they remove more error.
+        quality: effort: ``draft``, ``balanced`` or ``high``.
+        renderer: model of coverage while training: ``exact``, ``splat`` or ``gaussian``.
+        paint: ``flat`` colours, ``linear`` or ``radial`` gradients, or ``auto``.
+        layered: groups from coarse to fine, each with those before it a picture of its own.
+        levels: shapes up to the end of each of these groups.
+        colors: most different colours.
+        palette: the only colours, ``#rrggbb``; or a file with them.
+        opaque: no translucent shapes.
+        iterations: steps, in place of the effort's.
+        target_psnr: the smallest file that has this [dB].
+        time_budget: seconds, or ``"2m"``.
+        max_bytes: the best file within this size, or ``"100KB"``.
+        seed: of random numbers.
+        background: ``auto``, ``none`` or ``#rrggbb``.
+        title: of the picture.
+        size: that line art fills, ``"200x150mm"``.
+        page: its sheet, ``"a4"``.
+        units: of the file's size.
+        ids: name paths by their colours.
+        minify: smallest text.
+        precision: most decimals of a pixel in coordinates.
+        settings: all of these at once, made by ``make_settings``; none of the others may be given then.
+        importance: mask of the image's proportions, in any of the image's forms: how much errors count.
+        output: file to write the SVG to, before it is measured; ``-`` is the standard output.
+        device: ``auto``, ``cpu``, ``cuda`` or ``cuda:N``.
+        threads: of a CPU, default one a core; they do not change the result.
+        callback: see ``Callback``.
+        stop: asked after every step; once true, the shapes as they are make the file.
+        name: how messages call the image; default: its file's name.
+        keyed: mark the file with what it was made of, by which batches know it.
+
+    Returns:
+        the SVG, its scene, its score and the run's history.
+
+    Raises:
+        UsageError: a setting or device that cannot be used as given.
+        ImageError: an image or mask that cannot be read.
+        OutputError: ``output`` cannot be written.
+        ResourceError: memory, threads, or a place for compiled kernels are missing.
+        TypeError: an image of none of these forms.
+    """
+    given = {
+        "curves": curves,
+        "subject": subject,
+        "kind": _kind(closed=closed, open=open),
+        "mixed": mixed,
+        "quality": quality,
+        "renderer": renderer,
+        "paint": paint,
+        "layered": layered,
+        "levels": levels if levels is None or isinstance(levels, str) else ",".join(map(str, levels)),
+        "colors": colors,
+        "palette": palette if palette is None or isinstance(palette, str) else ",".join(palette),
+        "opaque": opaque,
+        "iterations": iterations,
+        "target_psnr": target_psnr,
+        "time_budget": time_budget,
+        "max_bytes": max_bytes,
+        "seed": seed,
+        "background": background,
+        "title": title,
+        "size": size,
+        "page": page,
+        "units": units,
+        "ids": ids,
+        "minify": minify,
+        "precision": precision,
+    }
+    if settings is None:
+        settings = settings_from(given)
+    elif others := [key for key, value in given.items() if value is not None]:
+        raise UsageError(f"settings are given, and {others[0]} besides")
+    watch = _Watch(callback, stop)
+    with _backend(device, threads) as backend:
+        return vectorize_image(
+            image,
+            settings,
+            backend,
+            output=None if output is None else Path(output),
+            name=name,
+            importance=importance,
+            keyed=keyed,
+            report=watch.report,
+            stop=watch.stop,
+        )
+
+
+def refine(
+    svg: SvgSource,
+    image: ImageSource,
+    *,
+    iterations: int = 200,
+    time_budget: float | str | None = None,
+    precision: int | None = None,
+    title: str | None = None,
+    ids: bool | None = None,
+    minify: bool | None = None,
+    background: str | None = None,
+    keep: bool = False,
+    settings: Settings | None = None,
+    output: str | os.PathLike[str] | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
+    stop: Callable[[], bool] | None = None,
+    name: str | None = None,
+) -> Result:
+    """Improve the paths of any SVG against an image by gradient descent; none is added.
+
+    Args:
+        svg: a string with a ``<`` in it is the SVG's text, any other its path; or bytes, or an open file.
+        image: as for ``vectorize``.
+        iterations: steps.
+        keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
+        name: how messages call the SVG.
+        time_budget: as for ``vectorize``, as is all that follows.
+        precision: see there.
+        title: see there.
+        ids: see there.
+        minify: see there.
+        background: see there.
+        settings: in place of all of them.
+        output: see there.
+        device: see there.
+        threads: see there.
+        callback: see there.
+        stop: see there.
+
+    Returns:
+        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better
+        was found.
+
+    Raises:
+        UsageError, ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``; an SVG that
+            cannot be read, or held, is an ``ImageError``.
+    """
+    settings = settings or make_settings(
+        iterations=iterations,
+        time_budget=time_budget,
+        precision=precision,
+        title=title,
+        ids=ids,
+        minify=minify,
+        background=background,
+    )
+    name = name or _svg_name(svg)
+    text = _text(svg, name)
+    target = load_target(image, None, settings.background)
+    watch = _Watch(callback, stop)
+    with _backend(device, threads) as backend:
+        result = refine_scene(
+            text,
+            target,
+            settings,
+            backend,
+            name=name,
+            keep=keep,
+            report=watch.report,
+            stop=watch.stop,
+        )
+    if output is not None:
+        write_svg_text(Path(output), result.svg)
+    return result
+
+
+def render(
+    scene: Scene | SvgSource,
+    width: int | None = None,
+    height: int | None = None,
+    *,
+    scale: float | None = None,
+    renderer: RendererName = "exact",
+    device: str = "auto",
+    threads: int | None = None,
+) -> FloatArray:
+    """Draw a scene or an SVG.
+
+    Args:
+        scene: what to draw.
+        width: [px]; the canvas, or the SVG's own size, is scaled to it.
+        height: [px]; without one of the two the other says the size.
+        scale: magnification, in place of both.
+        renderer: ``exact`` coverage, ``splat`` or (scenes only) ``gaussian``; ``viewer`` is resvg.
+        device: where to compute, see ``vectorize``.
+        threads: see there.
+
+    Returns:
+        sRGB in [0, 1] premultiplied by opacity, and opacity, shape (height, width, 4). ``to_pillow`` makes an
+        image of 8 bits of it.
+
+    Raises:
+        UsageError: sizes of other proportions than the scene's, or of no pixel.
+        ImageError: an SVG that cannot be read, or not by this renderer.
+    """
+    if not isinstance(scene, Scene):
+        text = _text(scene, _svg_name(scene))
+        own = svg_size(inspect_svg(text).root)
+        if own is None:
+            raise ImageError(f"{_svg_name(scene)}: says neither its size nor a viewBox")
+        zoom = _zoom(own, width, height, scale)
+        with _backend(device, threads) as backend:
+            return _with_opacity(drawn(text, renderer, zoom, backend))
+    size = (scene.canvas.width, scene.canvas.height)
+    zoom = _zoom(size, width, height, scale)
+    if renderer == "viewer":
+        return render(save_svg(scene), scale=zoom, renderer="viewer")
+    viewport = Viewport(width or max(1, round(size[0] * zoom)), height or max(1, round(size[1] * zoom)), zoom)
+    with _backend(device, threads) as backend:
+        model = model_for(Settings(renderer=renderer), 0)
+        return _with_opacity(render_into(scene, viewport, model=model, backend=backend))
+
+
+def load_image(image: ImageSource) -> FloatArray:
+    """An image as it is fitted: upright, sRGB in [0, 1], shape (height, width, 3), float32; with opacity
+    premultiplied by it, shape (height, width, 4).
+
+    Args:
+        image: as for ``vectorize``.
+
+    Raises:
+        ImageError: it cannot be read.
+    """
+    return image_of(image)
+
+
+def starting_scene(
+    image: ImageSource, curves: int = 128, *, open: bool = False, seed: int = 0, background: str = "auto"
+) -> Scene:
+    """Shapes to begin a fit of your own with: a loose grid over the canvas, in the colours of the image.
+
+    Args:
+        image: as for ``vectorize``.
+        curves: number of shapes.
+        open: strokes of three cubics in place of filled rings of quadratics.
+        seed: of random numbers.
+        background: as for ``vectorize``.
+
+    Raises:
+        UsageError: a value out of range.
+        ImageError: the image cannot be read.
+    """
+    settings = make_settings(
+        curves=curves, kind=_kind(closed=None, open=open), seed=seed, background=background
+    )
+    target = load_target(image, None, background)
+    return grid_scene(settings, target, curves, np.random.default_rng(seed))
+
+
+def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
+    """The paths of any SVG as a scene, at the SVG's own size.
+
+    Args:
+        svg: as for ``refine``.
+        keep: hold text, images, filters ... as pictures, which are drawn and written as they are.
+
+    Raises:
+        ImageError: not an SVG, one without a size or without paths, or one with something that a scene
+            cannot hold.
+    """
+    name = _svg_name(svg)
+    text = _text(svg, name)
+    try:
+        size = svg_size(inspect_svg(text).root)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+    if size is None:
+        raise ImageError(f"{name}: says neither its size nor a viewBox")
+    width, height = (max(1, math.floor(side + 0.5)) for side in size)
+    if keep:
+        kept = load_kept(text, width, height, name)
+        scene, has_background = kept.scene, kept.has_background
+    else:
+        scene, has_background = load_scene(text, width, height, name)
+    return scene if has_background else replace(scene, canvas=replace(scene.canvas, background=None))
+
+
+def save_svg(
+    scene: Scene,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    precision: int | None = None,
+    title: str = "",
+    ids: bool = False,
+    minify: bool = False,
+) -> str:
+    """The SVG of a scene, written to ``path`` where one is given, which is replaced in one step.
+
+    Args:
+        scene: what to write.
+        path: one that ends in ``.svgz`` is gzipped.
+        precision: decimals of a pixel in coordinates; default: a grid of an eighth of a pixel.
+        title: as for ``vectorize``, as are ``ids`` and ``minify``.
+        ids: see there.
+        minify: see there.
+
+    Raises:
+        UsageError: a value out of range.
+        OutputError: ``path`` cannot be written.
+    """
+    settings = make_settings(precision=precision, title=title, ids=ids)
+    text = export(scene, settings, finest(settings))
+    text = minified(text) if minify else text
+    if path is not None:
+        write_svg_text(Path(path), text)
+    return text
+
+
+def score(svg: SvgSource, image: ImageSource) -> Score:
+    """How well an SVG, as a viewer shows it at the image's size, shows the image, and what it is made of.
+
+    Where the image has opacity, on black and on white, and the lower figures count.
+
+    Raises:
+        ImageError: either cannot be read, or their proportions differ.
+    """
+    name = _svg_name(svg)
+    target = image_of(image)
+    try:
+        return score_svg(_text(svg, name), target)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+
+
+def _kind(*, closed: bool | None, open: bool | None) -> Kind | None:
+    if closed and open:
+        raise UsageError("closed and open do not go together")
+    if open or closed is False:
+        return Kind.STROKE
+    return Kind.FILL if closed else None
+
+
+class _Watch:
+    """What a run reports to, and what it asks whether to go on."""
+
+    def __init__(self, callback: Callback | None, stop: Callable[[], bool] | None) -> None:
+        self._callback, self._stop, self._enough = callback, stop, False
+
+    def report(self, progress: Progress) -> None:
+        if self._callback and self._callback(progress) is True:
+            self._enough = True
+
+    def stop(self) -> bool:
+        return self._enough or bool(self._stop and self._stop())
+
+
+@contextmanager
+def _backend(device: str, threads: int | None) -> Iterator[Backend]:
+    """The backend of a piece of work, with the right to use it."""
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        raise UsageError(f"threads must be a whole number from 1, not {threads!r}")
+    start_warp()
+    backend = Backend.on(choose_device(device), threads)
+    with turn(backend.device):
+        yield backend
+
+
+def _svg_name(svg: object) -> str:
+    return "the SVG" if isinstance(svg, str) and "<" in svg else source_name(svg, "the SVG")
+
+
+def _text(svg: SvgSource, name: str) -> str:
+    if isinstance(svg, str) and "<" in svg:
+        return svg
+    if not isinstance(svg, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
+        raise TypeError(f"an SVG is its text, a path, bytes or a file, not {type(svg).__name__}")
+    return svg_text(source_bytes(svg, "an SVG"), name)
+
+
+def _zoom(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:
+    """Pixels per unit of something of ``size`` that is drawn with this width, height or scale."""
+    if scale is not None and (width is not None or height is not None):
+        raise UsageError("a scale, and a width or height besides")
+    for what, side in (("width", width), ("height", height)):
+        if side is not None and (isinstance(side, bool) or int(side) != side or side < 1):
+            raise UsageError(f"{what} must be a whole number from 1, not {side!r}")
+    if scale is not None:
+        if not (math.isfinite(scale) and scale > 0):
+            raise UsageError(f"scale must be a positive number, not {scale}")
+        return scale
+    if width is None and height is None:
+        return 1.0
+    zoom = width / size[0] if width is not None else (height or 1) / size[1]
+    if width is not None and height is not None and abs(size[1] * zoom - height) >= 1:
+        raise UsageError(f"{width}x{height} px have not the proportions of {size[0]:g}x{size[1]:g}")
+    return zoom
+
+
+def _with_opacity(image: npt.NDArray[np.float32]) -> FloatArray:
+    return image if image.shape[2] == 4 else np.concatenate([image, np.ones_like(image[..., :1])], axis=2)

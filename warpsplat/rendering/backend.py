@@ -1,0 +1,125 @@
+"""Where kernels run: device, CPU threads, division of tiles; and the arrays of a stage."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.tiles import tile_counts
+
+Buffers = TypeVar("Buffers")
+
+THREADS_PER_CORE = 8
+"""Most threads that a split launch is cut for: more only wait, and cost memory for pieces and stacks."""
+
+
+def available_cores() -> int:
+    """CPU cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # macOS, Windows
+        return os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Viewport:
+    """The picture that is rendered."""
+
+    width: int
+    """[px]"""
+    height: int
+    """[px]"""
+    scale: float = 1.0
+    """[px a canvas unit]"""
+
+    @property
+    def tiles_x(self) -> int:
+        """Tiles in a row."""
+        return tile_counts(self.width, self.height)[0]
+
+    @property
+    def tiles_y(self) -> int:
+        """Tiles in a column."""
+        return tile_counts(self.width, self.height)[1]
+
+    @property
+    def tile_count(self) -> int:
+        """Tiles in all."""
+        return self.tiles_x * self.tiles_y
+
+    @property
+    def pixel_count(self) -> int:
+        """Pixels in all."""
+        return self.width * self.height
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A device and how work is divided on it. The result does not depend on ``threads``."""
+
+    device: wp.Device
+    threads: int
+    """CPU threads that share a launch; 1 on a GPU."""
+    lanes: int
+    """Threads a tile: a GPU gives each row or column one; a CPU keeps a tile in one thread's cache."""
+
+    @staticmethod
+    def on(device: wp.Device | str | None = None, threads: int | None = None) -> Backend:
+        """The usual division on ``device`` (default: Warp's).
+
+        ``threads``: of a CPU, default one a core, THREADS_PER_CORE a core at most.
+        """
+        chosen = wp.get_device(device)
+        if chosen.is_cpu:
+            cores = available_cores()
+            return Backend(chosen, max(1, min(threads or cores, THREADS_PER_CORE * cores)), 1)
+        return Backend(chosen, 1, constants.TILE)
+
+    @property
+    def lane_size(self) -> int:
+        """Rows or columns of a tile that a lane handles."""
+        return constants.TILE // self.lanes
+
+    def program(self, stage: str = "") -> Program:
+        """An empty program for this backend."""
+        return Program(self.device, self.threads, stage)
+
+    def array(self, dtype: Any, *shape: int) -> wp.array:
+        """A zeroed array."""
+        return wp.zeros(shape, dtype=dtype, device=self.device)
+
+    def allocate(self, buffers: type[Buffers], sizes: Mapping[str, int]) -> Buffers:
+        """Zeroed arrays for all fields of a dataclass made of ``buffer`` fields.
+
+        Args:
+            buffers: the dataclass.
+            sizes: what the names of dimensions stand for.
+        """
+        arrays: dict[str, wp.array] = {}
+        for item in fields(buffers):  # type: ignore[arg-type]
+            dtype, dimensions, memory = (item.metadata[key] for key in ("dtype", "dimensions", "memory_of"))
+            shape = tuple(sizes[d] if isinstance(d, str) else d for d in dimensions)
+            arrays[item.name] = view(arrays[memory], dtype, shape) if memory else self.array(dtype, *shape)
+        return buffers(**arrays)
+
+
+def buffer(dtype: Any, *dimensions: str | int, memory_of: str = "") -> Any:
+    """A field of a dataclass of device arrays.
+
+    Args:
+        dtype: of the elements.
+        dimensions: numbers, or names that ``Backend.allocate`` is given the sizes of.
+        memory_of: an earlier field whose memory this one reads as another type.
+    """
+    return field(metadata={"dtype": dtype, "dimensions": dimensions, "memory_of": memory_of})
+
+
+def view(array: wp.array, dtype: Any, shape: tuple[int, ...]) -> wp.array:
+    """The same memory as ``array``, read as ``shape`` elements of ``dtype``."""
+    return wp.array(ptr=array.ptr, dtype=dtype, shape=shape, device=array.device, copy=False)

@@ -1,0 +1,99 @@
+"""The binning stage: which shapes cover which tiles, front to back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpsplat.kernels import bins
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.ranges import record_ranges
+
+
+@dataclass
+class BinBuffers:
+    """What the stage owns. A slot is one (shape, tile) pair."""
+
+    shape_tiles: wp.array = buffer(wp.int32, "shapes", 4)
+    """Rectangle of tiles of each shape: x0, y0, x1, y1, ends excluded."""
+    front_slots: wp.array = buffer(wp.int32, "shapes")
+    front_ends: wp.array = buffer(wp.int32, "shapes")
+    slot_first: wp.array = buffer(wp.int32, "shapes")
+    slot_last: wp.array = buffer(wp.int32, "shapes")
+    slot_shape: wp.array = buffer(wp.int32, "slots")
+    """-1 for those not in use."""
+    slot_tile: wp.array = buffer(wp.int32, "slots")
+    slot_state: wp.array = buffer(wp.int32, "slots")
+    """Sums of ``constants.COVERED``, ``UNCOVERED`` and ``HIDDEN``."""
+    sort_keys: wp.array = buffer(wp.int32, "sorted")
+    """The second half of both is the sort's scratch memory."""
+    sort_slots: wp.array = buffer(wp.int32, "sorted")
+    tile_first: wp.array = buffer(wp.int32, "tiles")
+    tile_last: wp.array = buffer(wp.int32, "tiles")
+    tile_stop: wp.array = buffer(wp.int32, "tiles")
+    """End of a tile's visible slots in the two lists."""
+    list_slot: wp.array = buffer(wp.int32, "slots")
+    list_paint: wp.array = buffer(wp.vec4, "slots")
+
+
+class Bins:
+    """Each tile's list of slots, sorted front to back."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        capacity: int,
+        needed: wp.array,
+        *,
+        most: float = 1.0,
+    ) -> None:
+        """``most``: of an opacity, where it decides whether what lies behind is seen."""
+        self._most = most
+        self._parameters, self._viewport = parameters, viewport
+        self._capacity, self._needed = capacity, needed
+        self.paint: dict[str, wp.array] = {}
+        """Arrays that the lists read in place of the parameters' of these names."""
+        sizes = {
+            "shapes": parameters.shape_count,
+            "slots": capacity,
+            "sorted": 2 * capacity,
+            "tiles": viewport.tile_count,
+        }
+        self.buffers = backend.allocate(BinBuffers, sizes)
+
+    def forward(self, program: Program, samples: dict[str, Any]) -> None:
+        """Record samples -> slots, and each tile's range of them."""
+        b, shapes, tiles = self.buffers, self._parameters.shape_count, self._viewport.tile_count
+        program.launch(bins.rectangles, shapes, b, samples, self._viewport, split=True)
+        record_ranges(
+            program,
+            b.front_slots,
+            b.front_ends,
+            b.slot_first,
+            b.slot_last,
+            self._needed,
+            capacity=self._capacity,
+            reverse=True,
+        )
+        program.launch(bins.fill_slots, self._capacity, b, self._viewport, split=True)
+        program.call(wp.utils.radix_sort_pairs, b.sort_keys, b.sort_slots, self._capacity)
+        program.launch(bins.clear_ranges, tiles, b)
+        program.launch(bins.tile_ranges, self._capacity, b, slot_capacity=self._capacity)
+
+    def list_visible(self, program: Program) -> None:
+        """Record states of slots -> each tile's list of those that are seen."""
+        program.launch(
+            bins.list_visible,
+            self._viewport.tile_count,
+            self.buffers,
+            self._parameters.arrays,
+            most=self._most,
+            split=True,
+            **self.paint,
+        )

@@ -1,0 +1,265 @@
+"""The coverage stage: how much of each pixel a shape covers, and the adjoint.
+
+Two models fill the same arrays: the area that a viewer computes for a path, and the paper's Gaussians.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.coverage import fill, splat, stroke
+from warpsplat.kernels.tile import column
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.grid import Grid
+from warpsplat.rendering.outline import Outline
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+
+
+@dataclass
+class CoverageBuffers:
+    """What every model owns: a tile of floats a slot, as columns and, in the same memory, as pixels."""
+
+    coverage: wp.array = buffer(column, "slots", constants.TILE)
+    """After the adjoint of compositing, the gradient of the sum that the coverage came from."""
+    coverage_pixels: wp.array = buffer(wp.float32, "slots", constants.TILE_PIXELS, memory_of="coverage")
+
+
+@dataclass
+class FillBuffers:
+    """What fills need besides."""
+
+    slot_winding: wp.array = buffer(wp.int32, "slots")
+    """Of slots that no edge touches."""
+
+
+@dataclass
+class StrokeBuffers:
+    """What strokes need besides."""
+
+    slot_near: wp.array = buffer(wp.int32, "slots", "lanes")
+    segment: wp.array = buffer(wp.int32, "slots", constants.TILE_PIXELS)
+    """Nearest segment of each pixel."""
+
+
+class Coverage(Protocol):
+    """What compositing asks of a model."""
+
+    buffers: CoverageBuffers
+    law: int
+    """``constants.AREA`` or ``constants.PRODUCT``."""
+
+    def states(self, program: Program) -> None:
+        """Record slots -> their states, with coverages where those come first."""
+
+    def values(self, program: Program) -> None:
+        """Record visible slots -> coverages that are not there yet."""
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the samples."""
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What the parts of a coverage read and write."""
+
+    backend: Backend
+    parameters: Parameters
+    viewport: Viewport
+    outline: Outline
+    bins: Bins
+    coverage: CoverageBuffers
+    slots: int
+
+    @property
+    def sources(self) -> tuple[object, ...]:
+        """Where launches find their arrays."""
+        arrays = self.coverage, self.bins.buffers, self.outline.buffers, self.parameters.arrays
+        return (*arrays, self.viewport)
+
+
+class FillCoverage:
+    """Fills by signed area: states first, then coverages of what is seen."""
+
+    part = constants.FILL
+
+    def __init__(self, stages: Stages) -> None:
+        self._stages = stages
+        self.buffers = stages.backend.allocate(FillBuffers, {"slots": stages.slots})
+        self._sources = (*stages.sources, self.buffers)
+        self._edges = stages.outline.buffers.vertex.shape[0]
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        program.launch(fill.fill_states, self._stages.slots, *self._sources, own_part=self.part, split=True)
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``."""
+        backend = self._stages.backend
+        program.launch(
+            fill.fill_forward,
+            (self._stages.slots, backend.lanes),
+            *self._sources,
+            own_part=self.part,
+            lane_rows=backend.lane_size,
+            split=True,
+        )
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the edges' ends."""
+        program.launch(
+            fill.fill_backward,
+            self._edges,
+            *self._sources,
+            own_part=self.part,
+            sum_grad=self._stages.coverage.coverage_pixels,
+            split=True,
+        )
+
+
+class StyledCoverage(FillCoverage):
+    """Strokes as polygons, whose union is filled."""
+
+    part = constants.STYLED
+
+    def __init__(self, stages: Stages) -> None:
+        super().__init__(stages)
+        stroker = stages.outline.stroker
+        assert stroker
+        self._stroker = stroker
+        nonzero = stages.backend.array(wp.int32, stages.parameters.shape_count)
+        shapes = stages.parameters.arrays | {"rule": nonzero}
+        self._sources = (
+            stages.coverage,
+            stages.bins.buffers,
+            stroker.edges(),
+            shapes,
+            stages.viewport,
+            self.buffers,
+        )
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the centre lines and of the widths."""
+        super().backward(program)
+        self._stroker.backward(program)
+
+
+class StrokeCoverage:
+    """Round strokes by distance: states and coverages in one go."""
+
+    def __init__(self, stages: Stages) -> None:
+        self._stages = stages
+        sizes = {"slots": stages.slots, "lanes": stages.backend.lanes}
+        self.buffers = stages.backend.allocate(StrokeBuffers, sizes)
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        backend = self._stages.backend
+        program.launch(
+            stroke.stroke_forward,
+            (self._stages.slots, backend.lanes),
+            *self._stages.sources,
+            self.buffers,
+            lane_rows=backend.lane_size,
+            split=True,
+        )
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``: all are there."""
+
+    def backward(self, program: Program) -> None:
+        """Record gradients in the coverages' place -> gradients of the segments' ends and of the widths."""
+        stages = self._stages
+        program.launch(
+            stroke.stroke_backward,
+            stages.outline.buffers.vertex.shape[0],
+            *stages.sources,
+            self.buffers,
+            sum_grad=stages.coverage.coverage_pixels,
+            split=True,
+        )
+        program.launch(stroke.widths_backward, stages.parameters.shape_count, *stages.sources)
+
+
+EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
+    constants.FILL: FillCoverage,
+    constants.STROKE: StrokeCoverage,
+    constants.STYLED: StyledCoverage,
+}
+"""What covers the shapes of each of ``Parameters.parts``."""
+
+
+class ExactCoverage:
+    """The area that a viewer computes, of polylines: a part for each kind of shape that there is."""
+
+    law = constants.AREA
+
+    def __init__(
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        outline: Outline,
+        bins: Bins,
+        slots: int,
+    ) -> None:
+        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
+        self._outline = outline
+        stages = Stages(backend, parameters, viewport, outline, bins, self.buffers, slots)
+        self.parts = [EXACT_PARTS[part](stages) for part in parameters.parts]
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        for part in self.parts:
+            part.states(program)
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``."""
+        for part in self.parts:
+            part.values(program)
+
+    def backward(self, program: Program) -> None:
+        """See ``Coverage``: from the edges on to the points."""
+        for part in self.parts:
+            part.backward(program)
+        self._outline.backward(program)
+
+
+class SplatCoverage:
+    """The paper's Gaussians: 1 - product of 1 - g."""
+
+    law = constants.PRODUCT
+
+    def __init__(self, backend: Backend, grid: Grid, bins: Bins, slots: int) -> None:
+        self._backend, self._grid, self._slots = backend, grid, slots
+        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
+        self._sources = (self.buffers, bins.buffers, grid.buffers)
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        program.launch(
+            splat.splat_forward,
+            (self._slots, self._backend.lanes),
+            *self._sources,
+            lanes=self._backend.lanes,
+            split=True,
+        )
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``: all are there."""
+
+    def backward(self, program: Program) -> None:
+        """See ``Coverage``: gradients of means and conics."""
+        program.launch(
+            splat.splat_backward,
+            self._grid.buffers.mean.shape[0],
+            *self._sources,
+            sum_grad=self.buffers.coverage,
+            split=True,
+        )
+        self._grid.backward(program)

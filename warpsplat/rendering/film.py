@@ -1,0 +1,135 @@
+"""The compositing stage: lists and coverages -> image, and the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warpsplat.kernels import composite, composite_opaque, composite_paint, constants, visibility
+from warpsplat.kernels.tile import column
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.coverage import Coverage
+from warpsplat.rendering.paint import Painting
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.tiles import to_tiles
+from warpsplat.scene import Canvas
+
+
+@dataclass
+class FilmBuffers:
+    """Images by tiles: [tile, channel, column]."""
+
+    image: wp.array = buffer(column, "tiles", "planes", constants.TILE)
+    """sRGB in [0, 1]; of a transparent canvas premultiplied, and opacity."""
+    image_grad: wp.array = buffer(column, "tiles", "planes", constants.TILE)
+    inside: wp.array = buffer(column, "tiles", constants.TILE)
+    """1 for pixels of the image, 0 for the padding."""
+
+
+class Film:
+    """What the shapes are composited on."""
+
+    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas, *, opaque: bool = False) -> None:
+        """``opaque``: whether shapes of opacity 1 have gradients (``kernels.composite_opaque``)."""
+        self._opaque = opaque
+        self._backend, self._viewport = backend, viewport
+        # Premultiplied, nothing is black.
+        shown = np.zeros(3) if canvas.background is None else canvas.background
+        self._background = wp.vec3(*(float(x) for x in shown))
+        self.planes = 4 if canvas.background is None else 3
+        sizes = {"tiles": viewport.tile_count, "planes": self.planes}
+        self.buffers = backend.allocate(FilmBuffers, sizes)
+        whole = np.ones((viewport.height, viewport.width, 1), np.float32)
+        self.buffers.inside.assign(to_tiles(whole)[:, 0])
+
+    @property
+    def _dim(self) -> tuple[int, int]:
+        return self._viewport.tile_count, self._backend.lanes
+
+    def _is_plain(self, paint: Painting) -> bool:
+        """Whether all is flat and opaque behind."""
+        return self.planes == 3 and paint.is_flat
+
+    def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+        """Record lists and coverages -> ``image``."""
+        plain = self._is_plain(paint)
+        program.launch(
+            composite.composite_forward if plain else composite_paint.paint_forward,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            background=self._background,
+            split=True,
+        )
+
+    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+        """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
+        plain = self._is_plain(paint)
+        kernel = composite.composite_backward if plain else composite_paint.paint_backward
+        more = {}
+        if self._opaque:
+            kernel = composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward
+            slots = bins.buffers.list_slot.shape[0]
+            more = {
+                "background": self._background,
+                "light": self._backend.array(column, slots, self._backend.lanes),
+            }
+        program.launch(
+            kernel,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            law=coverage.law,
+            sum_grad=coverage.buffers.coverage,
+            split=True,
+            **more,
+        )
+
+    def removal_cost(
+        self,
+        program: Program,
+        bins: Bins,
+        coverage: Coverage,
+        paint: Painting,
+        target: wp.array,
+        importance: wp.array | None,
+        slot_cost: wp.array,
+    ) -> None:
+        """Record what the squared error against ``target`` would grow by without each slot."""
+        program.launch(
+            composite.removal_cost,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            target=target,
+            importance=self.buffers.inside if importance is None else importance,
+            slot_cost=slot_cost,
+            split=True,
+        )
+
+    def visibility(
+        self, program: Program, bins: Bins, coverage: Coverage, paint: Painting, seen: wp.array
+    ) -> None:
+        """Record what each pixel of a slot shows of its shape."""
+        program.launch(
+            visibility.visibility,
+            self._dim,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            seen=seen,
+            split=True,
+        )

@@ -1,0 +1,209 @@
+"""Loading compiled kernels from Warp's cache, and what to do where that is damaged or cannot be written.
+
+Warp trusts its cache: a file that was cut short or changed since makes every later run fail, or run wrong
+code. Here a file of checksums lies beside each module's files. It is written when a module is first loaded,
+so damage from before that moment is found only where the file cannot be loaded at all.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import errno
+import functools
+import hashlib
+import json
+import logging
+import os
+import shutil
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+from warpsplat.errors import ResourceError, explain
+from warpsplat.native import messages_hidden
+
+log = logging.getLogger(__name__)
+
+CHECKSUMS = "warpsplat.sha256.json"
+"""File name -> SHA-256, beside the files of a module."""
+
+LOADED = (".o", ".meta", ".cubin", ".ptx")
+"""Endings of the files that Warp loads; sources are only for reading."""
+
+_temporary: list[str] = []
+"""The folder that stands in for a cache that cannot be used, while this process lives."""
+
+
+def load(kernel: wp.Kernel, device: wp.Device) -> None:
+    """Load a kernel's module, compiled where need be. A damaged cache is made anew.
+
+    Raises:
+        ResourceError: neither the cache nor a temporary folder can hold compiled kernels.
+    """
+    module = kernel.module
+    block_dim = 1 if device.is_cpu else module.options["block_dim"]
+    if (None if device.is_cpu else device.context, block_dim) in module.execs:
+        return
+    with _loading:
+        _load(module, device, block_dim)
+
+
+_loading = threading.RLock()
+"""One thread at a time compiles or loads."""
+
+
+def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
+    """Load what is not loaded."""
+    if (None if device.is_cpu else device.context, block_dim) in module.execs:
+        return
+    failure: BaseException | None = None
+    for attempt in range(3):
+        folder = _place() / module.get_module_identifier(block_dim)
+        if (failure or damaged(folder)) and not _discard(folder) and not failure:
+            failure = OSError(errno.EROFS, "holds damaged files and cannot be written")
+        if attempt == 2 or isinstance(failure, OSError):
+            use_temporary_folder(failure)
+            folder = _place() / folder.name
+        try:
+            if folder.exists():
+                with messages_hidden():
+                    wp.load_module(module, device, block_dim=block_dim)
+            else:
+                _announce()
+                _wait_for(lambda: wp.load_module(module, device, block_dim=block_dim))
+        except Exception as error:  # Warp and its compiler raise all kinds
+            if explain(error)[0].startswith("not enough memory"):
+                raise
+            failure = error
+            module.mark_modified()  # or Warp would remember the failure
+            continue
+        _record(folder)
+        return
+    raise ResourceError(
+        f"kernel cache {wp.config.kernel_cache_dir}: kernels cannot be compiled or loaded: "
+        f"{_cause(failure)}; set WARP_CACHE_PATH to another folder"
+    ) from failure
+
+
+@functools.cache
+def _announce() -> None:
+    """Say why nothing seems to happen; a process says it once for all its modules."""
+    log.info("compiling kernels, once: some seconds")
+
+
+COMPILER = "warpsplat compiler"
+"""Name of the thread that compiles."""
+
+
+def _wait_for(work: Callable[[], None]) -> None:
+    """Do ``work`` in a thread, so that Ctrl-C need not wait until the compiler is done."""
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            work()
+        except BaseException as error:  # raised again where it is waited for
+            errors.append(error)
+
+    thread = threading.Thread(target=run, name=COMPILER, daemon=True)
+    with messages_hidden():
+        thread.start()
+        thread.join()
+    if errors:
+        raise errors[0]
+
+
+def compiling() -> bool:
+    """Whether the compiler is at work: a process that ends then must not clean up under its feet."""
+    return any(thread.name == COMPILER for thread in threading.enumerate())
+
+
+def _place() -> Path:
+    assert wp.config.kernel_cache_dir, "Warp chooses one when it starts"
+    return Path(wp.config.kernel_cache_dir)
+
+
+def _cause(failure: BaseException | None) -> str:
+    return getattr(failure, "strerror", None) or str(failure).splitlines()[0]
+
+
+def use_temporary_folder(failure: BaseException | None) -> None:
+    """Keep compiled kernels in a folder of this process, which goes with it.
+
+    Raises:
+        ResourceError: there is no place for one either.
+    """
+    if _temporary:
+        return
+    cause = _cause(failure)
+    place = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH") or "in the home folder"
+    try:
+        made = tempfile.mkdtemp(prefix="warpsplat-kernels-")
+    except OSError as error:
+        raise ResourceError(
+            f"kernel cache {place}: {cause}; set WARP_CACHE_PATH to a folder that can be written"
+        ) from error
+    log.warning(
+        "kernel cache %s: %s; kernels are compiled for this run only (WARP_CACHE_PATH names another folder)",
+        place,
+        cause,
+    )
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    _temporary.append(made)
+    wp.config.kernel_cache_dir = made
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.iterdir())
+        if path.suffix in LOADED
+    }
+
+
+def damaged(folder: Path) -> bool:
+    """Whether a module's folder holds other files than those that were loaded before."""
+    try:
+        noted = json.loads((folder / CHECKSUMS).read_bytes())
+        found = _checksums(folder)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except (OSError, ValueError):
+        return True
+    return not isinstance(noted, dict) or any(noted.get(name, sum_) != sum_ for name, sum_ in found.items())
+
+
+def _record(folder: Path) -> None:
+    """Note the checksums of what was loaded; those noted before are left as they are."""
+    with contextlib.suppress(OSError, ValueError):
+        path = folder / CHECKSUMS
+        found = _checksums(folder)
+        noted = json.loads(path.read_bytes()) if path.exists() else {}
+        if found.keys() <= noted.keys():
+            return
+        handle, name = tempfile.mkstemp(dir=folder, suffix=".tmp")
+        with os.fdopen(handle, "w") as file:
+            json.dump({**found, **noted}, file)
+        os.replace(name, path)
+
+
+def _discard(folder: Path) -> bool:
+    """Remove a module's folder; other processes may be looking, so it goes in one step.
+
+    Returns:
+        whether it is gone.
+    """
+    away = folder.with_name(f"{folder.name}.damaged-{os.getpid()}")
+    try:
+        folder.rename(away)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    shutil.rmtree(away, ignore_errors=True)
+    return True

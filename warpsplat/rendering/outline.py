@@ -1,0 +1,106 @@
+"""The outline stage: shapes -> polylines, and the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpsplat.kernels import constants, outline
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.ranges import record_ranges
+from warpsplat.rendering.stroker import Stroker
+
+
+@dataclass
+class OutlineBuffers:
+    """What the stage owns."""
+
+    bezier_vertex: wp.array = buffer(wp.int32, "beziers")
+    """First vertex of each Bézier, counted in its shape."""
+    bezier_pieces: wp.array = buffer(wp.int32, "beziers")
+    """Straight pieces of each Bézier."""
+    vertex_count: wp.array = buffer(wp.int32, "shapes")
+    vertex_ends: wp.array = buffer(wp.int32, "shapes")
+    vertex_first: wp.array = buffer(wp.int32, "shapes")
+    vertex_last: wp.array = buffer(wp.int32, "shapes")
+    vertex_shape: wp.array = buffer(wp.int32, "vertices")
+    vertex_next: wp.array = buffer(wp.int32, "vertices")
+    """Where the edge that starts at a vertex ends."""
+    vertex: wp.array = buffer(wp.vec2, "vertices")
+    """[px]"""
+    extent: wp.array = buffer(wp.vec2, "vertices")
+    """How far the shape may reach beyond the vertex [px]."""
+    start_grad: wp.array = buffer(wp.vec2, "vertices")
+    """Of the first end of the edge that starts at a vertex."""
+    end_grad: wp.array = buffer(wp.vec2, "vertices")
+    """Of its second end."""
+    half_grad: wp.array = buffer(wp.float32, "vertices")
+    """Of half a stroke's width, by edge."""
+
+
+class Outline:
+    """Flattens curves as finely as their size in pixels asks for."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        capacity: int,
+        needed: wp.array,
+        *,
+        slack: float = 1.0,
+    ) -> None:
+        """``slack``: how much further from the curves the polylines may be than ``constants.FLATNESS``."""
+        self._parameters, self._viewport = parameters, viewport
+        self._capacity, self._needed, self._slack = capacity, needed, slack
+        self.buffers = backend.allocate(
+            OutlineBuffers,
+            {"beziers": parameters.bezier_count, "shapes": parameters.shape_count, "vertices": capacity},
+        )
+        self.stroker: Stroker | None = None
+        """Of the strokes that are drawn as polygons."""
+        if constants.STYLED in parameters.parts:
+            self.stroker = Stroker(backend, parameters, viewport, self.buffers, capacity, needed)
+
+    def samples(self) -> dict[str, wp.array]:
+        """What tiles are found by: ``bins.rectangles``'s parameters."""
+        b = self.buffers
+        return {
+            "sample_first": b.vertex_first,
+            "sample_last": b.vertex_last,
+            "position": b.vertex,
+            "extent": b.extent,
+        }
+
+    def forward(self, program: Program) -> None:
+        """Record points, widths -> vertices."""
+        b, p = self.buffers, self._parameters
+        sources = (b, p.arrays, self._viewport)
+        program.launch(outline.plan_outline, p.shape_count, *sources, slack=self._slack)
+        record_ranges(
+            program,
+            b.vertex_count,
+            b.vertex_ends,
+            b.vertex_first,
+            b.vertex_last,
+            self._needed,
+            capacity=self._capacity,
+        )
+        program.launch(outline.outline_forward, p.bezier_count, *sources, split=True)
+        if self.stroker:
+            self.stroker.forward(program)
+
+    def backward(self, program: Program) -> None:
+        """Record gradients of the edges' ends -> gradients of the points."""
+        program.launch(
+            outline.outline_backward,
+            self._parameters.point_count,
+            self.buffers,
+            self._parameters.arrays,
+            self._viewport,
+            split=True,
+        )

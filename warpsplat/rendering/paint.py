@@ -1,0 +1,104 @@
+"""The paint stage: what a shape is coloured with.
+
+The forward half of flat colours is part of compositing, which waits for memory: ``kernels.paint.flat`` is
+inlined there. Gradients and pictures fill arrays that compositing reads, and replaces by their gradients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.paint import flat, gradient, picture, ramp
+from warpsplat.kernels.tile import column
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.pictures import picture_arrays
+from warpsplat.rendering.program import Program
+from warpsplat.scene import GRADIENTS, Paint
+
+
+@dataclass
+class PaintBuffers:
+    """What the stage owns."""
+
+    slot_columns: wp.array = buffer(column, "column_slots", 4)
+    """Gradients of colour (3) and opacity, where a thread has the tile."""
+    slot_grad: wp.array = buffer(wp.vec4, "lane_slots", "lanes")
+    """The same by lane, where it has not."""
+    paint_columns: wp.array = buffer(column, "paint_slots", 4, constants.TILE)
+    """Colour (3) and opacity of the pixels of slots that are not flat."""
+    paint_pixels: wp.array = buffer(
+        wp.float32, "paint_slots", 4, constants.TILE_PIXELS, memory_of="paint_columns"
+    )
+
+
+class Painting:
+    """Flat colours, gradients and pictures."""
+
+    def __init__(
+        self, backend: Backend, parameters: Parameters, viewport: Viewport, bins: Bins, slots: int
+    ) -> None:
+        self._backend, self._parameters, self._viewport, self._bins = backend, parameters, viewport, bins
+        self._slots = slots
+        self.has_gradients = bool(parameters.paints & set(GRADIENTS))
+        self._pictures = (
+            picture_arrays(parameters.pictures, viewport, backend.device)
+            if Paint.PICTURE in parameters.paints
+            else None
+        )
+        self.is_flat = not (self.has_gradients or self._pictures)
+        whole = backend.lanes == 1
+        self.buffers = backend.allocate(
+            PaintBuffers,
+            {
+                "column_slots": slots if whole else 1,
+                "lane_slots": 1 if whole else slots,
+                "lanes": backend.lanes,
+                "paint_slots": 1 if self.is_flat else slots,
+            },
+        )
+
+    def forward(self, program: Program) -> None:
+        """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
+        if self.has_gradients:
+            for kernel in (ramp.ramp_forward, gradient.gradient_forward):
+                program.launch(
+                    kernel,
+                    (self._slots, self._backend.lanes),
+                    *self._sources,
+                    lane_columns=self._backend.lane_size,
+                    split=True,
+                )
+        if self._pictures:
+            program.launch(
+                picture.picture_forward,
+                (self._slots, self._backend.lanes),
+                *self._sources,
+                self._pictures,
+                lane_columns=self._backend.lane_size,
+                split=True,
+            )
+
+    @property
+    def _sources(self) -> tuple[object, ...]:
+        return self.buffers, self._bins.buffers, self._parameters.arrays, self._viewport
+
+    def backward(self, program: Program) -> None:
+        """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
+        if self.has_gradients:
+            shapes = self._parameters.shape_count
+            for kernel in (ramp.ramp_backward, gradient.gradient_backward):
+                program.launch(kernel, shapes, *self._sources, split=True)
+        program.launch(
+            flat.flat_backward,
+            self._parameters.shape_count,
+            self.buffers,
+            self._bins.buffers,
+            self._parameters.arrays,
+            lanes=self._backend.lanes,
+            split=True,
+        )

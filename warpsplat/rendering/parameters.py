@@ -1,0 +1,284 @@
+"""A scene's arrays on a device, with their gradients and Adam moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.constants import NONE
+from warpsplat.kernels.paint.gradient import frame
+from warpsplat.rendering.backend import Backend, view
+from warpsplat.scene import (
+    ATTRIBUTES,
+    Attribute,
+    Basis,
+    Canvas,
+    FloatArray,
+    IndexArray,
+    Kind,
+    Paint,
+    Picture,
+    Scene,
+)
+from warpsplat.scene.attributes import NO_DASHES, Cap, Join
+from warpsplat.scene.scene import level_ends, starts_of
+
+ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
+"""What kernels read a row of so many numbers as."""
+
+
+@dataclass
+class Group:
+    """One attribute on the device: values, gradients and Adam moments, each (row, size) float32."""
+
+    attribute: Attribute
+    value: wp.array
+    grad: wp.array
+    moment1: wp.array
+    moment2: wp.array
+    owner: wp.array
+    """[row] the shape of each row."""
+    held: wp.array
+    """[row] 1 where the value is not updated any more."""
+
+
+class Parameters:
+    """Device arrays of a scene. Surgery (``rearrange``) carries moments and ages along with the rows."""
+
+    def __init__(self, scene: Scene, backend: Backend) -> None:
+        self.backend = backend
+        self.revision = 0
+        """Counts ``rearrange``: launches recorded on arrays of an earlier revision are out of date."""
+        zeros = {a.name: np.zeros(scene.shape_of(a), np.float32) for a in ATTRIBUTES}
+        self._upload(scene, (zeros, zeros), np.zeros(len(scene), np.int32))
+
+    def _upload(
+        self, scene: Scene, moments: tuple[dict[str, FloatArray], dict[str, FloatArray]], ages: np.ndarray
+    ) -> None:
+        self._scene = scene
+        shapes = np.arange(len(scene))
+        owner = scene.contour_shapes()
+        contours = np.arange(len(owner))
+        in_contour, in_shape = scene.contour_beziers(), scene.bezier_counts()
+        self.shape_count, self.point_count = len(scene), len(scene.points)
+        self.contour_count, self.bezier_count = len(owner), int(in_shape.sum())
+        self.arrays: dict[str, wp.array] = {
+            "kind": self._ints(scene.kind),
+            "part": self._ints(parts := _parts(scene)),
+            "basis": self._ints(scene.basis),
+            "rule": self._ints(scene.rule),
+            "paint": self._ints(scene.paint),
+            "spread": self._ints(scene.spread),
+            "picture": self._ints(scene.picture),
+            "stop_first": self._ints(scene.stop_first),
+            "point_first": self._ints(scene.first),
+            "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
+            "point_contour": self._ints(np.repeat(contours, np.diff(scene.starts))),
+            "contour_shape": self._ints(owner),
+            "contour_first": self._ints(scene.starts),
+            "contour_closed": self._ints(scene.closed),
+            "contour_bezier": self._ints(starts_of(in_contour)),
+            "bezier_first": self._ints(starts_of(in_shape)),
+            "bezier_contour": self._ints(np.repeat(contours, in_contour)),
+            "ages": self._ints(ages),
+        }
+        """What kernels bind by name: the layout of the shapes, and each attribute with its gradient."""
+        self.has_twins = bool(scene.twin.any())
+        if self.has_twins:
+            self.arrays["point_twin"] = self._ints(_twins(scene))
+        circular = _circular(scene)
+        self.has_circles = bool(circular.any())
+        if self.has_circles:
+            self.arrays["circular"] = self._ints(circular)
+        self.parts = tuple(np.unique(parts).tolist())
+        """Of exact coverage, that there are shapes of."""
+        if constants.STYLED in self.parts:
+            self._upload_styles(scene)
+        owners = {
+            "point": self.arrays["point_shape"],
+            "shape": self._ints(shapes),
+            "stop": self._ints(np.repeat(shapes, np.diff(scene.stop_first))),
+        }
+        self.groups: dict[str, Group] = {}
+        for a in ATTRIBUTES:
+            value, m1, m2 = (
+                self._floats(x, a) for x in (getattr(scene, a.name), moments[0][a.name], moments[1][a.name])
+            )
+            held = self.backend.array(wp.int32, value.shape[0])
+            group = Group(a, value, wp.zeros_like(value), m1, m2, owners[a.per], held)
+            self.groups[a.name] = group
+            rows = (value.shape[0],)
+            self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
+            self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
+
+    def prefix(self, count: int) -> Parameters:
+        """The first ``count`` shapes: the same values, in the same memory, with gradients of their own.
+
+        It holds as long as the arrays do: until the next ``rearrange``.
+        """
+        part = Parameters(self._scene.take(np.arange(count)), self.backend)
+        for name, group in part.groups.items():
+            rows, size = group.value.shape
+            group.value = view(self.groups[name].value, wp.float32, (rows, size))
+            part.arrays[name] = view(group.value, ELEMENTS[size], (rows,))
+        return part
+
+    def _upload_styles(self, scene: Scene) -> None:
+        lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
+        numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
+        self.arrays |= {
+            "cap": self._ints(scene.cap),
+            "join": self._ints(scene.join),
+            "miter_limits": wp.array(scene.miter_limits, dtype=wp.float32, device=self.backend.device),
+            "dash": self._ints(scene.dash),
+            "dash_first": self._ints(starts_of(lengths)),
+            "dashes": wp.array(numbers, dtype=wp.float32, device=self.backend.device),
+        }
+
+    def _ints(self, values: np.ndarray) -> wp.array:
+        return wp.array(np.ascontiguousarray(values, np.int32), dtype=wp.int32, device=self.backend.device)
+
+    def _floats(self, values: FloatArray, attribute: Attribute) -> wp.array:
+        flat = np.ascontiguousarray(values, np.float32).reshape(-1, attribute.size)
+        return wp.array(flat, dtype=wp.float32, device=self.backend.device)
+
+    @property
+    def kinds(self) -> frozenset[Kind]:
+        """Kinds of shapes that there are."""
+        return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+
+    @property
+    def paints(self) -> frozenset[Paint]:
+        """Paints of shapes that there are."""
+        return frozenset(Paint(k) for k in np.unique(self._scene.paint))
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """See ``Scene.pictures``."""
+        return self._scene.pictures
+
+    @property
+    def level_ends(self) -> tuple[int, ...]:
+        """Of the scene."""
+        return level_ends(self._scene)
+
+    @property
+    def canvas(self) -> Canvas:
+        """What the shapes lie on."""
+        return self._scene.canvas
+
+    def check_chains(self) -> None:
+        """Whether all shapes are cubics of one contour and each fill can be halved into two chains of them.
+
+        Raises:
+            ValueError: one is a spline, or has several contours or an odd number of cubics.
+        """
+        several = np.bincount(self._scene.contour_shapes(), minlength=self.shape_count) > 1
+        if several.any():
+            raise ValueError(f"shape {int(np.flatnonzero(several)[0])} has several contours, splats have one")
+        splines = self._scene.basis != Basis.CUBIC
+        if splines.any():
+            raise ValueError(f"shape {int(np.flatnonzero(splines)[0])} is a spline, not cubics")
+        odd = (self._scene.kind == Kind.FILL) & (self._scene.point_counts() % 6 != 0)
+        if odd.any():
+            raise ValueError(f"fill {int(np.flatnonzero(odd)[0])} has an odd number of cubics")
+
+    def scene(self) -> Scene:
+        """Copy the current values to the host."""
+        return replace(self._scene, **self._download("value"))
+
+    def gradients(self) -> dict[str, FloatArray]:
+        """Copy the gradients to the host, in the shapes of the scene's fields."""
+        return self._download("grad")
+
+    def _download(self, field: str) -> dict[str, Any]:
+        return {
+            name: getattr(group, field).numpy().reshape(self._scene.shape_of(group.attribute)).copy()
+            for name, group in self.groups.items()
+        }
+
+    def reshape(self, scene: Scene, keep: IndexArray) -> None:
+        """Take the points of ``scene``, the same shapes with only the rows ``keep`` of their points; those
+        keep their moments. As after ``rearrange``, launches must be recorded again.
+        """
+
+        def kept(field: str) -> dict[str, FloatArray]:
+            old = self._download(field)
+            return {a.name: old[a.name][keep] if a.per == "point" else old[a.name] for a in ATTRIBUTES}
+
+        self._upload(scene, (kept("moment1"), kept("moment2")), self.arrays["ages"].numpy())
+        self.revision += 1
+
+    def repaint(self, scene: Scene) -> None:
+        """Take ``scene``, the same shapes with other paints; stops of shapes that change begin anew. As after
+        ``rearrange``, launches must be recorded again.
+        """
+        before = self._scene
+        kept = np.flatnonzero((before.paint == scene.paint) & (np.diff(scene.stop_first) > 0))
+        stops = next(a for a in ATTRIBUTES if a.per == "stop")
+
+        def carried(field: str) -> dict[str, FloatArray]:
+            old = self._download(field)
+            for a in ATTRIBUTES:
+                if a.per == "stop":
+                    fresh = np.zeros(scene.shape_of(a), np.float32)
+                    fresh[scene.rows(stops, kept)] = old[a.name][before.rows(stops, kept)]
+                    old[a.name] = fresh
+            return old
+
+        self._upload(scene, (carried("moment1"), carried("moment2")), self.arrays["ages"].numpy())
+        self.revision += 1
+
+    def assign(self, scene: Scene) -> None:
+        """Take the values of ``scene``, which has the same shapes."""
+        for name, group in self.groups.items():
+            group.value.assign(getattr(scene, name).reshape(group.value.shape))
+
+    def hold(self, name: str, rows: npt.NDArray[np.bool_]) -> None:
+        """From now on only the other rows of attribute ``name`` are updated; until the next ``rearrange``."""
+        self.groups[name].held.assign(rows.astype(np.int32))
+
+    def rearrange(self, keep: IndexArray, added: Scene) -> None:
+        """Keep the shapes ``keep`` (in that order) with their moments and ages, put ``added`` in front.
+
+        New shapes start with moments and age 0. Device arrays are made anew, so launches recorded on the
+        old ones must be recorded again: ``revision`` tells.
+        """
+        before = self.scene()
+
+        def carried(field: str) -> dict[str, FloatArray]:
+            old = self._download(field)
+            fresh = {a.name: np.zeros(added.shape_of(a), np.float32) for a in ATTRIBUTES}
+            return {
+                a.name: np.concatenate([old[a.name][before.rows(a, keep)], fresh[a.name]]) for a in ATTRIBUTES
+            }
+
+        ages = np.concatenate([self.arrays["ages"].numpy()[keep], np.zeros(len(added), np.int32)])
+        moments = carried("moment1"), carried("moment2")
+        self._upload(before.take(keep).append(added), moments, ages)
+        self.revision += 1
+
+
+def _parts(scene: Scene) -> np.ndarray:
+    """Which part of exact coverage each shape belongs to."""
+    plain = (scene.cap == Cap.ROUND) & (scene.join == Join.ROUND) & (scene.dash == NO_DASHES)
+    return np.where((scene.kind == Kind.STROKE) & ~plain, constants.STYLED, scene.kind)
+
+
+def _circular(scene: Scene) -> np.ndarray:
+    """Whether each shape has a radial gradient whose second axis is the first one, turned."""
+    along, across = scene.frames[:, 2:4], scene.frames[:, 4:]
+    turned = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    return (scene.paint == Paint.RADIAL) & (across == turned).all(axis=1)
+
+
+def _twins(scene: Scene) -> IndexArray:
+    """For each point the same point of the shape that its shape is the twin of, or NONE."""
+    owner = np.repeat(np.arange(len(scene)), scene.point_counts())
+    behind = np.arange(len(owner)) - scene.point_counts()[owner]
+    return np.where(scene.twin[owner] == 1, behind, NONE)

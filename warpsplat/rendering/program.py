@@ -1,0 +1,235 @@
+"""A fixed list of kernel launches, recorded once and replayed every step."""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import functools
+import itertools
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpsplat.rendering.helpers import Request, helpers
+from warpsplat.rendering.kernel_cache import load
+from warpsplat.rendering.turns import undisturbed
+
+PIECES_PER_THREAD = 4
+"""A split launch is cut finer than there are threads, so that uneven pieces balance."""
+
+
+@dataclass(frozen=True)
+class Launch:
+    """One kernel or host function, as the pieces that may run at the same time."""
+
+    stage: str
+    name: str
+    """Of the kernel or function."""
+    pieces: tuple[Callable[[], None], ...]
+
+
+class Program:
+    """Launches in order. On a CPU with several threads, a split launch runs as pieces of its range.
+
+    Warp runs a CPU launch on one thread but releases the interpreter lock, and every kernel here takes the
+    index of its first thread and writes only its own elements, so pieces may run at the same time and the
+    result does not depend on how many there are. Not copied: arrays are those given when recorded.
+    """
+
+    def __init__(self, device: wp.Device, threads: int = 1, stage: str = "") -> None:
+        """``threads``: of a CPU. Where no thread can be started, the caller's does the work."""
+        self.device = device
+        self.threads = threads
+        self.stage = stage
+        """Names what is added from now on, for ``run_timed``."""
+        self.launches: list[Launch] = []
+        # Recorded launches hold addresses only.
+        self._arrays: list[Sequence[Any]] = []
+        self._commands: list[tuple[wp.Launch, ctypes.Structure | None]] = []
+
+    def launch(
+        self,
+        kernel: wp.Kernel,
+        dim: int | tuple[int, ...],
+        *sources: object,
+        split: bool = False,
+        **values: Any,
+    ) -> None:
+        """Append a launch. An empty range is left out.
+
+        Args:
+            kernel: its first parameter is the index of a piece's first thread.
+            dim: threads.
+            sources: mappings and objects in which the other parameters are looked up by their names.
+            split: whether pieces of the range may run on several threads.
+            values: parameters by name, over the sources.
+
+        Raises:
+            TypeError: a parameter is missing or stands in two sources, or a value is no parameter.
+        """
+        shape = (dim,) if isinstance(dim, int) else tuple(dim)
+        if min(shape) == 0:
+            return
+        load(kernel, self.device)
+        arguments = bind(kernel, sources, values)
+        self._arrays.append(arguments)
+        whole = wp.launch(kernel, dim=shape, inputs=[0, *arguments], device=self.device, record_cmd=True)
+        assert whole is not None
+        count = min(self.threads * PIECES_PER_THREAD, shape[0]) if split and self.threads > 1 else 1
+        if count == 1:
+            commands: list[tuple[wp.Launch, ctypes.Structure | None]] = [(whole, None)]
+        else:
+            borders = [shape[0] * i // count for i in range(count + 1)]
+            parts = (
+                part(whole, start, (stop - start, *shape[1:])) for start, stop in itertools.pairwise(borders)
+            )
+            commands = [(command, pack(command)) for command in parts]
+        self._commands += commands
+        self.launches.append(Launch(self.stage, kernel.key, tuple(itertools.starmap(replay, commands))))
+
+    def rebind(self, name: str, array: wp.array) -> None:
+        """From now on ``array``, of the same type as before, is the parameter ``name`` of all launches that
+        have one. Not kept alive: whoever runs the program does that.
+        """
+        for command, packed in self._commands:
+            for index, argument in enumerate(command.kernel.adj.args):
+                if argument.label == name:
+                    command.set_param_at_index(index, array)
+                    if packed is not None:
+                        setattr(packed, name, command.params[index + 1])
+
+    def memory(self) -> dict[int, int]:
+        """Bytes of the arrays of all launches, by address."""
+        arrays = (array for arguments in self._arrays for array in arguments if isinstance(array, wp.array))
+        return {array.ptr: array.capacity for array in arrays if array.ptr}
+
+    def call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Append a host function that launches device work (a scan, a sort)."""
+        self.launches.append(Launch(self.stage, function.__name__, (lambda: function(*arguments),)))
+
+    def _replay(self, launch: Launch) -> None:
+        pieces = iter(launch.pieces)
+
+        def work() -> None:
+            # Taking from a shared iterator is atomic: who is done with a piece takes the next.
+            for piece in pieces:
+                piece()
+
+        requests: list[Request] = []
+        if len(launch.pieces) > 1:
+            crew = helpers(self.threads)
+            requests = [crew.ask(work) for _ in range(min(crew.count, len(launch.pieces) - 1))]
+        try:
+            work()
+        finally:  # an interruption must not free arrays that helpers still write
+            for request in requests:
+                request.settle()  # on a busy machine many a helper comes too late
+
+    def run(self) -> None:
+        """Replay all launches."""
+        for launch in self.launches:
+            self._replay(launch)
+
+    def run_timed(self) -> dict[tuple[str, str], float]:
+        """Replay all launches, waiting for the device after each; seconds by stage and name."""
+        seconds: dict[tuple[str, str], float] = {}
+        for launch in self.launches:
+            begin = time.perf_counter()
+            self._replay(launch)
+            wp.synchronize_device(self.device)
+            spent = time.perf_counter() - begin
+            key = (launch.stage, launch.name)
+            seconds[key] = seconds.get(key, 0.0) + spent
+        return seconds
+
+
+def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
+    """One graph that replays ``programs`` without Python in between; None where that is not possible.
+
+    A CPU graph runs on one thread, so several threads are not given up for it; nor is one made while other
+    threads work (``turns``), whose launches would become part of it. A GPU needs its memory pool,
+    as scans and sorts take their scratch memory from it.
+    """
+    if device.is_cpu:
+        if any(program.threads > 1 for program in programs):
+            return None
+    elif not wp.is_mempool_enabled(device):
+        return None
+    with undisturbed() as alone:
+        if not alone and device.is_cpu:
+            return None
+        with wp.ScopedCapture(device) as captured:
+            for program in programs:
+                program.run()
+        return captured.graph
+
+
+def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:
+    """A recorded launch whose threads start at ``start``, for a part of what recording it anew would take."""
+    command = copy.copy(whole)
+    command.params, command.fwd_args = list(whole.params), list(whole.fwd_args or ())
+    command.set_dim(shape)
+    command.set_param_at_index(0, start)
+    return command
+
+
+QUICK_VERSIONS = ("1.19.",)
+"""Of Warp, in which CPU kernels are known to be called as ``replay`` does."""
+
+
+def pack(command: wp.Launch) -> ctypes.Structure | None:
+    """The arguments of a launch on a CPU as its kernel takes them; None where that is not known.
+
+    Packing takes 7 us a piece, in which it holds the interpreter lock that other threads wait for: up to a
+    tenth of a step.
+    """
+    if not wp.__version__.startswith(QUICK_VERSIONS):
+        return None
+    labels = (argument.label for argument in command.kernel.adj.args)
+    return _layout(tuple(zip(labels, map(type, command.params[1:]), strict=True)))(*command.params[1:])
+
+
+def replay(command: wp.Launch, packed: ctypes.Structure | None) -> Callable[[], None]:
+    """What launches ``command``, with its arguments as ``pack`` has them."""
+    if packed is None:
+        return command.launch
+    return functools.partial(command.hooks.forward, ctypes.byref(command.params[0]), ctypes.byref(packed))
+
+
+@functools.cache
+def _layout(fields: tuple[tuple[str, Any], ...]) -> type[ctypes.Structure]:
+    """The C structure of a kernel's arguments."""
+    return type("Arguments", (ctypes.Structure,), {"_fields_": list(fields)})
+
+
+def bind(kernel: wp.Kernel, sources: Sequence[object], values: Mapping[str, Any]) -> list[Any]:
+    """Arguments of ``kernel`` but the first, each found by its name; see ``Program.launch``.
+
+    Raises:
+        TypeError: a parameter is missing or stands in two sources, or a value is no parameter.
+    """
+    names = [argument.label for argument in kernel.adj.args[1:]]
+    unknown = values.keys() - set(names)
+    if unknown:
+        raise TypeError(f"{kernel.key} has no parameter {', '.join(sorted(unknown))}")
+    arguments = []
+    for name in names:
+        found = [values[name]] if name in values else _lookup(name, sources)
+        if len(found) != 1:
+            raise TypeError(f"{kernel.key}: parameter {name} is {'missing' if not found else 'ambiguous'}")
+        arguments.append(found[0])
+    return arguments
+
+
+def _lookup(name: str, sources: Sequence[object]) -> list[Any]:
+    """What the sources have under ``name``."""
+    found = []
+    for source in sources:
+        if isinstance(source, Mapping):
+            found += [source[name]] if name in source else []
+        elif hasattr(source, name):
+            found.append(getattr(source, name))
+    return found

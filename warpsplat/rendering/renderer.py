@@ -1,0 +1,254 @@
+"""The renderer: the stages in order, arrays of fixed capacity, launches recorded once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import warp as wp
+
+from warpsplat.errors import CapacityError
+from warpsplat.kernels import constants
+from warpsplat.kernels.tile import column
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.film import Film
+from warpsplat.rendering.models import EXACT, Job, Model
+from warpsplat.rendering.paint import Painting
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.tiles import from_tiles, to_tiles
+from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
+from warpsplat.scene.attributes import OPACITY_RANGE
+from warpsplat.scene.scene import IntArray
+
+GROWTH = 1.5
+"""Capacity over need when an array has to grow, so that a growing scene seldom does."""
+SLOT_LIMIT = 1_500_000
+"""Most slots (1.3 KiB each, 2.4 for strokes) before a scene is refused: up to 3.5 GiB."""
+SAMPLE_LIMIT = 16_000_000
+"""Most Gaussians or vertices (about 120 bytes each, 200 with styled strokes) before a scene is refused."""
+SLOTS_PER_SHAPE = 8
+"""First guess of the need, besides one for each tile."""
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """Sizes of the arrays whose need depends on the scene."""
+
+    samples: int
+    """Vertices or Gaussians."""
+    slots: int
+
+
+class Visible(NamedTuple):
+    """What compositing multiplies the shapes' colours with, in the tiles where they are seen."""
+
+    shape: IntArray
+    """Shape (slot,)."""
+    tile: IntArray
+    """Shape (slot,)."""
+    share: FloatArray
+    """By column and row of the tile, in [0, 1], shape (slot, TILE, TILE)."""
+    colored: IndexArray
+    """The slots of gradients, ascending, shape (colored,)."""
+    color: FloatArray
+    """Theirs, shape (colored, 3, TILE, TILE)."""
+
+
+class Renderer:
+    """Renders ``parameters`` into ``viewport``; and the adjoint.
+
+    Nothing is allocated and nothing is copied to the host between ``forward`` and ``backward``. A scene
+    that needs more than the capacity is rendered without the shapes that do not fit; ``make_room`` mends it.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        viewport: Viewport,
+        *,
+        model: Model = EXACT,
+        capacity: Capacity | None = None,
+        opaque: bool = False,
+    ) -> None:
+        """Record the stages.
+
+        Args:
+            parameters: what is rendered.
+            viewport: the picture.
+            model: of coverage.
+            capacity: without, a guess that ``make_room`` mends.
+            opaque: whether shapes may have opacities beyond OPACITY_RANGE, and gradients even so.
+        """
+        self.parameters, self.viewport = parameters, viewport
+        self.backend = parameters.backend
+        self._model, self._opaque = model, opaque
+        self.film = Film(self.backend, viewport, parameters.canvas, opaque=opaque)
+        self.needed_samples = self.backend.array(wp.int32, 1)
+        self.needed_slots = self.backend.array(wp.int32, 1)
+        shapes = parameters.shape_count
+        first_guess = Capacity(
+            model.samples_per_shape * shapes, viewport.tile_count + SLOTS_PER_SHAPE * shapes
+        )
+        self._build(capacity or first_guess)
+
+    def _build(self, capacity: Capacity) -> None:
+        """Make the stages for ``capacity`` and record their launches."""
+        backend, p, v = self.backend, self.parameters, self.viewport
+        self.capacity = capacity
+        most = OPACITY_RANGE[1] if self._opaque else 1.0
+        self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, most=most)
+        job = Job(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
+        self.geometry, self.coverage = self._model.stages(job)
+        self.paint = Painting(backend, p, v, self.bins, capacity.slots)
+        self.forward_program = backend.program()
+        self._record_forward(self.forward_program)
+        self.backward_program = backend.program("backward")
+        self._record_backward(self.backward_program)
+        self._revision = p.revision
+
+    def check_current(self) -> None:
+        """Whether the programs are those of the parameters' arrays as they are.
+
+        Raises:
+            RuntimeError: surgery has replaced the arrays, whose addresses the recorded launches hold.
+        """
+        if self._revision != self.parameters.revision:
+            raise RuntimeError("recorded before the last surgery")
+
+    def _record_forward(self, program: Program) -> None:
+        program.stage = "outline"
+        self.geometry.forward(program)  # points, widths -> samples
+        program.stage = "bins"
+        self.bins.forward(program, self.geometry.samples())  # samples -> slots, sorted by tile
+        program.stage = "forward"
+        self.coverage.states(program)  # slots, samples -> states
+        self.bins.list_visible(program)  # states, paint -> each tile's list
+        self.coverage.values(program)  # lists, samples -> coverages
+        self.paint.forward(program)  # frames, stops -> colours of pixels, where there are gradients
+        self.film.forward(program, self.bins, self.coverage, self.paint)  # -> image
+
+    def _record_backward(self, program: Program) -> None:
+        self.film.backward(program, self.bins, self.coverage, self.paint)  # image_grad -> by slot
+        self.paint.backward(program)  # -> colours, opacities
+        self.coverage.backward(program)  # -> samples -> points, widths
+
+    def bytes(self) -> int:
+        """Memory of all arrays that the programs work on."""
+        return sum((self.forward_program.memory() | self.backward_program.memory()).values())
+
+    def forward(self) -> None:
+        """Render into the film."""
+        self.check_current()
+        self.forward_program.run()
+
+    def backward(self) -> None:
+        """From the film's gradient and the last forward pass to the gradients of the parameters."""
+        self.check_current()
+        self.backward_program.run()
+
+    def read_image(self) -> FloatArray:
+        """The image on the host: sRGB in [0, 1], shape (height, width, 3); of a transparent canvas
+        premultiplied, and opacity: shape (height, width, 4).
+        """
+        return from_tiles(self.film.buffers.image.numpy(), self.viewport.width, self.viewport.height)
+
+    def write_image_grad(self, gradient: FloatArray) -> None:
+        """Set the image's gradient from the host, in the image's shape."""
+        self.film.buffers.image_grad.assign(to_tiles(gradient))
+
+    def removal_costs(self, target: wp.array, importance: wp.array | None = None) -> FloatArray:
+        """What the mean squared error against ``target`` would grow by without each shape, after ``forward``.
+
+        ``target``: tiles as the film's image; ``importance``: weights of the pixels by tiles, without all 1.
+        Shape of the result: (shape,). Allocates and copies to the host: for use between steps.
+        """
+        cost = self.backend.array(wp.float32, self.capacity.slots, self.backend.lanes)
+        program = self.backend.program()
+        self.film.removal_cost(program, self.bins, self.coverage, self.paint, target, importance, cost)
+        program.run()
+        shapes = self.bins.buffers.slot_shape.numpy()
+        used = shapes >= 0
+        totals = np.bincount(
+            shapes[used],
+            weights=cost.numpy().sum(axis=1, dtype=np.float64)[used],
+            minlength=self.parameters.shape_count,
+        )
+        return np.asarray(totals / (3 * self.viewport.pixel_count), np.float32)
+
+    def visible(self) -> Visible:
+        """What is seen of each shape, after ``forward``. Allocates and copies to the host: for use between
+        steps.
+        """
+        seen = self.backend.array(column, self.capacity.slots, constants.TILE)
+        program = self.backend.program()
+        self.film.visibility(program, self.bins, self.coverage, self.paint, seen)
+        program.run()
+        shapes, shares = self.bins.buffers.slot_shape.numpy(), seen.numpy()
+        rows = np.flatnonzero((shapes >= 0) & shares.any(axis=(1, 2)))
+        tiles = self.bins.buffers.slot_tile.numpy()
+        colored, colors = np.zeros(0, np.intp), np.zeros((0, 3, constants.TILE, constants.TILE), np.float32)
+        if self.paint.has_gradients:
+            paint = self.parameters.arrays["paint"].numpy()[shapes[rows]]
+            colored = np.flatnonzero(np.isin(paint, GRADIENTS))
+            colors = self.paint.buffers.paint_columns.numpy()[rows[colored], :3]
+        return Visible(shapes[rows], tiles[rows], shares[rows], colored, colors)
+
+    def make_room(self) -> bool:
+        """Whether the passes since the last call ran out of capacity; if so, the arrays are now larger and
+        the programs others.
+
+        Reads two counters back from the device.
+
+        Raises:
+            CapacityError: the scene needs more than SLOT_LIMIT or SAMPLE_LIMIT.
+        """
+        samples = int(self.needed_samples.numpy()[0])
+        slots = int(self.needed_slots.numpy()[0])
+        if samples > SAMPLE_LIMIT or slots > SLOT_LIMIT:
+            raise CapacityError(
+                f"the scene needs {samples} samples and {slots} tile slots, more than the limits of "
+                f"{SAMPLE_LIMIT} and {SLOT_LIMIT}: fewer curves or a smaller image are needed"
+            )
+        now = self.capacity
+        if samples <= now.samples and slots <= now.slots:
+            return False
+        self.needed_samples.zero_()
+        self.needed_slots.zero_()
+        self._build(Capacity(max(now.samples, int(GROWTH * samples)), max(now.slots, int(GROWTH * slots))))
+        return True
+
+    def forward_complete(self) -> bool:
+        """Render, growing until everything fits; whether it had to grow, and so has other programs now."""
+        self.forward()
+        grown = False
+        while self.make_room():
+            grown = True
+            self.forward()
+        return grown
+
+
+def render(
+    scene: Scene, *, scale: float = 1.0, model: Model = EXACT, backend: Backend | None = None
+) -> FloatArray:
+    """Render ``scene`` at ``scale`` px per canvas unit, as its file looks or by another model.
+
+    Samples follow the size in pixels, so a scene can be rendered at any size (paper section 3.3).
+
+    Returns:
+        as ``Renderer.read_image``.
+    """
+    canvas = scene.canvas
+    size = max(1, round(canvas.width * scale)), max(1, round(canvas.height * scale))
+    return render_into(scene, Viewport(*size, scale), model=model, backend=backend)
+
+
+def render_into(
+    scene: Scene, viewport: Viewport, *, model: Model = EXACT, backend: Backend | None = None
+) -> FloatArray:
+    """As ``render``, at a size in pixels."""
+    made = Renderer(Parameters(scene, backend or Backend.on()), viewport, model=model)
+    made.forward_complete()
+    return made.read_image()

@@ -1,0 +1,155 @@
+"""The paper's own model: shapes -> soft Gaussians, each of its own strength -> coverage, and the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.coverage import gaussian
+from warpsplat.kernels.grid import fill, gaussians, soft
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.coverage import CoverageBuffers
+from warpsplat.rendering.grid import GridBuffers
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.ranges import record_ranges
+from warpsplat.scene import GRADIENTS, Kind
+
+
+@dataclass
+class SoftBuffers(GridBuffers):
+    """What the stage owns."""
+
+    strength: wp.array = buffer(wp.float32, "gaussians")
+    """Opacity of each Gaussian."""
+    strength_grad: wp.array = buffer(wp.float32, "gaussians")
+    gaussian_width_grad: wp.array = buffer(wp.float32, "gaussians")
+    paint_opacities: wp.array = buffer(wp.float32, "shapes")
+    """1: what compositing takes for the shapes' opacities, which are in their coverages."""
+
+
+class SoftGrid:
+    """Puts a grid of Gaussians along and across each fill, a row along each stroke."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        capacity: int,
+        needed: wp.array,
+        *,
+        softness: float,
+        density: float,
+        through_scales: bool,
+        fold: float,
+    ) -> None:
+        """Allocate.
+
+        Raises:
+            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2); or a
+                gradient, whose opacities would count besides the Gaussians'.
+        """
+        if parameters.paints & set(GRADIENTS):
+            raise ValueError("soft Gaussians have flat colours, no gradients")
+        self._parameters, self._viewport = parameters, viewport
+        self._softness, self._density = softness, density
+        self._through_scales, self._fold = through_scales, fold
+        self._capacity, self._needed = capacity, needed
+        parameters.check_chains()
+        self.buffers = backend.allocate(
+            SoftBuffers, {"shapes": parameters.shape_count, "gaussians": capacity}
+        )
+        self.buffers.paint_opacities.fill_(1.0)
+
+    @property
+    def _sources(self) -> tuple[object, ...]:
+        return self.buffers, self._parameters.arrays, self._viewport
+
+    def samples(self) -> dict[str, wp.array]:
+        """What tiles are found by: ``bins.rectangles``'s parameters."""
+        b = self.buffers
+        return {
+            "sample_first": b.gaussian_first,
+            "sample_last": b.gaussian_last,
+            "position": b.mean,
+            "extent": b.extent,
+        }
+
+    def forward(self, program: Program) -> None:
+        """Record points, widths, opacities -> Gaussians."""
+        b, p = self.buffers, self._parameters
+        program.launch(soft.plan_soft, p.shape_count, *self._sources, density=self._density, split=True)
+        record_ranges(
+            program,
+            b.gaussian_count,
+            b.gaussian_ends,
+            b.gaussian_first,
+            b.gaussian_last,
+            self._needed,
+            capacity=self._capacity,
+        )
+        kernels = {Kind.FILL: fill.fill_grid_forward, Kind.STROKE: soft.soft_stroke_forward}
+        for kind in sorted(p.kinds):
+            program.launch(kernels[kind], self._capacity, *self._sources, split=True)
+        program.launch(
+            soft.soft_gaussians_forward, self._capacity, *self._sources, softness=self._softness, split=True
+        )
+
+    def backward(self, program: Program) -> None:
+        """Record gradients of means, conics and strengths -> gradients of the shapes' attributes."""
+        b, p = self.buffers, self._parameters
+        program.launch(
+            soft.soft_differences_backward,
+            self._capacity,
+            *self._sources,
+            softness=self._softness,
+            through_scales=float(self._through_scales),
+            fold_factor=self._fold / self._viewport.pixel_count,
+            split=True,
+        )
+        program.launch(gaussians.positions_backward, self._capacity, b, split=True)
+        if Kind.FILL in p.kinds:
+            program.launch(fill.fill_stations_backward, self._capacity, *self._sources, split=True)
+            program.launch(fill.fill_points_backward, p.point_count, *self._sources, split=True)
+        if Kind.STROKE in p.kinds:
+            program.launch(soft.soft_stroke_backward, p.point_count, *self._sources, split=True)
+        program.launch(soft.soft_shapes_backward, p.shape_count, *self._sources, split=True)
+
+
+class GaussianCoverage:
+    """1 - product of 1 - o g."""
+
+    law = constants.PRODUCT
+
+    def __init__(self, backend: Backend, grid: SoftGrid, bins: Bins, slots: int) -> None:
+        self._backend, self._grid, self._slots = backend, grid, slots
+        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
+        self._sources = (self.buffers, bins.buffers, grid.buffers)
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        program.launch(
+            gaussian.gaussian_forward,
+            (self._slots, self._backend.lanes),
+            *self._sources,
+            lanes=self._backend.lanes,
+            split=True,
+        )
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``: all are there."""
+
+    def backward(self, program: Program) -> None:
+        """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
+        program.launch(
+            gaussian.gaussian_backward,
+            self._grid.buffers.mean.shape[0],
+            *self._sources,
+            sum_grad=self.buffers.coverage,
+            split=True,
+        )
+        self._grid.backward(program)

@@ -1,0 +1,92 @@
+"""The stage between outlines and coverage of styled strokes: centre lines -> polygons, and the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpsplat.kernels import corners, stroker
+from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.ranges import record_ranges
+
+
+@dataclass
+class StrokerBuffers:
+    """What the stage owns."""
+
+    corner_count: wp.array = buffer(wp.int32, "shapes")
+    corner_ends: wp.array = buffer(wp.int32, "shapes")
+    corner_first: wp.array = buffer(wp.int32, "shapes")
+    corner_last: wp.array = buffer(wp.int32, "shapes")
+    corner_segments: wp.array = buffer(wp.vec2i, "corners")
+    """Segments of the centre line that a corner hangs on."""
+    corner_place: wp.array = buffer(wp.vec4, "corners")
+    """Where, as ``kernels.corners`` says."""
+    corner_shape: wp.array = buffer(wp.int32, "corners")
+    corner_next: wp.array = buffer(wp.int32, "corners")
+    corner: wp.array = buffer(wp.vec2, "corners")
+    """[px]"""
+    corner_start_grad: wp.array = buffer(wp.vec2, "corners")
+    """Of the first end of the edge that starts at a corner."""
+    corner_end_grad: wp.array = buffer(wp.vec2, "corners")
+    """Of its second end."""
+    segment_grad: wp.array = buffer(wp.vec3, "corners")
+    """Of the turn and the length of each segment of centre lines, and of the length before it."""
+
+
+class Stroker:
+    """Polygons of the strokes that are not round throughout."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        parameters: Parameters,
+        viewport: Viewport,
+        lines: object,
+        capacity: int,
+        needed: wp.array,
+    ) -> None:
+        """``lines``: buffers of the outline stage, of the same ``capacity``."""
+        self._parameters, self._needed, self._capacity = parameters, needed, capacity
+        self.buffers = backend.allocate(
+            StrokerBuffers, {"shapes": parameters.shape_count, "corners": capacity}
+        )
+        self._sources = (self.buffers, lines, parameters.arrays, viewport)
+
+    def edges(self) -> dict[str, wp.array]:
+        """The polygons as the kernels of fills know outlines."""
+        b = self.buffers
+        return {
+            "vertex": b.corner,
+            "vertex_shape": b.corner_shape,
+            "vertex_next": b.corner_next,
+            "vertex_ends": b.corner_ends,
+            "vertex_first": b.corner_first,
+            "vertex_last": b.corner_last,
+            "start_grad": b.corner_start_grad,
+            "end_grad": b.corner_end_grad,
+        }
+
+    def forward(self, program: Program) -> None:
+        """Record centre lines, widths -> corners; and how far these reach."""
+        b, shapes = self.buffers, self._parameters.shape_count
+        program.launch(stroker.walk_strokes, shapes, *self._sources, write=0, split=True)
+        record_ranges(
+            program,
+            b.corner_count,
+            b.corner_ends,
+            b.corner_first,
+            b.corner_last,
+            self._needed,
+            capacity=self._capacity,
+        )
+        program.launch(stroker.walk_strokes, shapes, *self._sources, write=1, split=True)
+        program.launch(corners.place_corners, self._capacity, *self._sources, split=True)
+
+    def backward(self, program: Program) -> None:
+        """Record gradients of the polygons' edges -> of the segments' ends and of the widths."""
+        shapes = self._parameters.shape_count
+        program.launch(corners.corners_backward, shapes, *self._sources, split=True)

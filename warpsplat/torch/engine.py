@@ -1,0 +1,214 @@
+"""Renderers kept for the next call: recorded programs and buffers, by what they were recorded for."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import torch
+import warp as wp
+
+from warpsplat.errors import UsageError
+from warpsplat.kernels import constants, pixels
+from warpsplat.rendering.backend import Backend, Viewport, view
+from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.models import Model
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import Renderer
+from warpsplat.rendering.turns import turn
+from warpsplat.scene import TRAITS, Scene
+
+KEPT = 32
+"""Engines that are kept at the most."""
+
+KEPT_BYTES = 512 * 2**20
+"""Memory beyond which only the engine used last is kept."""
+
+SENSIBLE = {"opacities": (0.0, 1.0), "stop_opacities": (0.0, 1.0), "widths": (0.0, None)}
+"""Values that mean something; what lies beyond is drawn as the nearest, and has its gradient."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What an engine is recorded for."""
+
+    layout: Scene
+    viewport: Viewport
+    model: Model
+    device: torch.device
+    threads: int
+    opaque: bool
+    """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
+
+    @functools.cached_property
+    def key(self) -> tuple[object, ...]:
+        """Equal where the same engine serves."""
+        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads, self.opaque
+
+
+STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait.name for trait in TRAITS))
+
+
+def layout_key(scene: Scene) -> tuple[object, ...]:
+    """Equal for scenes that differ in the values of attributes alone."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in STRUCTURE:
+        array = getattr(scene, name)
+        digest.update(f"{name} {array.shape}".encode())
+        digest.update(array.tobytes())
+    background = scene.canvas.background
+    return (
+        digest.digest(),
+        (scene.canvas.width, scene.canvas.height, None if background is None else background.tobytes()),
+        scene.dashes,
+        tuple(map(id, scene.pictures)),  # kept alive by the engine's own layout
+    )
+
+
+class Engine:
+    """A renderer with arrays of its own, into and out of which calls copy. One call at a time."""
+
+    def __init__(self, picture: Picture) -> None:
+        backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
+        self._parameters = Parameters(picture.layout, backend)
+        self._renderer = Renderer(
+            self._parameters, picture.viewport, model=picture.model, opaque=picture.opaque
+        )
+        self._values, self._grads = (
+            {
+                name: wp.to_torch(getattr(group, field))
+                for name, group in self._parameters.groups.items()
+                if group.value.shape[0]
+            }
+            for field in ("value", "grad")
+        )
+        self._record_pixels(backend, picture.viewport)
+        self.lock = threading.Lock()
+        self.ticket: object = None
+        """Of the call whose forward pass the buffers hold."""
+        self.bytes = self._renderer.bytes()
+        self._stream: torch.cuda.Stream | None = None
+
+    def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
+        film = self._renderer.film
+        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS)
+        anything = backend.array(wp.vec4, 1, 1)
+
+        def record(kernel: wp.Kernel, tiles: wp.array) -> Program:
+            program = backend.program()
+            program.launch(
+                kernel,
+                (viewport.tile_count, constants.TILE),
+                viewport,
+                pixels=anything,
+                image_pixels=view(tiles, wp.float32, shape),
+                split=True,
+            )
+            return program
+
+        self._show = record(pixels.tiles_to_pixels, film.buffers.image)
+        self._take = record(pixels.pixels_to_tiles, film.buffers.image_grad)
+
+    def forward(self, values: Mapping[str, torch.Tensor]) -> None:
+        """Render the scene of these attributes, each in the shape of its field."""
+        self.ticket = None
+        for name, own in self._values.items():
+            own.copy_(values[name].reshape(own.shape))
+            if name in SENSIBLE:
+                own.clamp_(*SENSIBLE[name])
+        if self._renderer.forward_complete():
+            self.bytes = self._renderer.bytes()
+
+    def follow(self, device: torch.device) -> None:
+        """Work of the last call, on another stream perhaps, comes before that of torch's current one."""
+        if device.type == "cuda":
+            stream = torch.cuda.current_stream(device)
+            if self._stream not in (None, stream):
+                stream.wait_stream(self._stream)
+            self._stream = stream
+
+    def show(self, image: torch.Tensor) -> None:
+        """Write what was rendered, shape (height, width, 4)."""
+        self._run(self._show, image)
+
+    def backward(self, image_grad: torch.Tensor) -> dict[str, torch.Tensor]:
+        """From the gradient of the image, shape (height, width, 4), to those of the attributes. The state of
+        the forward pass is used up.
+        """
+        self.ticket = None
+        self._run(self._take, image_grad)
+        self._renderer.backward()
+        return {name: own.clone() for name, own in self._grads.items()}
+
+    @staticmethod
+    def _run(program: Program, image: torch.Tensor) -> None:
+        array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
+        assert isinstance(array, wp.array)
+        program.rebind("pixels", array)
+        program.run()
+
+
+class Engines:
+    """Engines used last, as many as are allowed."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, picture: Picture) -> Engine:
+        """The engine of ``picture``, made where there is none."""
+        with self._lock:
+            engine = self._kept.pop(picture.key, None)
+            if engine is None:
+                engine = Engine(picture)
+            self._kept[picture.key] = engine
+            while len(self._kept) > 1 and (
+                len(self._kept) > KEPT or sum(each.bytes for each in self._kept.values()) > KEPT_BYTES
+            ):
+                self._kept.popitem(last=False)
+            return engine
+
+    def clear(self) -> None:
+        """Give up all of them."""
+        with self._lock:
+            self._kept.clear()
+
+
+ENGINES = Engines()
+
+
+def clear_cache() -> None:
+    """Free the renderers that are kept for further calls. They are made anew when they are needed."""
+    ENGINES.clear()
+
+
+@contextlib.contextmanager
+def engine_of(picture: Picture) -> Iterator[Engine]:
+    """The engine of ``picture``, for this thread alone and on torch's current stream."""
+    if picture.device.type not in ("cpu", "cuda"):
+        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
+    _start()
+    device = wp.device_from_torch(picture.device)
+    with turn(device), _on_stream(picture.device):
+        engine = ENGINES.get(picture)
+        with engine.lock:
+            engine.follow(picture.device)
+            yield engine
+
+
+@functools.cache
+def _start() -> None:
+    start_warp()
+
+
+def _on_stream(device: torch.device) -> contextlib.AbstractContextManager[object]:
+    """Have Warp work where torch does."""
+    if device.type == "cpu":
+        return contextlib.nullcontext()
+    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))

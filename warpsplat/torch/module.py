@@ -1,0 +1,85 @@
+"""A scene as a module with parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.units import Units
+from warpsplat.scene import IndexArray, Scene
+from warpsplat.svg.write import write_svg
+from warpsplat.torch.function import MODELS, model_of, render
+from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, has
+
+
+class Module(torch.nn.Module):
+    """Holds a scene: a parameter for each attribute that some shape of it has."""
+
+    def __init__(self, scene: Scene, *, renderer: Any = "exact", threads: int | None = None) -> None:
+        """``renderer``, ``threads``: see ``render``."""
+        super().__init__()
+        self._layout, self._renderer, self._threads = scene, renderer, threads
+        for name, attribute in TABLE.items():
+            soft_only = name == "fades" and model_of(renderer) is not MODELS["gaussian"]
+            if name not in WITHOUT_GRADIENT and has(scene, attribute) and not soft_only:
+                self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
+        self._twins: torch.Tensor | None
+        tied = torch.tensor(same_points(scene)) if scene.twin.any() else None
+        self.register_buffer("_twins", tied, persistent=False)
+
+    def tensors(self) -> SceneTensors:
+        """The scene of the parameters; what is done with it has gradients."""
+        values: dict[str, torch.Tensor] = dict(self.named_parameters())
+        if self._twins is not None:
+            values["points"] = values["points"][self._twins]
+        return SceneTensors(self._layout, values)
+
+    def forward(self, width: int | None = None, height: int | None = None) -> torch.Tensor:
+        """See ``render``."""
+        return render(self.tensors(), width, height, renderer=self._renderer, threads=self._threads)
+
+    def parameter_groups(
+        self, settings: Settings | None = None, *, rate: float = 1.0
+    ) -> list[dict[str, Any]]:
+        """What an optimiser takes: each attribute with the learning rate that it has in a run.
+
+        Args:
+            settings: of the run; default: the usual one.
+            rate: what all of them are multiplied by.
+        """
+        settings = settings or Settings()
+        units = Units.of(settings, self._layout.canvas)
+        return [
+            {
+                "params": [parameter],
+                "name": name,
+                "lr": rate * units.resolve(settings.rates[name], TABLE[name].rate_unit),
+            }
+            for name, parameter in self.named_parameters()
+        ]
+
+    @torch.no_grad()
+    def project(self) -> None:
+        """Bring every attribute back within its bounds, as a run does after each step."""
+        units = Units.of(Settings(), self._layout.canvas)
+        for name, parameter in self.named_parameters():
+            parameter.clamp_(units.resolve(*TABLE[name].low), units.resolve(*TABLE[name].high))
+
+    def scene(self) -> Scene:
+        """The scene as it is."""
+        return self.tensors().scene()
+
+    def to_svg(self) -> str:
+        """The scene as an SVG file's text."""
+        return write_svg(self.scene())
+
+
+def same_points(scene: Scene) -> IndexArray:
+    """For each point its own row, or that of the same point of the shape that its shape is the twin of."""
+    rows = np.arange(len(scene.points))
+    for i in np.flatnonzero(scene.twin):  # ascending: the shape before may be a twin itself
+        rows[scene.first[i] : scene.first[i + 1]] = rows[scene.first[i - 1] : scene.first[i]]
+    return rows
