@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import cairosvg
@@ -14,6 +15,7 @@ import pytest
 from PIL import Image
 
 from tests.scenes import disc, mixed_scene, random_scene, started_alike, with_gradients
+from warpsplat.files.output import may_replace
 from warpsplat.kernels.constants import PLATEAU
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
@@ -28,10 +30,12 @@ from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
     NAMESPACE,
+    SHORT,
     minified,
     read_metadata,
     resized,
     rounded,
+    shortened,
     width_decimals,
     write_svg,
 )
@@ -103,7 +107,7 @@ def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -
     paths = re.findall(r' d="([^"]*)"', text)
     assert len(paths) == (scene.kind == kind).sum()
     for data in paths:
-        assert re.fullmatch(r"[Mm]-?\d+([ -]\d+)+([cqstlhvCSLHV](-?\d+[ ]?)+)*", data), data
+        assert re.fullmatch(r"[Mm]-?\d+([ -]\d+)+([cqstlhvCQSTLHV](-?\d+[ ]?)+)*", data), data
         assert "  " not in data and " -" not in data
     assert all(len(x) <= 3 for x in re.findall(r'-opacity="([^"]*)"', text))
     assert all(re.fullmatch(r"\d*(\.\d)?", x) for x in re.findall(r'stroke-width="([^"]*)"', text))
@@ -172,7 +176,7 @@ def test_groups_are_never_longer_than_none() -> None:
 def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
     """No longer than from any other; and the same text wherever its points start."""
     rng = np.random.default_rng(seed)
-    ring = np.round(rng.uniform(-15, 40, (9, 2)) * 2).astype(np.int64)
+    ring = np.round(rng.uniform(-150, 400, (9, 2)) * 2).astype(np.int64)
     half = [(int(x), int(y)) for x, y in ring]
     data = spline_data(half, closed=True)
     lengths = []
@@ -273,6 +277,51 @@ def test_titles() -> None:
     assert "title" not in write_svg(random_scene(Kind.FILL, count=2))
     back, _ = load_scene(text, 40, 36, "a.svg")
     assert len(back) == 2
+
+
+def test_fills_of_one_paint_that_lie_apart_are_one_path() -> None:
+    """It shows the same and is read as a shape of two contours; those that overlap stay two."""
+    scene = random_scene(Kind.FILL, count=2, basis=Basis.SPLINE)
+    points = scene.points - scene.points.mean(axis=0)
+    points *= 6 / np.abs(points).max()
+    rows = np.repeat([0, 1], scene.point_counts())
+    for gap, count in ((20, 1), (3, 2)):
+        places = np.array([[8, 20], [8 + gap, 20]])[rows]
+        alike = replace(
+            scene,
+            points=(points + places).astype(np.float32),
+            colors=np.repeat(scene.colors[:1], 2, axis=0),
+            opacities=np.full(2, 0.6, np.float32),
+        )
+        text = write_svg(alike, per_pixel=10)
+        assert text.count("<path") == count
+        shown = np.asarray(render_svg(text), np.int16)
+        named = np.asarray(render_svg(write_svg(alike, per_pixel=10, ids=True)), np.int16)
+        np.testing.assert_array_equal(shown, named)
+        back, _ = load_scene(text, scene.canvas.width, scene.canvas.height, "x.svg")
+        assert len(back) == count
+        assert (back.basis == Basis.SPLINE).all()
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_short_files_are_marked_by_the_order_of_their_attributes(kind: Kind, tmp_path: Path) -> None:
+    """They show the same, are known again, and are no longer than without a mark."""
+    text = write_svg(random_scene(kind, count=3), per_pixel=0.5)
+    short = shortened(text)
+    assert short != text
+    assert shortened(short) == short
+    assert minified(short) == minified(text)
+    assert len(short) == len(minified(text))
+    np.testing.assert_array_equal(np.asarray(render_svg(short)), np.asarray(render_svg(text)))
+    path = tmp_path / "short.svg"
+    for content, is_ours in ((short, True), (minified(text), False), ("<!---->" + short, False)):
+        path.write_text(content)
+        assert may_replace(path) == is_ours
+    keyed = write_svg(random_scene(kind, count=3), per_pixel=0.5, metadata="key")
+    assert shortened(keyed) == keyed, "what the comment says is kept"
+    long = write_svg(random_scene(kind, count=40))
+    assert len(long) > SHORT
+    assert shortened(long) == long
 
 
 @pytest.mark.parametrize("kind", list(Kind))

@@ -28,6 +28,11 @@ from warpsplat.files.inputs import STANDARD
 SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
 """In the head of every SVG written here (``svg.write_svg``), now and by earlier versions."""
 
+SHORT_SVG = re.compile(
+    rb'<svg viewBox="0 0 [\d.]+ [\d.]+" xmlns="http://www\.w3\.org/2000/svg" height="\d+" width="\d+">'
+)
+"""How short ones begin: nobody else has the attributes in this order (``svg.write.shortened``)."""
+
 PNG_SOFTWARE = "warpsplat"
 """Text of the ``Software`` chunk of every PNG written here."""
 
@@ -146,7 +151,7 @@ def may_replace(path: Path) -> bool:
         return True
     head = unpacked(head)
     marks = (*SVG_MARKS, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
-    return not head or any(mark in head for mark in marks)
+    return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
 
 
 def unpacked(head: bytes) -> bytes:

@@ -12,7 +12,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
 from warpsplat.scene import Basis, Kind
 
-HEAD_BYTES = 400
+HEAD_BYTES = 150
 """Of a file, besides its shapes."""
 
 STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}

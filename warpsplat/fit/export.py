@@ -9,7 +9,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.kernels import constants
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own, render_svg
-from warpsplat.svg.write import write_svg
+from warpsplat.svg.write import minified, shortened, write_svg
 
 
 def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
@@ -25,6 +25,15 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
         title=settings.title,
         ids=settings.ids,
     )
+
+
+def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
+    """As ``export``, as short as the settings allow."""
+    text = export(scene, settings, per_pixel, metadata)
+    if settings.minify:
+        return minified(text)
+    # A sheet is made of the usual head.
+    return text if settings.size or settings.page or settings.units else shortened(text)
 
 
 def show(text: str, scene: Scene) -> Image.Image:

@@ -12,9 +12,6 @@ from warpsplat.alpha import CLEAR, on, straight
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
-OPACITY = 0.98
-"""Opacity of a new shape: it hides what it should replace, and may still become translucent."""
-
 COVER = 1.3
 """Area of the first shapes over the area of the canvas: circles on a grid that leave few gaps."""
 
@@ -189,7 +186,7 @@ def _new(
         points,
         settings.basis,
         colors=np.asarray(colors, np.float32).reshape(len(points), 3),
-        opacities=np.full(len(points), OPACITY_RANGE[1] if settings.opaque else OPACITY, np.float32),
+        opacities=np.full(len(points), OPACITY_RANGE[1] if settings.opaque else settings.opacity, np.float32),
         widths=np.asarray(widths, np.float32),
     )
 

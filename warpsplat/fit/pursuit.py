@@ -8,27 +8,29 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
+from warpsplat.fit.afford import STYLE_BYTES
 from warpsplat.fit.density import densify
-from warpsplat.fit.export import export
+from warpsplat.fit.export import finished
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.rounding import STAGES, stage_steps
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
+from warpsplat.fit.simplify import LEAST_POINTS, simplify
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
+from warpsplat.fit.tiny import FEW, grounded
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.scene import FloatArray
+from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.write import path_sizes
 
 Report = Callable[[Progress], None]
 Stop = Callable[[], bool]
-
-METADATA = "0" * 8
-"""As long as that of a finished file."""
 
 LAST_STEPS = 0.2
 """Share of the run that is done again where shapes went or came."""
@@ -64,11 +66,18 @@ class Pursuit:
     settings: Settings
     """With the goals; their ``curves`` are the most that there may be."""
     backend: Backend
+    metadata: str
+    """Of the file."""
     importance: FloatArray | None
     deadline: float
     """Of ``time.monotonic``; infinite where there is none."""
     report: Report | None
     stop: Stop | None
+
+    @property
+    def may_choose_ground(self) -> bool:
+        """Whether the ground may have any colour."""
+        return self.settings.background == "auto" and not self.settings.is_limited
 
     def over(self) -> bool:
         """Whether there is no time for another round, or the user wants no more."""
@@ -88,7 +97,7 @@ class Pursuit:
     def made(self, result: Fit) -> Made:
         """``result`` with the figures of its file."""
         result = replace(result, scene=result.scene.take(by_opacity(result.scene)))
-        text = export(result.scene, self.settings, result.per_pixel, METADATA)
+        text = finished(result.scene, self.settings, result.per_pixel, self.metadata)
         score = score_svg(text, self.image, own=True, eyes=False)
         return Made(result, score.bytes, score.psnr)
 
@@ -117,15 +126,14 @@ class Pursuit:
         sizes = path_sizes(scene, base.fit.per_pixel)
         if wanted < base.size:
             seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
-            order = np.argsort(seen / sizes, kind="stable")
-            removed = np.cumsum(sizes[order])
-            count = min(1 + int(np.searchsorted(removed, base.size - wanted)), len(scene) - 1)
-            scene = scene.take(np.sort(order[count:]))
+            scene = smaller(scene, seen, sizes, base.size - wanted)
         else:
             count = min(math.ceil((wanted - base.size) / sizes.mean()), settings.curves - len(scene))
             if count > 0:
                 image = step.renderer.read_image()
                 scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
+        if len(scene) <= FEW and self.image.shape[2] == 3 and self.may_choose_ground:
+            scene = grounded(scene, self.image, self.backend)
         before_stages = settings.iterations - STAGES * stage_steps(settings) - 1
         density = replace(settings.density, interval=0)
         return fit(
@@ -140,3 +148,27 @@ class Pursuit:
             report=report,
             stop=self.over,
         )
+
+
+def smaller(scene: Scene, seen: FloatArray, sizes: npt.NDArray[np.int64], excess: float) -> Scene:
+    """Without shapes, and for what is less than a shape without points of splines.
+
+    Args:
+        scene: what is to become smaller.
+        seen: what the error would grow by without each shape, shape (shape,).
+        sizes: of the shapes [bytes], shape (shape,).
+        excess: what has to go [bytes].
+    """
+    order = np.argsort(seen / sizes, kind="stable")
+    removed = np.cumsum(sizes[order])
+    count = min(int(np.searchsorted(removed, excess, "right")), len(scene) - 1)
+    left = excess - (float(removed[count - 1]) if count else 0.0)
+    kept = np.sort(order[count:])
+    counts = scene.point_counts()
+    splines = kept[(scene.basis[kept] == Basis.SPLINE) & (counts[kept] > LEAST_POINTS)]
+    if not len(splines):  # nothing less than a shape can go
+        return scene.take(np.sort(order[min(count + 1, len(scene) - 1) :]))
+    a_point = (sizes[splines].mean() - STYLE_BYTES[Kind.FILL]) / (counts[splines].mean() + 2)
+    scene, seen = scene.take(kept), seen[kept]
+    worth = np.maximum(seen, 0) / np.maximum(areas(scene), 1.0)
+    return simplify(scene, np.asarray(worth, np.float32), math.ceil(left / max(a_point, 1.0)))[0]

@@ -27,7 +27,7 @@ Painting = Literal["flat", "linear", "radial", "auto"]
 FRACTION = (0.0, 1.0)
 WEIGHT = (0.0, 1e6)
 RANGES: dict[str, tuple[float, float]] = {
-    **dict.fromkeys(("coarse", "final_rate", "texture"), FRACTION),
+    **dict.fromkeys(("coarse", "final_rate", "texture", "opacity"), FRACTION),
     **dict.fromkeys(("ssim", "xing", "bending", "level_weight"), WEIGHT),
     **dict.fromkeys(("fold_start", "fold_end"), (1e-6, 1e6)),
     "softness": (0.0, 100.0),
@@ -135,6 +135,8 @@ class Settings:
     fine_pixels: int = 1_600_000
     """Largest size of the image that the last iterations see [pixels]."""
     seed: int = 0
+    opacity: float = 0.98
+    """Of a new shape: it hides what it should replace, and may still become translucent."""
     chain_cubics: int = 2
     """Cubics in each of the two chains of a closed curve."""
     renderer: Renderer = "exact"
@@ -292,7 +294,7 @@ class Settings:
             f"paint {self.paint}": self.paint != "flat",
             f"renderer {self.renderer}": self.renderer != "exact",
             "target-psnr": self.target_psnr is not None,
-            "max-bytes": self.max_bytes is not None,
+            "max-bytes": self.max_bytes is not None and self.subject != "drawing",
         }
         return [name for name, is_given in given.items() if is_given]
 

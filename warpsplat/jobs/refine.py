@@ -20,7 +20,7 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import KeptScene, load_kept
 from warpsplat.svg.viewer import on_white, render_svg
-from warpsplat.svg.write import minified, write_svg
+from warpsplat.svg.write import minified, shortened, write_svg
 
 
 def refine(
@@ -80,7 +80,7 @@ def refine(
     svg = write_svg(
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
-    svg = minified(svg) if settings.minify else svg
+    svg = minified(svg) if settings.minify else shortened(svg)
     eyes = has_time_for_eyes(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr

@@ -11,6 +11,7 @@ import numpy as np
 
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import Refinement, matching
+from warpsplat.fit.export import finished
 from warpsplat.fit.loop import Fit, Progress
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.rounding import finest
@@ -37,10 +38,13 @@ def decided(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
     """
     if settings.subject != "auto":
         return settings, ""
-    fitted = settings.fitted_options()
+    # Of a size, drawings know as well: with fewer regions.
+    fitted = replace(settings, max_bytes=None).fitted_options()
     guess = guess_subject(target) if fitted in ([], ["mixed"]) else None
     if guess is None or (fitted and guess.subject != "line"):
         return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
+    if settings.max_bytes and guess.subject not in {"photo", "drawing"}:
+        return replace(settings, subject="photo"), "max-bytes is for fitted shapes and drawings"
     return replace(settings, subject=guess.subject), guess.why
 
 
@@ -65,11 +69,45 @@ def draw(
         return _made(scene, per_pixel, target, backend, interrupted=False)
     if settings.subject == "line":
         return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop)
+    most = None if settings.simplify else settings.curves
+    made = _drawn(target, settings, backend, most, over, stop)
+    low, high = 0, len(made.scene)  # regions that fit into the size, and that do not
+    best, size = made, _size(made, settings)
+    if not settings.max_bytes or size <= settings.max_bytes:
+        return made
+    for _ in range(FEWER_ROUNDS):
+        share = settings.max_bytes / size if not low else 0.5
+        count = min(max(low + round(share * (high - low)), low + 1), high - 1)
+        if count <= low or over():
+            break
+        made = _drawn(target, settings, backend, count, over, stop)
+        size = _size(made, settings)
+        if size <= settings.max_bytes:
+            low, best = count, made
+        else:
+            high = count
+            best = best if low else made
+    return best
+
+
+def _size(made: Fit, settings: Settings) -> int:
+    """Bytes of the file."""
+    return len(finished(made.scene, settings, made.per_pixel).encode())
+
+
+FEWER_ROUNDS = 5
+"""Numbers of regions at the most that are tried for ``max_bytes``."""
+
+
+def _drawn(
+    target: FloatArray, settings: Settings, backend: Backend, most: int | None, over: Stop, stop: Stop | None
+) -> Fit:
+    """A drawing of ``most`` regions, finished."""
     size = enlargement(target)
     shown, target = target, np.ascontiguousarray(target[::size, ::size])
-    traced = trace(target, most=None if settings.simplify else settings.curves)
+    traced = trace(target, most=most)
     scene = limited(traced.scene, settings)
-    finished = finish_drawing(
+    done = finish_drawing(
         target,
         Drawing(scene, traced.joints, traced.same),
         backend,
@@ -77,7 +115,7 @@ def draw(
         finest=finest(settings),
         stop=over,
     )
-    scene, per_pixel = enlarged(finished.drawing.scene, size), finished.per_pixel / size
+    scene, per_pixel = enlarged(done.drawing.scene, size), done.per_pixel / size
     return _made(scene, per_pixel, shown, backend, interrupted=bool(stop and stop()))
 
 

@@ -20,7 +20,7 @@ from warpsplat.files.importance import load_importance
 from warpsplat.files.output import write_svg_text
 from warpsplat.files.sources import ImageSource, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
-from warpsplat.fit.export import export
+from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
@@ -36,7 +36,6 @@ from warpsplat.scene.geometry import areas
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_color, by_opacity
 from warpsplat.svg.page import placed
-from warpsplat.svg.write import minified
 
 
 @dataclass(frozen=True)
@@ -158,10 +157,17 @@ def vectorize(
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
     traced = scene is None and settings.subject not in {"auto", "photo"}
-    pursued = scene is None and (settings.target_psnr or settings.max_bytes)
+    pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
-            target, settings, backend, importance=importance, seconds=seconds, report=report, stop=stop
+            target,
+            settings,
+            backend,
+            metadata=metadata,
+            importance=importance,
+            seconds=seconds,
+            report=report,
+            stop=stop,
         )
     elif traced:
         made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop)
@@ -227,8 +233,7 @@ def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: 
     """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
 
     def made() -> str:
-        text = export(scene, settings, per_pixel, metadata)
-        return minified(text) if settings.minify else text
+        return finished(scene, settings, per_pixel, metadata)
 
     svg = made()
     while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:

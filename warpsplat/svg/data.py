@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from warpsplat.scene import Basis, IndexArray, Kind, Scene
 from warpsplat.svg.commands import Pair, minus, segments_of, shortest, shortest_ring
+from warpsplat.svg.smooth import SMALL, shortest_smooth
 
 
 def integers(pairs: Iterable[Pair]) -> str:
@@ -165,6 +166,8 @@ def spline_data(half: list[Pair], closed: bool, *, turns: bool = True) -> str:
     if not closed:
         joints = [(2 * half[0][0], 2 * half[0][1]), *joints[1:-1], (2 * half[-1][0], 2 * half[-1][1])]
     control = (2 * ring[1][0], 2 * ring[1][1])
+    if max(abs(value) for joint in joints for value in joint) <= SMALL:
+        return shortest_smooth(joints, control)
     steps = [minus(after, before) for before, after in itertools.pairwise(joints)]
     text = f"M{integers(joints[:1])}q{integers([minus(control, joints[0]), steps[0]])}"
     return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text

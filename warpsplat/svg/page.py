@@ -118,13 +118,15 @@ def placed(text: str, size: str, page: str, unit: str) -> str:
     """
     if size and page:
         raise UsageError("size and page do not go together")
+    if not (size or page or unit):
+        return text
     found = HEAD.match(text)
     assert found
     if size:
         return on_sheet(text, parse_size(size, unit or "mm"))
     if page:
         return on_sheet(text, parse_page(page, int(found[1]), int(found[2]), unit=unit or "mm"))
-    return in_units(text, unit) if unit else text
+    return in_units(text, unit)
 
 
 def in_units(text: str, unit: str, dpi: float = 96.0) -> str:

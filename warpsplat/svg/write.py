@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
 from warpsplat.svg.names import LEVEL_ID, Names, color_names
@@ -206,12 +207,40 @@ def _groups(
             _path(scene, i, data.of(i), colors[i], both[i], per_pixel, rest[i], in_group=in_group)
             for i in shapes
         ]
+        paths = _joined(scene, shapes, paths)
         group = (f"<g {STROKE_ATTRIBUTES}>", "</g>") if in_group else ("", "")
         by_color = ids and not scene.layer_names
         inner = painted(paths, [called[i] for i in shapes], group_names) if by_color else nested(paths)
         yield from (group[0], *inner, group[1])
     if last is not None:
         yield "</g>"
+
+
+APART = 1.0
+"""Shapes nearer to each other than this [px] share pixels."""
+
+
+def _joined(scene: Scene, shapes: list[int], paths: list[Path]) -> list[Path]:
+    """Neighbours among fitted fills that say the same and lie apart as one path, which shows the same.
+
+    Those of drawings stay: there a path is a region.
+    """
+    alike = [a.shared == b.shared and not (a.own or b.own) for a, b in itertools.pairwise(paths)]
+    if not any(alike):
+        return paths
+    chosen = (scene.kind[shapes] == Kind.FILL) & (scene.basis[shapes] == Basis.SPLINE)
+    boxes = bounds(scene)[shapes]
+    low, high = boxes[:, :2] - APART / 2, boxes[:, 2:] + APART / 2
+    found, first = [paths[0]], 0
+    for i, is_alike in enumerate(alike, 1):
+        before = slice(first, i)
+        apart = ((low[before] >= high[i]) | (low[i] >= high[before])).any(axis=1)
+        if is_alike and chosen[before].all() and chosen[i] and apart.all():
+            found[-1] = replace(found[-1], data=found[-1].data + paths[i].data)
+        else:
+            found.append(paths[i])
+            first = i
+    return found
 
 
 def write_svg(
@@ -296,5 +325,39 @@ def read_metadata(text: str) -> str:
 
 def minified(text: str) -> str:
     """A file written here without the mark and line breaks, which show nothing."""
-    head, found, rest = text.partition(MARK)
+    head, found, rest = _plain(text).partition(MARK)
     return head + rest.partition("-->\n")[2].rstrip("\n") if found else text
+
+
+SHORT = 1500
+"""A file of fewer characters has no comment: the mark is the order of its attributes, which costs nothing
+(``files.output`` knows both)."""
+
+SHORT_HEAD = re.compile(
+    rf'<svg viewBox="0 0 ([\d.]+) ([\d.]+)" xmlns="{re.escape(NAMESPACE)}" height="(\d+)" width="(\d+)">'
+)
+"""How a short file begins."""
+
+
+def shortened(text: str) -> str:
+    """A file written here, where it is short without the comment and line breaks; one whose comment says more
+    than the mark stays as it is.
+    """
+    head = OUR_HEAD.match(text)
+    if not head or not text.startswith("-->\n", head.end()) or len(text) >= SHORT:
+        return text
+    width, height, *box = head.groups()
+    rest = text[head.end() + len("-->\n") :].rstrip("\n")
+    return f'<svg viewBox="0 0 {" ".join(box)}" xmlns="{NAMESPACE}" height="{height}" width="{width}">{rest}'
+
+
+def _plain(text: str) -> str:
+    """A short file with the comment again; any other as it is."""
+    head = SHORT_HEAD.match(text)
+    if not head:
+        return text
+    *box, height, width = head.groups()
+    return (
+        f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="0 0 {" ".join(box)}">'
+        f"{MARK}-->\n{text[head.end() :]}\n"
+    )

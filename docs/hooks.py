@@ -1,0 +1,111 @@
+"""What the site shows of texts that have their home elsewhere: files of the repository's top, parts of the
+README, and the help of the commands.
+"""
+
+from __future__ import annotations
+
+import html
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+
+from warpsplat.cli.main import COMMANDS, cli
+
+ROOT = Path(__file__).parents[1]
+PAGES = {
+    "architecture.md": "ARCHITECTURE.md",
+    "changelog.md": "CHANGELOG.md",
+    "contributing.md": "CONTRIBUTING.md",
+}
+"""Pages that are files of the repository's top."""
+
+REPOSITORY = "https://github.com/warpsplat/warpsplat/blob/main/"
+
+COMMANDS_INTRODUCTION = """# Commands
+
+What `warpsplat COMMAND --help` says. [Options and settings](settings.md) says more about what decides the
+result.
+"""
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are made."""
+    for page, source in PAGES.items():
+        text = (ROOT / source).read_text(encoding="utf-8")
+        files.append(File.generated(config, page, content=linked(text)))
+    reference = "\n".join(
+        [COMMANDS_INTRODUCTION, *(line for name in COMMANDS for line in command_help(name))]
+    )
+    files.append(File.generated(config, "commands.md", content=reference))
+    return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put parts of files where a page says ``<!-- FILE: NAME -->``."""
+    return re.sub(r"^<!-- (\S+): (\w+) -->$", lambda m: part(m[1], m[2]), markdown, flags=re.MULTILINE)
+
+
+def part(file: str, name: str) -> str:
+    """What lies between ``<!-- name -->`` and ``<!-- /name -->``.
+
+    Raises:
+        PluginError: the file has no such part.
+    """
+    text = (ROOT / file).read_text(encoding="utf-8")
+    found = re.search(rf"<!-- {name} -->\n(.*?)<!-- /{name} -->", text, re.DOTALL)
+    if not found:
+        raise PluginError(f"{file} has no part {name!r}")
+    return linked(found[1])
+
+
+def linked(text: str) -> str:
+    """Markdown with links among the repository's files as links among the site's pages."""
+    for page, source in PAGES.items():
+        text = re.sub(rf"\]\(({re.escape(REPOSITORY)})?{source}", f"]({page}", text)
+    return re.sub(rf"\]\(({re.escape(REPOSITORY)})?docs/", "](", text)
+
+
+def command_help(name: str) -> Iterator[str]:
+    """Lines of Markdown on a command."""
+    command = cli.get_command(click.Context(cli), name)
+    assert command
+    context = click.Context(command, info_name=f"warpsplat {name}", **command.context_settings)
+    yield f"## {name}\n"
+    yield from paragraphs(inspect.cleandoc(command.help or ""))
+    yield f"```text\n{command.get_usage(context).removeprefix('Usage: ')}\n```\n"
+    yield "| option | meaning | default |\n|---|---|---|"
+    for parameter in command.get_params(context):
+        record = parameter.get_help_record(context)
+        if record and isinstance(parameter, click.Option):
+            yield option_row(*record)
+    yield ""
+
+
+def option_row(flags: str, meaning: str) -> str:
+    """A row of a table of options; what click adds in brackets is the default, or known from the rest."""
+    default = re.search(r"\[default(?:: (.*?))?\]", meaning)
+    words = re.sub(r"\[(default|x[<>]|\d).*$", "", meaning)
+    name, _, choices = flags.partition("[")
+    choices = f' <code class="choices">{choices.strip("]").replace("|", ", ")}</code>' if choices else ""
+    cells = (
+        f"<code>{name.strip()}</code>{choices}",
+        html.escape(words),
+        (default[1] or "yes") if default else "",
+    )
+    return "| " + " | ".join(" ".join(text.split()) for text in cells) + " |"
+
+
+def paragraphs(text: str) -> Iterator[str]:
+    r"""Markdown of a command's help, whose paragraphs after a ``\b`` keep their lines."""
+    for paragraph in text.split("\n\n"):
+        lines = paragraph.split("\n")
+        if lines[0].strip() == "\b":
+            lines = ["```yaml", *lines[1:], "```"]
+        yield "\n".join(lines) + "\n"

@@ -1,0 +1,142 @@
+"""What the documentation says works: its Python runs, its commands parse, its links lead somewhere.
+
+Python blocks that are whole programs are marked ``python``; fragments are marked ``py``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import runpy
+import shlex
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+from PIL import Image
+
+from tests import ROOT
+from warpsplat.cli.main import COMMANDS, cli
+from warpsplat.fit.settings import PRESETS
+from warpsplat.svg.viewer import render_svg
+
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+CAT = "docs/images/cat.jpg"
+PHOTOGRAPHS = ("photo.jpg", "cat.jpg", CAT)
+"""What pages call one: the reader's own, the tutorial's copy, and the repository's."""
+
+SMALL = (72, 64)
+"""Pixels that it is reduced to, so that blocks are quick."""
+
+NEEDED = {"warpsplat.torch": "torch"}
+"""What parts of the library need, which need not be installed."""
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The code of a page in a language, without what a list indents it by."""
+    text = page.read_text("utf-8")
+    found = re.findall(rf"^( *)```{language}\n(.*?)^\1```$", text, re.DOTALL | re.MULTILINE)
+    return [re.sub(rf"^{indent}", "", code, flags=re.MULTILINE) for indent, code in found]
+
+
+def with_code(language: str) -> list[object]:
+    return [pytest.param(page, id=page.name) for page in PAGES if blocks(page, language)]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A reader's folder: the pictures of the documentation, small; and runs are short."""
+    (tmp_path / CAT).parent.mkdir(parents=True)
+    for path in ROOT.glob("docs/images/sources/*"):
+        shutil.copy(path, tmp_path)
+    with Image.open(ROOT / CAT) as image:
+        image.thumbnail(SMALL)
+        for name in PHOTOGRAPHS:
+            image.save(tmp_path / name)
+    for name in PRESETS:
+        monkeypatch.setitem(PRESETS, name, {"iterations": 30})
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", with_code("python"))
+def test_python_runs(page: Path, folder: Path) -> None:
+    """In order, each block after those before it."""
+    names: dict[str, object] = {"__name__": "__main__"}
+    for number, block in enumerate(blocks(page, "python")):
+        for module, needs in NEEDED.items():
+            if module in block:
+                pytest.importorskip(needs)
+        exec(compile(block, f"{page.name}, block {number}", "exec"), names)
+
+
+@pytest.mark.parametrize("page", with_code("sh"))
+def test_commands_parse(page: Path) -> None:
+    """Each line of ``warpsplat``: its command and options are there and take such values."""
+    for words in commands(page):
+        assert words[1] in COMMANDS, " ".join(words)
+        command = cli.get_command(click.Context(cli), words[1])
+        assert command
+        try:
+            command.make_context(words[1], words[2:])
+        except click.ClickException as error:
+            pytest.fail(f"{' '.join(words)}: {error.format_message()}")
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """The words of each run of warpsplat."""
+    for block in blocks(page, "sh"):
+        for line in block.replace("\\\n", " ").splitlines():
+            for part in line.split("&&"):
+                words = shlex.split(part, comments=True)
+                if words and Path(words[0]).name == "warpsplat":
+                    yield words
+
+
+def test_there_are_commands_to_parse() -> None:
+    assert len([words for page in PAGES for words in commands(page)]) > 30
+
+
+HERE = re.compile(
+    r"https://(raw\.githubusercontent\.com/warpsplat/warpsplat|github\.com/warpsplat/warpsplat/(blob|tree))/main/"
+)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_of_links_are_there(page: Path) -> None:
+    """Links among the repository's files, by its host's name as well; those of made pages the site checks."""
+    text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)\s#]+)", text):
+        if HERE.match(link):
+            assert (ROOT / HERE.sub("", link)).exists(), link
+        elif ":" not in link:
+            made = link in MADE and page.parent == ROOT / "docs"
+            assert made or (page.parent / link).exists(), link
+
+
+MADE = {"architecture.md", "changelog.md", "contributing.md", "commands.md"}
+"""Pages that the site makes."""
+
+
+def test_words_of_the_pages_are_public() -> None:
+    """What Python blocks take from the package is what it offers."""
+    for page in PAGES:
+        for block in blocks(page, "python"):
+            for name in re.findall(r"\bwarpsplat\.(\w+)", re.sub(r"[\"'].*?[\"']", "", block)):
+                public = importlib.import_module("warpsplat").__all__
+                assert name in {*public, "torch", "pydiffvg", "errors", "scene"}, (
+                    f"{page.name}: warpsplat.{name}"
+                )
+
+
+def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
+    """All of them; the script holds its gradient against central differences."""
+    runpy.run_path(str(ROOT / "docs" / "figures.py"))["main"](tmp_path)
+    kept = ROOT / "docs" / "images" / "how"
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept.iterdir()}
+    for path in tmp_path.iterdir():
+        assert (
+            render_svg(path.read_text("utf-8")).size == render_svg((kept / path.name).read_text("utf-8")).size
+        )
