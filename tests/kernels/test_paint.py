@@ -62,4 +62,4 @@ def test_no_other_kernel_knows_a_paint() -> None:
         for path in (ROOT / "kernels").rglob("*.py")
         if path.parent.name != "paint" and asked_of_paints(ast.parse(path.read_text("utf-8")))
     }
-    assert asking == {"composite.py", "composite_paint.py", "bins.py"}
+    assert asking == {"composite.py", "composite_paint.py", "composite_opaque.py", "bins.py"}
