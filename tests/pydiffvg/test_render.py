@@ -204,6 +204,8 @@ def test_what_is_not_there_says_so() -> None:
     refused("center of shape 0 has shape", [pydiffvg.Circle(tensor(1.0), torch.zeros(3))], [group])
     with pytest.raises(UsageError, match="render_grad"):
         pydiffvg.RenderFunction.render_grad()
+    with pytest.raises(UsageError, match="a point of a shape is not finite"):
+        render([pydiffvg.Circle(tensor(float("nan")), tensor(9, 9))], [group])
     with pytest.raises(UsageError, match="background_image has shape"):
         render([shape], [group], torch.zeros(SIZE, SIZE, 3))
 

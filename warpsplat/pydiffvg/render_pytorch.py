@@ -97,7 +97,7 @@ class RenderFunction:
             that are not premultiplied, and black where nothing is: at the edge of what is drawn it fades.
 
         Raises:
-            UsageError: arguments that are none, a background of another shape.
+            UsageError: arguments that are none, a background of another shape, points that are not finite.
         """
         if len(args) != 1 or not isinstance(args[0], SceneArguments):
             raise UsageError("RenderFunction.apply takes what RenderFunction.serialize_scene gave, unchanged")
@@ -128,6 +128,10 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
     if not layout.rows:
         return torch.zeros(height, width, 4, device=device) if background is None else background
     tensors = assemble(scene, layout, size, device)
+    if not bool(tensors.values["points"].isfinite().all()):
+        raise UsageError(
+            "a point of a shape is not finite: an optimiser has run away, or a shape has no size"
+        )
     if _print_timing:
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
         began = time.perf_counter()
