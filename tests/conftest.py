@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 # Fixed before Warp reads it, so that kernels are compiled once and kept between runs of the suite.
@@ -23,6 +24,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--device", action="append", default=None, help="Warp devices to test (default: all here)"
     )
+
+
+@pytest.fixture
+def single_precision() -> Iterator[None]:
+    """PyTorch as its users find it: the reference renderer makes float64 the default type."""
+    import torch
+
+    before = torch.get_default_dtype()
+    torch.set_default_dtype(torch.float32)
+    yield
+    torch.set_default_dtype(before)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

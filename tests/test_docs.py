@@ -22,6 +22,8 @@ from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
 from warpsplat.svg.viewer import render_svg
 
+pytestmark = pytest.mark.usefixtures("single_precision")
+
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 CAT = "docs/images/cat.jpg"
 PHOTOGRAPHS = ("photo.jpg", "cat.jpg", CAT)

@@ -19,6 +19,8 @@ from PIL import Image
 import warpsplat
 from tests import ROOT
 
+pytestmark = pytest.mark.usefixtures("single_precision")
+
 EXAMPLES = ROOT / "examples"
 STEPS = 25
 CURVES = 12
