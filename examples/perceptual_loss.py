@@ -16,6 +16,8 @@ POOLED = {2, 4, 7, 10}
 """Convolutions of VGG16, counted from 0, before which the picture is halved."""
 COMPARED = {1, 3, 6}
 """Those after which pictures are compared."""
+REDUCED = 2
+"""How much smaller the network sees pictures, for speed."""
 MEAN, DEVIATION = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
 
 
@@ -34,7 +36,7 @@ def _number(name: str) -> int:
 
 def features(layers: list[tuple[torch.Tensor, torch.Tensor]], image: torch.Tensor) -> list[torch.Tensor]:
     """What the network sees in an image of shape (height, width, 3), at several depths."""
-    x, found = ((image - MEAN) / DEVIATION).permute(2, 0, 1)[None], []
+    x, found = F.avg_pool2d(((image - MEAN) / DEVIATION).permute(2, 0, 1)[None], REDUCED), []
     for i, (weight, bias) in enumerate(layers[: max(COMPARED) + 1]):
         x = F.max_pool2d(x, 2) if i in POOLED else x
         x = F.relu(F.conv2d(x, weight, bias, padding=1))
@@ -43,7 +45,7 @@ def features(layers: list[tuple[torch.Tensor, torch.Tensor]], image: torch.Tenso
     return found
 
 
-def main(source: str, output: str, weights: str, steps: int = 100, curves: int = 200) -> list[float]:
+def main(source: str, output: str, weights: str, steps: int = 60, curves: int = 200) -> list[float]:
     """The loss after each step."""
     layers = load(weights)
     wanted = torch.tensor(warpsplat.load_image(source))[..., :3]
