@@ -13,7 +13,7 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, training_seconds
+from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, noting, training_seconds
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
@@ -67,13 +67,9 @@ def refine(
     )
     seconds = training_seconds(settings, target, started)
     history: list[Progress] = []
-
-    def note(progress: Progress) -> None:
-        history.append(progress)
-        if report:
-            report(progress)
-
-    made = fit(target, settings, backend, scene=scene, seconds=seconds, report=note, stop=stop)
+    made = fit(
+        target, settings, backend, scene=scene, seconds=seconds, report=noting(history, report), stop=stop
+    )
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
         refined = clear_empty(refined, target, settings, backend, made.per_pixel)

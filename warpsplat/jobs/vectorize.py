@@ -323,6 +323,17 @@ def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tup
     return tuple(missed)
 
 
+def noting(history: list[Progress], report: Callable[[Progress], None] | None) -> Callable[[Progress], None]:
+    """What notes in ``history`` all that it is told, and passes it on to ``report``."""
+
+    def note(progress: Progress) -> None:
+        history.append(progress)
+        if report:
+            report(progress)
+
+    return note
+
+
 def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
     """An image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
 
@@ -377,11 +388,6 @@ def vectorize_image(
     chosen, why = decided(target, settings)
     history: list[Progress] = []
 
-    def note(progress: Progress) -> None:
-        history.append(progress)
-        if report:
-            report(progress)
-
     def on_paper(svg: str) -> str:
         return placed(svg, settings.size, settings.page, settings.units)
 
@@ -391,7 +397,7 @@ def vectorize_image(
         backend,
         metadata=key,
         importance=None if importance is None else load_importance(importance, width, height, mask_name),
-        report=note,
+        report=noting(history, report),
         stop=stop,
         write=None if output is None else lambda svg: write_svg_text(output, on_paper(svg)),
     )
