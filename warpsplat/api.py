@@ -390,7 +390,7 @@ def save_svg(
     Args:
         scene: what to write.
         path: one that ends in ``.svgz`` is gzipped.
-        precision: decimals of a pixel in coordinates; default: a grid of an eighth of a pixel.
+        precision: decimals of a pixel in coordinates; default: two.
         title: as for ``vectorize``, as are ``ids`` and ``minify``.
         ids: see there.
         minify: see there.
