@@ -8,3 +8,4 @@ Image sizes of a few dozen pixels.
 import torch
 
 torch.set_default_dtype(torch.float64)
+torch.set_num_threads(1)  # its arrays are small: threads would only wait for one another
