@@ -31,8 +31,8 @@ STOPPED = 53
 """Steps, behind the first look at the file; more in the first fit of several."""
 
 WORDS = (
-    "step", "began", "curves", "per_pixel", "settled", "rounding", "colored", "generator", "room", "fits",
-    "state", "samples", "slots", "needed", "inc", "has_uint32", "PCG64", "true", "false", "null", "NaN", "Infinity",
+    "step", "began", "curves", "per_pixel", "settled", "rounding", "colored", "generator", "room",
+    "fits", "state", "samples", "slots", "needed", "inc", "has_uint32", "PCG64", "true", "false", "null", "NaN", "Infinity",
 )  # fmt: skip
 
 SNIPPETS = (
@@ -105,7 +105,10 @@ def _parts(data: bytes) -> list[tuple[str, bytes]]:
 
 def _other_numbers(rng: random.Random, part: bytes) -> bytes:
     """An array with some of its numbers changed, or with rows more or less."""
-    array = np.load(io.BytesIO(part))
+    try:
+        array = np.load(io.BytesIO(part))
+    except (ValueError, OSError):  # changed already
+        return mutate.mutate_bytes(rng, part, part)
     flat = array.reshape(-1)
     whole = array.dtype == np.int32
     for _ in range(rng.choice((1, 1, 2, 8)) if len(flat) else 0):
