@@ -32,7 +32,8 @@ STOPPED = 53
 
 WORDS = (
     "step", "began", "curves", "per_pixel", "settled", "rounding", "colored", "generator", "room",
-    "fits", "state", "samples", "slots", "needed", "inc", "has_uint32", "PCG64", "true", "false", "null", "NaN", "Infinity",
+    "fits", "state", "samples", "slots", "needed", "inc", "has_uint32", "PCG64", "true", "false", "null",
+    "NaN", "Infinity",
 )  # fmt: skip
 
 SNIPPETS = (

@@ -22,7 +22,7 @@ from warpsplat.jobs import checkpoint as module
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata, write_svg
 
-PICTURE = picture()
+PICTURE = picture(48, 36)
 CLEAR = np.concatenate([PICTURE, np.ones_like(PICTURE[..., :1])], axis=2)
 CLEAR[:12, :20] = 0
 MASK = np.ascontiguousarray(PICTURE[..., 0])
@@ -35,16 +35,14 @@ def after(count: int) -> Callable[[], bool]:
 
 
 def fitted(**given: Any) -> warpsplat.Result:
-    return warpsplat.vectorize(
-        **{"image": PICTURE, "curves": 10, "iterations": 56, "seed": 1, "subject": "photo", "device": "cpu"}
-        | given
-    )
+    common = {"image": PICTURE, "curves": 10, "iterations": 56, "seed": 1, "subject": "photo"}
+    return warpsplat.vectorize(**{**common, "device": "cpu", "threads": 1, **given})
 
 
 def refined(**given: Any) -> warpsplat.Result:
     height, width = PICTURE.shape[:2]
     text = write_svg(random_scene(Kind.FILL, count=6, width=width, height=height, seed=3))
-    return warpsplat.refine(text, PICTURE, iterations=56, device="cpu", **given)
+    return warpsplat.refine(text, PICTURE, iterations=56, device="cpu", threads=1, **given)
 
 
 RUNS: dict[str, Callable[..., warpsplat.Result]] = {
@@ -52,27 +50,28 @@ RUNS: dict[str, Callable[..., warpsplat.Result]] = {
     "open": lambda **given: fitted(open=True, **given),
     "splat": lambda **given: fitted(renderer="splat", **given),
     "gaussian": lambda **given: fitted(renderer="gaussian", open=True, **given),
-    "layered": lambda **given: fitted(curves=None, levels=(4, 12), iterations=40, **given),
+    "layered": lambda **given: fitted(curves=None, levels=(4, 12), iterations=28, **given),
     "mixed": lambda **given: fitted(mixed=True, **given),
     "paint": lambda **given: fitted(paint="auto", **given),
     "palette": lambda **given: fitted(colors=4, **given),
     "transparent": lambda **given: fitted(**{"image": CLEAR} | given),
     "importance": lambda **given: fitted(importance=MASK, **given),
-    "size": lambda **given: fitted(max_bytes=1500, curves=40, iterations=40, **given),
-    "target": lambda **given: fitted(target_psnr=22.0, curves=20, iterations=30, **given),
+    "size": lambda **given: fitted(max_bytes=1200, curves=34, iterations=16, **given),
+    "target": lambda **given: fitted(target_psnr=20.0, curves=10, iterations=12, **given),
     "refine": refined,
 }
 
 
 @pytest.mark.parametrize("kind", RUNS)
 def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path, kind: str) -> None:
-    """Stopped twice: at a random step of the growth, and behind a look at the file."""
+    """Stopped at some step; exact ones twice, then behind a look at the file as well."""
     run, path = RUNS[kind], tmp_path / "run.checkpoint"
     whole = run()
     first = run(checkpoint=path, stop=after(3 + sum(map(ord, kind)) % 24))
     assert first.stopped and first.iterations < whole.iterations and is_packed(path)
-    second = run(checkpoint=path, resume=True, stop=after(28))
-    assert second.stopped and first.iterations < second.iterations < whole.iterations
+    if kind in {"closed", "transparent", "size"}:
+        second = run(checkpoint=path, resume=True, stop=after(30))
+        assert second.stopped and first.iterations < second.iterations < whole.iterations
     result = run(checkpoint=path, resume=True)
     assert result.svg == whole.svg
     assert result.as_dict() | {"seconds": 0} == whole.as_dict() | {"seconds": 0}
@@ -119,7 +118,7 @@ def test_a_stopped_file_says_so_and_a_goal_is_stopped_between_its_fits(tmp_path:
     """In the last step of a fit: it is done, and the next one is begun by the run that goes on."""
     path = tmp_path / "run.checkpoint"
     run = RUNS["layered"]
-    stopped = run(checkpoint=path, stop=after(30))
+    stopped = run(checkpoint=path, stop=after(21))
     header, _ = unpack(path)
     assert not header["under way"] and len(header["fits"]) == 1
     assert "stopped" in read_metadata(stopped.svg)
