@@ -67,10 +67,10 @@ def cli() -> None:
     """Turn raster images into SVGs of Bézier shapes by gradient descent.
 
     \b
-    Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image or
-    SVG, 4 result could not be written, 5 some images of a batch failed, 6 a goal
-    was missed, 7 not enough memory, threads or kernel cache, 130 interrupted,
-    143 terminated.
+    Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
+    or checkpoint, 4 result could not be written, 5 some images of a batch failed,
+    6 a goal was missed, 7 not enough memory, threads or kernel cache, 130
+    interrupted, 143 terminated.
     """  # noqa: D301
 
 

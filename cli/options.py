@@ -39,6 +39,33 @@ overwrite_option = click.option(
 )
 
 
+def checkpoint_options(function: Function) -> Function:
+    """How a run that was ended goes on; the keywords of ``warpsplat.vectorize`` but for ``overwrite``."""
+    options = [
+        click.option(
+            "--checkpoint",
+            type=FILE,
+            metavar="FILE",
+            help="Keep the state of the run in FILE until it is done, also when it is stopped by a signal.",
+        ),
+        click.option(
+            "--resume",
+            is_flag=True,
+            help="Go on from the checkpoint, to the same file as without a stop; where there is none, start.",
+        ),
+        click.option(
+            "--checkpoint-every",
+            default="30s",
+            show_default=True,
+            metavar="TIME",
+            help="Time between two times that the state is kept.",
+        ),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
 def voice_options(function: Function) -> Function:
     """``-v`` and ``-q``."""
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
+from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
@@ -34,6 +34,7 @@ from warpsplat.jobs.options import BY_NAME
     is_flag=True,
     help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
 )
+@checkpoint_options
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
@@ -46,6 +47,9 @@ def command(
     verbose: int,
     quiet: bool,
     as_json: bool,
+    checkpoint: Path | None,
+    resume: bool,
+    checkpoint_every: str,
     keep: bool,
     **given: Any,
 ) -> None:
@@ -60,6 +64,8 @@ def command(
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
     check_output(output, svg, image, endings=SVG_ENDINGS, overwrite=overwrite)
+    if checkpoint:
+        check_output(checkpoint, svg, image)
     from warpsplat.api import refine
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
@@ -80,6 +86,10 @@ def command(
             callback=report,
             stop=interrupt,
             name=input_name(svg),
+            checkpoint=checkpoint,
+            resume=resume,
+            checkpoint_every=checkpoint_every,
+            overwrite=overwrite,
         )
     before = result.before or 0.0
     if result.kept and not quiet:

@@ -93,10 +93,11 @@ def run_file(
     keyed: bool = False,
     verbose: int = 0,
     quiet: bool = False,
+    **keeping: Any,
 ) -> Result:
     """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask. ``keyed``: see there.
+    ``importance``: file of a mask. ``keyed``, and what says how to keep its state: see there.
     """
     pursued = settings.target_psnr or settings.max_bytes
     start_warp()
@@ -119,6 +120,7 @@ def run_file(
             keyed=keyed,
             callback=report,
             stop=interrupt,
+            **keeping,
         )
     count = len(result.scene)
     traced = result.subject != "photo"

@@ -10,6 +10,7 @@ import click
 
 from warpsplat.cli.options import (
     FILE,
+    checkpoint_options,
     importance_option,
     overwrite_option,
     quality_options,
@@ -58,6 +59,7 @@ def _level(level: dict[str, Any]) -> str:
 @overwrite_option
 @quality_options
 @importance_option
+@checkpoint_options
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
@@ -74,6 +76,9 @@ def command(
     quiet: bool,
     as_uri: bool,
     as_json: bool,
+    checkpoint: Path | None,
+    resume: bool,
+    checkpoint_every: str,
     **given: Any,
 ) -> None:
     """Turn IMAGE (- is the standard input) into an SVG and say how good the file is.
@@ -96,6 +101,8 @@ def command(
     output = output or Path(image.name).with_suffix(".svg")
     inputs = (image,) if importance is None else (image, importance)
     check_output(output, *inputs, endings=SVG_ENDINGS, overwrite=overwrite)
+    if checkpoint:
+        check_output(checkpoint, *inputs)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(
@@ -108,6 +115,10 @@ def command(
         importance=importance,
         verbose=verbose,
         quiet=quiet,
+        checkpoint=checkpoint,
+        resume=resume,
+        checkpoint_every=checkpoint_every,
+        overwrite=overwrite,
     )
     if as_uri:
         from warpsplat.svg.uri import data_uri

@@ -24,7 +24,10 @@ from warpsplat.fit.loop import Progress
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Painting, Quality, Renderer, Settings, Subject, make_settings
+from warpsplat.fit.stages import INTERVAL
 from warpsplat.fit.step import model_for
+from warpsplat.fit.texts import parse_duration
+from warpsplat.jobs.checkpoint import CheckpointFile
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.refine import refine as refine_scene
 from warpsplat.jobs.render import RendererName, drawn
@@ -86,6 +89,10 @@ def vectorize(
     stop: Callable[[], bool] | None = None,
     name: str | None = None,
     keyed: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    checkpoint_every: float | str = INTERVAL,
+    overwrite: bool = False,
 ) -> Result:
     """Turn an image into an SVG, and measure how good it is.
 
@@ -130,6 +137,11 @@ def vectorize(
         stop: asked after every step; once true, the shapes as they are make the file.
         name: how messages call the image; default: its file's name.
         keyed: mark the file with what it was made of, by which batches know it.
+        checkpoint: file in which the state of the run is kept until it is done, every ``checkpoint_every``
+            and when it is stopped.
+        resume: go on from the checkpoint, to the bytes of an uninterrupted run; where there is none, start.
+        checkpoint_every: seconds, or ``"2m"``.
+        overwrite: let a run that starts anew replace a checkpoint, or any other file, of that name.
 
     Returns:
         the SVG, its scene, its score and the run's history.
@@ -137,6 +149,7 @@ def vectorize(
     Raises:
         UsageError: a setting or device that cannot be used as given.
         ImageError: an image or mask that cannot be read.
+        CheckpointError: a checkpoint that cannot be read; one of another run is a ``UsageError``.
         OutputError: ``output`` cannot be written.
         ResourceError: memory, threads, or a place for compiled kernels are missing.
         TypeError: an image of none of these forms.
@@ -172,6 +185,9 @@ def vectorize(
         settings = settings_from(given)
     elif others := [key for key, value in given.items() if value is not None]:
         raise UsageError(f"settings are given, and {others[0]} besides")
+    kept = _checkpoint(
+        checkpoint, checkpoint_every, (image, importance, output), resume=resume, overwrite=overwrite
+    )
     watch = _Watch(callback, stop)
     with _backend(device, threads) as backend:
         return vectorize_image(
@@ -184,6 +200,7 @@ def vectorize(
             keyed=keyed,
             report=watch.report,
             stop=watch.stop,
+            checkpoint=kept,
         )
 
 
@@ -206,6 +223,10 @@ def refine(
     callback: Callback | None = None,
     stop: Callable[[], bool] | None = None,
     name: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    checkpoint_every: float | str = INTERVAL,
+    overwrite: bool = False,
 ) -> Result:
     """Improve the paths of any SVG against an image by gradient descent; none is added.
 
@@ -227,14 +248,18 @@ def refine(
         threads: see there.
         callback: see there.
         stop: see there.
+        checkpoint: see there.
+        resume: see there.
+        checkpoint_every: see there.
+        overwrite: see there.
 
     Returns:
         the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better
         was found.
 
     Raises:
-        UsageError, ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``; an SVG that
-            cannot be read, or held, is an ``ImageError``.
+        UsageError, ImageError, CheckpointError, OutputError, ResourceError, TypeError: as for
+            ``vectorize``; an SVG that cannot be read, or held, is an ``ImageError``.
     """
     settings = settings or make_settings(
         iterations=iterations,
@@ -248,6 +273,7 @@ def refine(
     name = name or _svg_name(svg)
     text = _text(svg, name)
     target = load_target(image, None, settings.background)
+    kept = _checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     watch = _Watch(callback, stop)
     with _backend(device, threads) as backend:
         result = refine_scene(
@@ -259,9 +285,12 @@ def refine(
             keep=keep,
             report=watch.report,
             stop=watch.stop,
+            checkpoint=kept,
         )
     if output is not None:
         write_svg_text(Path(output), result.svg)
+    if kept and not result.stopped:
+        kept.remove()
     return result
 
 
@@ -443,6 +472,24 @@ class _Watch:
 
     def stop(self) -> bool:
         return self._enough or bool(self._stop and self._stop())
+
+
+def _checkpoint(
+    path: str | os.PathLike[str] | None,
+    every: float | str,
+    others: tuple[object, ...],
+    *,
+    resume: bool,
+    overwrite: bool,
+) -> CheckpointFile | None:
+    """Where a run keeps its state, which is none of the ``others`` that are paths."""
+    if path is None:
+        if resume:
+            raise UsageError("to resume, a run needs a checkpoint")
+        return None
+    made = CheckpointFile(Path(path), resume, overwrite, parse_duration(every))
+    made.check(*(Path(other) for other in others if isinstance(other, (str, os.PathLike))))
+    return made
 
 
 @contextmanager

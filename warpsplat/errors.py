@@ -18,7 +18,7 @@ class ExitCode(IntEnum):
     USAGE = 2
     """An option, batch file, device or output that cannot be used as given."""
     INPUT = 3
-    """An image or SVG that cannot be read or is not supported."""
+    """An image, SVG or checkpoint that cannot be read or is not supported."""
     OUTPUT = 4
     """The result could not be written."""
     SOME_FAILED = 5
@@ -47,6 +47,12 @@ class UsageError(WarpsplatError):
 
 class ImageError(WarpsplatError):
     """An image (or SVG) that cannot be read or is not supported."""
+
+    exit_code = ExitCode.INPUT
+
+
+class CheckpointError(WarpsplatError):
+    """A checkpoint that cannot be read, or is damaged."""
 
     exit_code = ExitCode.INPUT
 

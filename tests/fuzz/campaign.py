@@ -83,7 +83,10 @@ def run_case(
         if report:
             report(case, command, outcome)
         what = judge(command, outcome, folder)
-        if not what and (folder / case.name).read_bytes() != case.data:
+        given = folder / case.name
+        if command.consumes and outcome.code == 0:
+            what = what or ("the input is left" if given.exists() else "")
+        elif not what and given.read_bytes() != case.data:
             what = "the input was changed"
         if what:
             return Finding(case, command, what, outcome)

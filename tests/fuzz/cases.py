@@ -11,7 +11,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from tests.fuzz import corpus, mutate
+from tests.fuzz import checkpoints, corpus, mutate
 from tests.fuzz.corpus import Seed
 from tests.fuzz.vocabulary import SVG_SNIPPETS, SVG_WORDS, TEXT_OPTIONS, TOKENS, YAML_SNIPPETS, YAML_WORDS
 from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, Outcome
@@ -31,6 +31,8 @@ class Command:
     """File that is there, whole, if the exit code is 0, and else is not."""
     stdin: str = ""
     """File that the standard input is."""
+    consumes: bool = False
+    """Whether the input is gone if the exit code is 0; else it is as it was."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,10 @@ def _changed_yaml(rng: random.Random, data: bytes, other: bytes) -> bytes:
     return mutate.mutate_text(rng, data, other, YAML_WORDS, YAML_SNIPPETS)
 
 
+def _checkpoint_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
+    return (Command(checkpoints.arguments(name), (USAGE, INPUT), "out.svg", consumes=True),)
+
+
 @dataclass(frozen=True)
 class Target:
     """A kind of input."""
@@ -143,6 +149,7 @@ TARGETS = {
     "svg": Target(corpus.svgs, (".svg", ".svgz"), _changed_svg, _svg_commands, 8),
     "yaml": Target(corpus.yamls, (".yaml", ".yml"), _changed_yaml, _yaml_commands, 2),
     "options": Target(lambda: [Seed("in.txt", b"-")], (), lambda rng, data, other: data, _option_commands, 1),
+    "checkpoint": Target(checkpoints.checkpoints, (), checkpoints.changed, _checkpoint_commands, 2),
 }
 
 

@@ -17,6 +17,7 @@ from warpsplat.fit.pursuit import Change, Made, Pursuit, Report, Stop
 from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import PRESETS, Settings
+from warpsplat.fit.stages import Stages
 from warpsplat.fit.tiny import FEW, for_few
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
@@ -94,6 +95,7 @@ def pursue(
     seconds: float | None = None,
     report: Report | None = None,
     stop: Stop | None = None,
+    stages: Stages | None = None,
 ) -> Fit:
     """The smallest file that has ``target_psnr``, within ``max_bytes``; without a target the best in these.
 
@@ -108,7 +110,7 @@ def pursue(
         room = affordable_curves(settings, image.shape[1], image.shape[0])
         settings = replace(for_few(replace(settings, curves=room)), curves=most)
     deadline = math.inf if seconds is None else time.monotonic() + seconds
-    pursuit = Pursuit(image, settings, backend, metadata, importance, deadline, report, stop)
+    pursuit = Pursuit(image, settings, backend, metadata, importance, deadline, report, stop, stages)
     done, first = _first(pursuit)
     if first.interrupted:
         return replace(first, iterations=done)

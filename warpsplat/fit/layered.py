@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.settings import Settings
+from warpsplat.fit.stages import Stages
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
@@ -31,6 +32,7 @@ def fit_layered(
     importance: FloatArray | None = None,
     report: Report | None = None,
     stop: Callable[[], bool] | None = None,
+    stages: Stages | None = None,
 ) -> Fit:
     """A scene whose first ``settings.levels`` shapes are pictures of their own: its layers.
 
@@ -51,6 +53,7 @@ def fit_layered(
             importance=importance,
             report=_told(report, done, each.iterations, steps, finish),
             stop=stop,
+            stages=stages,
         )
         done += made.iterations
         below = made.scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,22 +14,26 @@ from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
+from warpsplat.fit.saved import step_content, step_from
 from warpsplat.fit.schedule import (
     CHECK_INTERVAL,
     LOOK_FROM,
     LOOK_INTERVAL,
+    Phase,
     phase_at,
     phases,
     shapes_at,
     work_done,
 )
 from warpsplat.fit.settings import Settings
+from warpsplat.fit.stages import Content, Stages, real, whole
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.arrays import from_arrays, to_arrays
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,7 @@ def fit(
     seconds: float | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    stages: Stages | None = None,
 ) -> Fit:
     """Optimise shapes against ``image``.
 
@@ -98,73 +103,185 @@ def fit(
         seconds: time that the run should take, in place of the settings' iterations.
         report: called every few steps.
         stop: asked after every step; once true, the run ends.
+        stages: of which this is the next fit: where an earlier run came to it, it goes on from there. None
+            for a run of some ``seconds``, of which no two take the same steps.
+
+    Raises:
+        CheckpointError: ``stages`` hold what cannot be the state of this fit.
     """
     rng = np.random.default_rng(settings.seed)
-    grows = scene is None
     start = below or scene or grid_scene(settings, image, shapes_at(settings, 0), rng)
     palette = Palette.of(settings, image)
     if palette:
         start = replace(start, canvas=palette.canvas(start.canvas))
-    state = FitState.start(start, backend, rng, begin, len(below) if below else 0)
-    budget = Budget(seconds) if seconds is not None else None
-    if budget:
-        settings = budget.measure(state, settings, image)
-    started = time.monotonic()
+    stage = stages.begin() if stages else None
+    if stage and stage.result:
+        with stage.reading():
+            return _fit_from(stage.result, start)
     plan = phases(settings, image.shape[1], image.shape[0])
     weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
-    step: Step | None = None
-    phase = None
-    interrupted = False
-    settled = rounding = False
+    task = _Task(
+        image, start, plan, weights, palette, begin, per_pixel, scene is None, thrifty, finish, report
+    )
+    base, budget = len(below) if below else 0, None
+    if stage and stage.state:
+        with stage.reading():
+            run = _Run(task, step_from(stage.state, start, settings, backend, base, begin, task.target))
+    else:
+        state = FitState.start(start, backend, rng, begin, base)
+        if seconds is not None:
+            budget = Budget(seconds)
+            settings = budget.measure(state, settings, image)
+        task = replace(task, started=time.monotonic())
+        step = Step(state, settings, task.target(settings, begin))
+        run = _Run(task, operate(step, grows=True) if below is not None else step, budget)
+        run.advance()
     while True:
-        entered = phase_at(settings, plan, state.step)
-        if step is None or entered is not phase:
-            phase = entered
-            first = step is None and below is not None
-            step = Step(state, settings, Target(image, phase, weights))
-            step = operate(step, grows=True) if first else step
-        if palette and not rounding and palette.is_due(state):
-            palette.choose(step)
+        interrupted = bool(stop and stop())
+        if stage and not run.is_over():
+            stage.keep(lambda: step_content(run.step), now=interrupted)
+        if interrupted or run.is_over():
+            break
+        run.turn()
+        run.advance()
+    made = run.result()
+    if stage and run.is_over():
+        stage.finish(_fit_content(made))
+    return replace(made, interrupted=interrupted)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What a fit is to do, besides its settings; see ``fit``."""
+
+    image: FloatArray
+    start: Scene
+    plan: list[Phase]
+    weights: FloatArray | None
+    """Of the pixels at the finest size."""
+    palette: Palette | None
+    begin: int
+    per_pixel: float | None
+    grows: bool
+    """Whether the number of shapes follows the schedule."""
+    thrifty: bool
+    finish: bool
+    report: Callable[[Progress], None] | None
+    started: float = field(default_factory=time.monotonic)
+
+    def target(self, settings: Settings, step: int) -> Target:
+        """What the step after ``step`` steps compares with."""
+        return Target(self.image, phase_at(settings, self.plan, step), self.weights)
+
+
+class _Run:
+    """A fit between a step and what may follow it before the next one: a turn."""
+
+    def __init__(self, task: _Task, step: Step, budget: Budget | None = None) -> None:
+        self.task, self.step, self.budget = task, step, budget
+
+    def is_over(self) -> bool:
+        """Whether there is no further step."""
+        done = self.step.state.step >= self.step.settings.iterations
+        return done or bool(self.budget and self.budget.over())
+
+    def advance(self) -> None:
+        """A step."""
+        step, task, settings = self.step, self.task, self.step.settings
+        state = step.state
+        if phase_at(settings, task.plan, state.step) is not step.target.phase:
+            self.step = step = Step(state, settings, task.target(settings, state.step))
+        if task.palette and not state.rounding and task.palette.is_due(state):
+            task.palette.choose(step)
         step.advance()
-        done, finest = state.step, phase is plan[-1]
-        if done % CHECK_INTERVAL == 0 or done == settings.iterations:
+        if state.step % CHECK_INTERVAL == 0 or state.step == settings.iterations:
             step.make_room()
-            if report:
-                spent, work = time.monotonic() - started, work_done(settings, plan, done)
-                report(Progress(done, settings.iterations, step.psnr(), spent, work, finest))
-        if stop and stop():
-            interrupted = True
-            break
-        if done >= settings.iterations or (budget and budget.over()):
-            break
-        stage = stage_at(settings, done)
-        if stage is not None and finish:
-            if not rounding:
-                state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
-                rounding = True
-            hold_stage(step, stage)
-        exact = settings.renderer == "exact"
-        if finish and exact and not settled and done >= max(opacities_at(settings), begin + 1):
-            hold_opacities(step)
-            settled = True
-        density = settings.density
-        surgical = done < density.stop * settings.iterations
+            if task.report:
+                task.report(self.progress())
+
+    def progress(self) -> Progress:
+        """For people."""
+        step, plan, done = self.step, self.task.plan, self.step.state.step
+        return Progress(
+            done,
+            step.settings.iterations,
+            step.psnr(),
+            time.monotonic() - self.task.started,
+            work_done(step.settings, plan, done),
+            step.target.phase is plan[-1],
+        )
+
+    def turn(self) -> None:
+        """What is due after the steps so far: rounding, a look at the file, surgery."""
+        task, step = self.task, self.step
+        state, settings, done = step.state, step.settings, step.state.step
+        if task.finish:
+            self._round()
         # What is kept may show other than over what lies below.
-        late = done >= LOOK_FROM * settings.iterations or bool(start.pictures)
-        if settings.viewer and finish and finest and late and not rounding and done % LOOK_INTERVAL == 0:
+        late = done >= LOOK_FROM * settings.iterations or bool(task.start.pictures)
+        looks = settings.viewer and task.finish and step.target.phase is task.plan[-1] and late
+        if looks and not state.rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
-        due = density.interval > 0 and done % density.interval == 0
-        if due and budget and phase is plan[0] and surgical:  # then what is due when stays as it is
-            slowness = (time.monotonic() - started) / (done * budget.costs[0])
-            settings = budget.fit(settings, done, slowness)
-            step.configure(settings)
-        if due and grows and settings.max_bytes and surgical:
-            settings = affordable(step)
-            step.configure(settings)
-        missing = grows and state.parameters.shape_count != state.base + settings.curves
-        if due and done < settings.iterations and (missing or done < density.stop * settings.iterations):
-            step = operate(step, grows=grows)
-    if finish and not rounding:
-        state.per_pixel = choose_grid(step, staged=False)
-    done = state.step - begin
-    return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), done, interrupted)
+        due = settings.density.interval > 0 and done % settings.density.interval == 0
+        if due:
+            self._fit_goals()
+        settings = step.settings
+        missing = task.grows and state.parameters.shape_count != state.base + settings.curves
+        surgical = missing or done < settings.density.stop * settings.iterations
+        if due and done < settings.iterations and surgical:
+            self.step = operate(step, grows=task.grows)
+
+    def _round(self) -> None:
+        """Round and hold what the steps so far ask for."""
+        task, step = self.task, self.step
+        state, settings = step.state, step.settings
+        stage = stage_at(settings, state.step)
+        if stage is not None:
+            if not state.rounding:
+                state.per_pixel = task.per_pixel or choose_grid(step, staged=True, thrifty=task.thrifty)
+                state.rounding = True
+            hold_stage(step, stage)
+        settles = settings.renderer == "exact" and not state.settled
+        if settles and state.step >= max(opacities_at(settings), task.begin + 1):
+            hold_opacities(step)
+            state.settled = True
+
+    def _fit_goals(self) -> None:
+        """Settings by the time that is left, and by the bytes that the shapes take, until they stay."""
+        task, step = self.task, self.step
+        settings, done = step.settings, step.state.step
+        if done >= settings.density.stop * settings.iterations:
+            return
+        if self.budget and step.target.phase is task.plan[0]:  # then what is due when stays as it is
+            slowness = (time.monotonic() - self.task.started) / (done * self.budget.costs[0])
+            step.configure(self.budget.fit(settings, done, slowness))
+        if task.grows and settings.max_bytes:
+            step.configure(affordable(step))
+
+    def result(self) -> Fit:
+        """What there is now, as that of a run that was not interrupted."""
+        step, state = self.step, self.step.state
+        if self.task.finish and not state.rounding:
+            state.per_pixel = choose_grid(step, staged=False)
+        done = state.step - self.task.begin
+        return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), done, interrupted=False)
+
+
+MOST = 1_000_000_000
+"""Of a figure that is read."""
+
+FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
+
+
+def _fit_content(made: Fit) -> Content:
+    """A result as numbers and arrays."""
+    numbers = {name: getattr(made, name) for name in FIGURES} | {"iterations": made.iterations}
+    return Content(numbers, to_arrays(made.scene))
+
+
+def _fit_from(content: Content, start: Scene) -> Fit:
+    """The result of a fit that began with ``start``."""
+    figures = {name: real(content.numbers, name, -MOST, MOST) for name in FIGURES}
+    iterations = whole(content.numbers, "iterations", 0, MOST)
+    scene = from_arrays(content.arrays, start)
+    return Fit(scene, iterations=iterations, interrupted=False, **figures)

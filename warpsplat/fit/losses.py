@@ -54,12 +54,15 @@ class Aim:
         self.importance: wp.array = wp.array(
             to_tiles(weights[..., None])[:, 0], dtype=column, device=backend.device
         )
+        self.moved = False
+        """Whether it is at another target than at first."""
         self.buffers = backend.allocate(LossBuffers, {"tiles": viewport.tile_count})
         self.value_count = 3 * viewport.pixel_count
 
     def at(self, target: FloatArray) -> None:
         """Another target from now on."""
         self.target.assign(to_tiles(target))
+        self.moved = True
 
     def mean_square(self) -> float:
         """Mean squared error of the last step, unweighted. Reads a number a tile back from the device."""

@@ -43,7 +43,6 @@ class Palette:
     def __init__(self, colors: FloatArray) -> None:
         """``colors``: sRGB in [0, 1], shape (color, 3)."""
         self.colors = colors
-        self._revision = -1
 
     @staticmethod
     def of(settings: Settings, target: FloatArray) -> Palette | None:
@@ -82,14 +81,14 @@ class Palette:
 
     def is_due(self, state: FitState) -> bool:
         """Whether it is time to choose: every few steps, and at once where shapes have come or gone."""
-        return state.step % CHOICE_INTERVAL == 0 or self._revision != state.parameters.revision
+        return state.step % CHOICE_INTERVAL == 0 or state.colored != state.parameters.revision
 
     def choose(self, step: Step) -> None:
         """Give each shape the colour with which the error is least."""
         parameters = step.state.parameters
         scene = step.state.scene()
         parameters.assign(replace(scene, colors=self.colors[self.nearest(best_colors(step, scene))]))
-        self._revision = parameters.revision
+        step.state.colored = parameters.revision
 
     def limited(self, scene: Scene) -> Scene:
         """A scene in these colours, without gradients."""

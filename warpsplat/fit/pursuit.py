@@ -19,6 +19,7 @@ from warpsplat.fit.rounding import STAGES, stage_steps
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.simplify import LEAST_POINTS, simplify
+from warpsplat.fit.stages import Stages
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.tiny import FEW, grounded
@@ -73,6 +74,7 @@ class Pursuit:
     """Of ``time.monotonic``; infinite where there is none."""
     report: Report | None
     stop: Stop | None
+    stages: Stages | None = None
 
     @property
     def may_choose_ground(self) -> bool:
@@ -112,6 +114,7 @@ class Pursuit:
             seconds=seconds,
             report=report,
             stop=self.stop,
+            stages=self.stages,
         )
 
     def changed(self, change: Change, report: Report | None) -> Fit:
@@ -147,6 +150,7 @@ class Pursuit:
             importance=self.importance,
             report=report,
             stop=self.over,
+            stages=self.stages,
         )
 
 

@@ -31,6 +31,12 @@ class FitState:
     """What outlines keep, where they have conditions."""
     base: int = 0
     """Shapes of earlier levels (``fit.layered``), which keep their number: the first ones."""
+    settled: bool = False
+    """Whether the opacities are rounded and held."""
+    rounding: bool = False
+    """Whether coordinates are being rounded and held, in stages."""
+    colored: int = -1
+    """Revision of the parameters at the last choice of colours (``fit.palette``); -1: there was none."""
 
     @staticmethod
     def start(

@@ -37,6 +37,7 @@ class Target:
             phase: the size.
             weights: of the pixels, shape (height, width) of any size and scale; without, all count alike.
         """
+        self.phase = phase
         height, width = image.shape[:2]
         size = (phase.width, phase.height)
         reduced = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
@@ -72,16 +73,19 @@ class Step:
         capacity: Capacity | None = None,
         aim: Aim | None = None,
         level_aim: Aim | None = None,
+        began: int | None = None,
     ) -> None:
         """Without ``capacity``, the need is found by rendering.
 
         ``level_aim``: what the pictures of the first levels are compared with; default: the image.
+        ``began``: steps that were done when it was made, if not those of now: weights go by that.
         """
         self.state, self.settings, self.target = state, settings, target
+        self.began = state.step if began is None else began
         self.renderer = Renderer(
             state.parameters,
             target.viewport,
-            model=model_for(settings, state.step, target.slack),
+            model=model_for(settings, self.began, target.slack),
             capacity=capacity,
         )
         self.aim = aim or self._aim()
@@ -97,7 +101,7 @@ class Step:
         return Aim(self.target.image, self.renderer.backend, self.target.viewport, self.target.weights)
 
     def _level(self, end: int, aim: Aim) -> Level:
-        model = model_for(self.settings, self.state.step, self.target.slack)
+        model = model_for(self.settings, self.began, self.target.slack)
         return Level.of(self.state, end, self.target.viewport, model, aim)
 
     def record(self) -> None:
@@ -145,9 +149,14 @@ class Step:
                 program.run()
         wp.synchronize_device(self.renderer.backend.device)
 
+    @property
+    def renderers(self) -> tuple[Renderer, ...]:
+        """Of the whole picture, and of the levels'."""
+        return (self.renderer, *(level.renderer for level in self.levels))
+
     def make_room(self) -> None:
         """Where the last steps ran out of capacity, go on with larger arrays."""
-        grown = [each.make_room() for each in (self.renderer, *(level.renderer for level in self.levels))]
+        grown = [renderer.make_room() for renderer in self.renderers]
         if any(grown):
             self.record()
 

@@ -11,6 +11,7 @@ from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Fit, Progress, fit
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
+from warpsplat.fit.stages import Stages
 from warpsplat.jobs.areas import filled
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
@@ -39,6 +40,7 @@ def draw_lines(
     seconds: float | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    stages: Stages | None = None,
 ) -> Fit:
     """Trace line art as strokes, and refine them against its ink; arguments are those of ``fit``.
 
@@ -56,7 +58,7 @@ def draw_lines(
     if not len(traced.scene) and not traced.areas:
         raise ImageError("no lines found: nothing is darker than the paper around it")
     fills = filled(traced, backend, finest(settings), stop) if traced.areas else None
-    made = _fitted(ink, traced, settings, backend, seconds=seconds, report=report, stop=stop)
+    made = _fitted(ink, traced, settings, backend, seconds=seconds, report=report, stop=stop, stages=stages)
     if fills:
         both = fills.scene.append(made.scene)
         made = replace(
@@ -78,6 +80,7 @@ def _fitted(
     seconds: float | None,
     report: Callable[[Progress], None] | None,
     stop: Callable[[], bool] | None,
+    stages: Stages | None,
 ) -> Fit:
     """The strokes of ``traced``, refined and in the order of a tour."""
     lines = traced.scene
@@ -98,6 +101,7 @@ def _fitted(
         seconds=seconds,
         report=report,
         stop=stop,
+        stages=stages,
     )
     scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas)
     return replace(made, scene=toured(rejoined(lines, scene)))

@@ -13,6 +13,7 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.settings import Density, Settings, solid_color
+from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, noting, training_seconds
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
@@ -33,6 +34,7 @@ def refine(
     keep: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    checkpoint: CheckpointFile | None = None,
 ) -> Result:
     """Improve the SVG ``text`` against ``target``; its shapes stay, none is added or removed.
 
@@ -48,11 +50,16 @@ def refine(
         keep: keep elements that the scene cannot hold as they are, in their place, instead of refusing them.
         report: called every few steps.
         stop: asked after every step; once true, the shapes as they are make the file.
+        checkpoint: where the state of the run is kept; it is for the caller to remove.
 
     Raises:
         ImageError: the SVG cannot be read, or held.
+        CheckpointError, UsageError: see ``CheckpointFile``.
     """
     started = time.monotonic()
+    stages = (
+        checkpoint.stages(identity("refine", settings, target, svg=text), backend) if checkpoint else None
+    )
     base, target, has_background = _load(text, target, settings, name, keep=keep)
     scene = base.scene
     before = score_svg(text, target, eyes=False)
@@ -68,8 +75,17 @@ def refine(
     seconds = training_seconds(settings, target, started)
     history: list[Progress] = []
     made = fit(
-        target, settings, backend, scene=scene, seconds=seconds, report=noting(history, report), stop=stop
+        target,
+        settings,
+        backend,
+        scene=scene,
+        seconds=seconds,
+        report=noting(history, report),
+        stop=stop,
+        stages=None if settings.time_budget else stages,
     )
+    if stages and made.interrupted:
+        stages.save()
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
         refined = clear_empty(refined, target, settings, backend, made.per_pixel)

@@ -16,6 +16,7 @@ from warpsplat.fit.loop import Fit, Progress
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.fit.stages import Stages
 from warpsplat.fit.tidy import finish_drawing
 from warpsplat.jobs.line import draw_lines
 from warpsplat.metrics import psnr
@@ -56,6 +57,7 @@ def draw(
     seconds: float | None = None,
     report: Report | None = None,
     stop: Stop | None = None,
+    stages: Stages | None = None,
 ) -> Fit:
     """Trace ``target`` as its ``settings.subject`` asks for; arguments are those of ``fit``."""
     deadline = math.inf if seconds is None else time.monotonic() + seconds
@@ -68,7 +70,7 @@ def draw(
         scene = limited(scene, settings)
         return _made(scene, per_pixel, target, backend, interrupted=False)
     if settings.subject == "line":
-        return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop)
+        return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop, stages=stages)
     most = None if settings.simplify else settings.curves
     made = _drawn(target, settings, backend, most, over, stop)
     low, high = 0, len(made.scene)  # regions that fit into the size, and that do not

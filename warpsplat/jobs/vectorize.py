@@ -26,7 +26,9 @@ from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
+from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
+from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
@@ -137,6 +139,7 @@ def vectorize(
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
     write: Callable[[str], None] | None = None,
+    stages: Stages | None = None,
 ) -> Result:
     """Fit curves to ``target`` and score the file they make.
 
@@ -153,8 +156,11 @@ def vectorize(
         stop: asked after every step; once true, the curves as they are make the file. True later, the score
             is given up.
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
+        stages: what the run goes on from, and is told of its state. A run within a time budget, and tracing,
+            begin again: the one has no two runs alike, the other has no state but its beginning.
     """
     started = time.monotonic()
+    fits = None if settings.time_budget else stages
     seconds = training_seconds(settings, target, started)
     traced = scene is None and settings.subject not in {"auto", "photo"}
     pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
@@ -168,11 +174,14 @@ def vectorize(
             seconds=seconds,
             report=report,
             stop=stop,
+            stages=fits,
         )
     elif traced:
-        made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop)
+        made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop, stages=fits)
     elif scene is None and settings.levels:
-        made = fit_layered(target, settings, backend, importance=importance, report=report, stop=stop)
+        made = fit_layered(
+            target, settings, backend, importance=importance, report=report, stop=stop, stages=fits
+        )
     else:
         if settings.simplify and scene is None:
             settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
@@ -185,7 +194,10 @@ def vectorize(
             seconds=seconds,
             report=report,
             stop=stop,
+            stages=fits,
         )
+    if stages and made.interrupted:
+        stages.save()
     if not pursued and not traced and settings.renderer != "gaussian":
         # Soft Gaussians reach beyond the outlines that this order goes by.
         made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
@@ -358,6 +370,7 @@ def vectorize_image(
     keyed: bool = False,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    checkpoint: CheckpointFile | None = None,
 ) -> Result:
     """Read an image, vectorize it, write ``output`` atomically, and score it.
 
@@ -372,10 +385,12 @@ def vectorize_image(
             mask are files then.
         report: called every few steps.
         stop: asked after every step, see ``vectorize``.
+        checkpoint: where the state of the run is kept until it is done.
 
     Raises:
         ImageError: ``source`` or the mask cannot be read, or their proportions differ.
         OutputError: ``output`` cannot be written.
+        CheckpointError, UsageError: see ``CheckpointFile``.
     """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
@@ -385,6 +400,10 @@ def vectorize_image(
         key = job_key(settings, source, importance)
     target = load_target(source, name, settings.background)
     height, width = target.shape[:2]
+    mask = None if importance is None else load_importance(importance, width, height, mask_name)
+    stages = None
+    if checkpoint:
+        stages = checkpoint.stages(identity("vectorize", settings, target, mask), backend)
     chosen, why = decided(target, settings)
     history: list[Progress] = []
 
@@ -396,11 +415,14 @@ def vectorize_image(
         chosen,
         backend,
         metadata=key,
-        importance=None if importance is None else load_importance(importance, width, height, mask_name),
+        importance=mask,
         report=noting(history, report),
         stop=stop,
         write=None if output is None else lambda svg: write_svg_text(output, on_paper(svg)),
+        stages=stages,
     )
+    if checkpoint and not result.stopped:
+        checkpoint.remove()
     return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
 
 

@@ -32,6 +32,10 @@ ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """What kernels read a row of so many numbers as."""
 
 
+Moments = tuple[dict[str, FloatArray], dict[str, FloatArray]]
+"""First and second, by attribute."""
+
+
 @dataclass
 class Group:
     """One attribute on the device: values, gradients and Adam moments, each (row, size) float32."""
@@ -50,16 +54,19 @@ class Group:
 class Parameters:
     """Device arrays of a scene. Surgery (``rearrange``) carries moments and ages along with the rows."""
 
-    def __init__(self, scene: Scene, backend: Backend) -> None:
+    def __init__(
+        self, scene: Scene, backend: Backend, moments: Moments | None = None, ages: np.ndarray | None = None
+    ) -> None:
+        """Without ``moments`` and ``ages``, the shapes are new."""
         self.backend = backend
         self.revision = 0
         """Counts ``rearrange``: launches recorded on arrays of an earlier revision are out of date."""
         zeros = {a.name: np.zeros(scene.shape_of(a), np.float32) for a in ATTRIBUTES}
-        self._upload(scene, (zeros, zeros), np.zeros(len(scene), np.int32))
+        self._upload(
+            scene, moments or (zeros, zeros), np.zeros(len(scene), np.int32) if ages is None else ages
+        )
 
-    def _upload(
-        self, scene: Scene, moments: tuple[dict[str, FloatArray], dict[str, FloatArray]], ages: np.ndarray
-    ) -> None:
+    def _upload(self, scene: Scene, moments: Moments, ages: np.ndarray) -> None:
         self._scene = scene
         shapes = np.arange(len(scene))
         owner = scene.contour_shapes()
@@ -91,10 +98,7 @@ class Parameters:
         self.has_twins = bool(scene.twin.any())
         if self.has_twins:
             self.arrays["point_twin"] = self._ints(_twins(scene))
-        circular = _circular(scene)
-        self.has_circles = bool(circular.any())
-        if self.has_circles:
-            self.arrays["circular"] = self._ints(circular)
+        self.tie_circles(_circular(scene))
         self.parts = tuple(np.unique(parts).tolist())
         """Of exact coverage, that there are shapes of."""
         if constants.STYLED in self.parts:
@@ -115,6 +119,12 @@ class Parameters:
             rows = (value.shape[0],)
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
+
+    def tie_circles(self, rows: np.ndarray) -> None:
+        """From now on the gradients of the shapes ``rows`` (true or 1) keep circles round."""
+        self.has_circles = bool(rows.any())
+        if self.has_circles:
+            self.arrays["circular"] = self._ints(rows)
 
     def prefix(self, count: int) -> Parameters:
         """The first ``count`` shapes: the same values, in the same memory, with gradients of their own.
@@ -195,6 +205,10 @@ class Parameters:
     def gradients(self) -> dict[str, FloatArray]:
         """Copy the gradients to the host, in the shapes of the scene's fields."""
         return self._download("grad")
+
+    def moments(self) -> Moments:
+        """Copy Adam's first and second moments to the host, in the shapes of the scene's fields."""
+        return self._download("moment1"), self._download("moment2")
 
     def _download(self, field: str) -> dict[str, Any]:
         return {

@@ -220,6 +220,18 @@ class Renderer:
         self._build(Capacity(max(now.samples, int(GROWTH * samples)), max(now.slots, int(GROWTH * slots))))
         return True
 
+    def room(self) -> tuple[Capacity, Capacity]:
+        """The capacity, and the largest need since it last grew: what a pass leaves out depends on both."""
+        samples, slots = (int(count.numpy()[0]) for count in (self.needed_samples, self.needed_slots))
+        return self.capacity, Capacity(samples, slots)
+
+    def take_room(self, capacity: Capacity, needed: Capacity) -> None:
+        """Go on with the ``room`` of an earlier renderer of the same shapes; the programs are others then."""
+        if capacity != self.capacity:
+            self._build(capacity)
+        self.needed_samples.fill_(needed.samples)
+        self.needed_slots.fill_(needed.slots)
+
     def forward_complete(self) -> bool:
         """Render, growing until everything fits; whether it had to grow, and so has other programs now."""
         self.forward()

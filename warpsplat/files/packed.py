@@ -1,0 +1,153 @@
+"""Numbers and arrays in one file, that NumPy's ``load`` and any unzipper can look into.
+
+A zip archive, nothing in it compressed: first ``header.json``, then an ``.npy`` file for each array. Reading
+it runs and unpickles nothing, and takes no more memory than a few times the file's length.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.errors import CheckpointError
+from warpsplat.files.inputs import read_input
+
+HEADER = "header.json"
+
+MARK = b'{"warpsplat": "checkpoint"'
+"""How the header begins."""
+
+FORMAT = 1
+"""Version of what a file holds; another one is refused."""
+
+HEAD = 100
+"""Bytes at the start of a file in which its mark stands."""
+
+LONGEST_HEADER = 16 << 20
+"""Of the file's [bytes]."""
+
+LONGEST_LIST = 16 << 20
+"""Of the archive's list of its members [bytes]."""
+
+LONGEST_ARRAY_HEADER = 1000
+"""Of an array's [characters]; NumPy's own are about 120."""
+
+TYPES = (np.dtype(np.float32), np.dtype(np.int32))
+"""What arrays may consist of."""
+
+LONGEST_CAUSE = 100
+"""Characters of a library's message."""
+
+
+def is_packed(path: Path) -> bool:
+    """Whether ``path`` is a file that ``pack`` made, by its beginning.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    return head.startswith(b"PK") and MARK in head
+
+
+def pack(header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """A file's content."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_STORED) as archive:
+        text = json.dumps({"warpsplat": "checkpoint", "format": FORMAT, **header})
+        archive.writestr(zipfile.ZipInfo(HEADER), text)
+        for name, array in arrays.items():
+            part = io.BytesIO()
+            np.lib.format.write_array(part, np.ascontiguousarray(array), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), part.getbuffer())
+    return made.getvalue()
+
+
+def unpack(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Header and arrays of a file that ``pack`` made.
+
+    Raises:
+        CheckpointError: it is damaged, or of another version.
+        ImageError: it cannot be read.
+    """
+    data = read_input(path, "a checkpoint")
+    try:
+        _check_end(data)
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = archive.infolist()
+            _check_members(members, len(data))
+            header = _header(archive.read(members[0]))
+            arrays = {info.filename.removesuffix(".npy"): _array(archive.read(info)) for info in members[1:]}
+    except CheckpointError as error:
+        raise CheckpointError(f"{path}: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:  # of whatever kind zipfile, json and NumPy find for what is damaged
+        cause = str(error)[:LONGEST_CAUSE] or type(error).__name__
+        raise CheckpointError(f"{path}: the checkpoint is damaged: {cause}") from error
+    return header, arrays
+
+
+def _check_end(data: bytes) -> None:
+    """Before the list of members is read: it is short."""
+    end = data[-END:]
+    if len(end) < END or end[:4] != b"PK\5\6" or data[-END - LOCATOR :][:4] == b"PK\6\7":
+        raise ValueError("its end is missing")
+    if int.from_bytes(end[12:16], "little") > LONGEST_LIST:
+        raise ValueError("it has too many parts")
+
+
+END, LOCATOR = 22, 20
+"""Lengths of what a zip archive ends with, and of what lies before that in one of over 4 GiB [bytes]."""
+
+
+def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
+    """Before anything is read: nothing is compressed, and all lies in the file side by side."""
+    if not members or members[0].filename != HEADER or members[0].file_size > LONGEST_HEADER:
+        raise ValueError("it has no header")
+    if any(info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1 for info in members):
+        raise ValueError("a part of it is compressed or encrypted")
+    if any(info.file_size != info.compress_size for info in members):
+        raise ValueError("a part of it has two sizes")
+    if sum(info.file_size for info in members) > size:
+        raise ValueError("its parts are larger than the file")
+    if len({info.filename for info in members}) != len(members):
+        raise ValueError("a part of it is there twice")
+
+
+def _header(text: bytes) -> dict[str, Any]:
+    if not text.startswith(MARK):
+        raise ValueError("its header is not that of a checkpoint")
+    header = json.loads(text)
+    if not isinstance(header, dict):
+        raise TypeError("its header is no table")
+    version = header.get("format")
+    if version != FORMAT:
+        raise CheckpointError(f"the checkpoint is of format {str(version)[:20]}, this program reads {FORMAT}")
+    return header
+
+
+def _array(data: bytes) -> npt.NDArray[Any]:
+    """The array of an ``.npy`` file, none of whose bytes is missing or too many."""
+    stream = io.BytesIO(data)
+    if np.lib.format.read_magic(stream) != (1, 0):
+        raise ValueError("an array is of an unknown version")
+    shape, by_columns, dtype = np.lib.format.read_array_header_1_0(
+        stream, max_header_size=LONGEST_ARRAY_HEADER
+    )
+    if dtype not in TYPES or by_columns:
+        raise ValueError("an array is of an unknown type")
+    count = 1
+    for side in shape:
+        count *= side
+    begin = stream.tell()
+    if min(shape, default=0) < 0 or count * dtype.itemsize != len(data) - begin:
+        raise ValueError("an array is not as long as it says")
+    return np.frombuffer(data, dtype, offset=begin).reshape(shape).copy()

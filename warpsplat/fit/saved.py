@@ -1,0 +1,143 @@
+"""A fit between two steps as numbers and arrays, and back: with these and its settings the rest follows, bit
+for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.stages import Content, flag, real, whole
+from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.saved import parameter_arrays, parameters_from
+from warpsplat.rendering.tiles import from_tiles
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.arrays import Array, between, typed
+
+SPARE_ROOM = 64
+"""Room over what the shapes need, at the most: more than any run keeps of times when it had more shapes."""
+
+FINEST = 1e7
+"""Units a pixel, at the most."""
+
+TARGETS = 10.0
+"""What the target comes to, at the most: the image, less what a viewer shows otherwise."""
+
+
+def step_content(step: Step) -> Content:
+    """All that ``step`` carries to the next one. Copies it to the host."""
+    state = step.state
+    numbers = {
+        "step": state.step,
+        "began": step.began,
+        "curves": step.settings.curves,
+        "per_pixel": state.per_pixel,
+        "settled": state.settled,
+        "rounding": state.rounding,
+        "colored": state.colored == state.parameters.revision,
+        "generator": state.rng.bit_generator.state,
+        "room": [_room(renderer) for renderer in step.renderers],
+    }
+    arrays = parameter_arrays(state.parameters)
+    if step.aim.moved:
+        viewport = step.target.viewport
+        arrays["target"] = from_tiles(step.aim.target.numpy(), viewport.width, viewport.height)
+    return Content(numbers, arrays)
+
+
+def step_from(
+    content: Content,
+    start: Scene,
+    settings: Settings,
+    backend: Backend,
+    base: int,
+    begin: int,
+    target: Callable[[Settings, int], Target],
+) -> Step:
+    """The step of which ``step_content`` made ``content``.
+
+    Args:
+        content: from a file: it is checked.
+        start: what the fit began with.
+        settings: what it began with.
+        backend: where to compute.
+        base: shapes of earlier levels.
+        begin: step that it began at.
+        target: what the step after a number of steps is compared with.
+
+    Raises:
+        ValueError, TypeError, KeyError, OverflowError: it is not of such a fit.
+    """
+    numbers = content.numbers
+    done = whole(numbers, "step", begin + 1, settings.iterations - 1)
+    settings = replace(settings, curves=whole(numbers, "curves", 1, settings.curves))
+    parameters = parameters_from(content.arrays, start, backend)
+    if base > parameters.shape_count:
+        raise ValueError("shapes of earlier levels are missing")
+    clock = backend.array(wp.int32, 1)
+    clock.fill_(done)
+    state = FitState(
+        parameters,
+        clock,
+        _generator(numbers["generator"]),
+        done,
+        real(numbers, "per_pixel", 1e-3, FINEST),
+        base=base,
+        settled=flag(numbers, "settled"),
+        rounding=flag(numbers, "rounding"),
+        colored=parameters.revision if flag(numbers, "colored") else -1,
+    )
+    step = Step(state, settings, target(settings, done - 1), began=whole(numbers, "began", 0, done))
+    rooms = numbers["room"]
+    if not isinstance(rooms, list) or len(rooms) != len(step.renderers):
+        raise ValueError("room is not that of the renderers")
+    for renderer, room in zip(step.renderers, rooms, strict=True):
+        _take_room(renderer, room)
+    if "target" in content.arrays:
+        step.aim.at(_target(content.arrays, step.target.image))
+    step.record()
+    return step
+
+
+def _room(renderer: Renderer) -> dict[str, int]:
+    capacity, needed = renderer.room()
+    return {
+        "samples": capacity.samples,
+        "slots": capacity.slots,
+        "needed samples": needed.samples,
+        "needed slots": needed.slots,
+    }
+
+
+def _take_room(renderer: Renderer, room: Any) -> None:
+    """Where shapes do not fit, some are left out until the next look: that has to be at the same steps."""
+    if not isinstance(room, dict):
+        raise TypeError("room is no table")
+    now, _ = renderer.room()
+    samples, slots = SPARE_ROOM * now.samples, SPARE_ROOM * now.slots
+    renderer.take_room(
+        Capacity(whole(room, "samples", 1, samples), whole(room, "slots", 1, slots)),
+        Capacity(whole(room, "needed samples", 0, samples), whole(room, "needed slots", 0, slots)),
+    )
+
+
+def _generator(state: Any) -> np.random.Generator:
+    generator = np.random.default_rng(0)
+    generator.bit_generator.state = state
+    return generator
+
+
+def _target(arrays: dict[str, Array], image: FloatArray) -> FloatArray:
+    found = typed(arrays, "target", np.float32)
+    if found.shape != image.shape:
+        raise ValueError(f"target has shape {found.shape}, not {image.shape}")
+    between("target", found, -TARGETS, TARGETS)
+    return found

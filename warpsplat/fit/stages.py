@@ -1,0 +1,193 @@
+"""What a run leaves behind so that another one can go on: the fits that are done, the state of the next one.
+
+A run consists of one fit or of several, one after the other (``goals``, ``layered``). They are numbered as
+they begin. A run that goes on takes the same way again: of a fit that was done it takes the result, the next
+one goes on from the state.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from warpsplat.errors import CheckpointError
+from warpsplat.scene.arrays import Array
+
+INTERVAL = 30.0
+"""Between two times that a state is saved [s]."""
+
+SPARE = 100.0
+"""Time from one save to the next over what the save took, at the least: saving costs a hundredth."""
+
+MOST_FITS = 1000
+"""Of a run."""
+
+
+class Content(NamedTuple):
+    """Numbers and arrays by name."""
+
+    numbers: dict[str, Any]
+    """As JSON has them."""
+    arrays: dict[str, Array]
+
+
+class Stages:
+    """The fits of a run."""
+
+    def __init__(
+        self,
+        name: str,
+        write: Callable[[Content], None],
+        every: float = INTERVAL,
+        saved: Content | None = None,
+    ) -> None:
+        """Of a new run, or of one that goes on.
+
+        Args:
+            name: how messages call what ``saved`` comes from.
+            write: keeps what ``saved`` is to be.
+            every: time between two saves [s].
+            saved: of an earlier run.
+
+        Raises:
+            CheckpointError: ``saved`` is nothing that was written.
+        """
+        self._name, self._write, self._every = name, write, every
+        self._results: list[Content] = []
+        self._state: Content | None = None
+        if saved:
+            with self.reading():
+                self._results, self._state = _split(saved)
+        self._begun = 0
+        self._due = time.monotonic() + every
+        self._is_saved = saved is not None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to go on from."""
+        return not self._results and self._state is None
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Make of what goes wrong with content from a file an error that says so.
+
+        Raises:
+            CheckpointError: the content is none that was saved.
+        """
+        try:
+            yield
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
+            raise CheckpointError(f"{self._name}: the checkpoint is damaged: {error}") from error
+
+    def begin(self) -> Stage:
+        """The next fit."""
+        self._begun += 1
+        return Stage(self, self._begun - 1)
+
+    def result(self, number: int) -> Content | None:
+        """Of a fit; None where it is not done."""
+        return self._results[number] if number < len(self._results) else None
+
+    def state(self, number: int) -> Content | None:
+        """Of a fit that was begun."""
+        return self._state if number == len(self._results) else None
+
+    def is_due(self) -> bool:
+        """Whether it is time to save."""
+        return time.monotonic() >= self._due
+
+    def keep(self, state: Content | None, result: Content | None = None) -> None:
+        """Have another state to save, or the result of the present fit."""
+        if result:
+            self._results.append(result)
+        self._state = state
+        self._is_saved = False
+
+    def save(self) -> None:
+        """Save what there is, if there is anything new."""
+        if self._is_saved:
+            return
+        began = time.monotonic()
+        self._write(_joined(self._results, self._state))
+        self._is_saved = True
+        now = time.monotonic()
+        self._due = now + max(self._every, SPARE * (now - began))
+
+
+class Stage:
+    """A fit of a run."""
+
+    def __init__(self, stages: Stages, number: int) -> None:
+        self._stages, self._number = stages, number
+        self.reading = stages.reading
+
+    @property
+    def result(self) -> Content | None:
+        """Where it was done by an earlier run."""
+        return self._stages.result(self._number)
+
+    @property
+    def state(self) -> Content | None:
+        """Where an earlier run had begun it."""
+        return self._stages.state(self._number)
+
+    def keep(self, state: Callable[[], Content], *, now: bool) -> None:
+        """Save the state where it is time to, or ``now``."""
+        if now or self._stages.is_due():
+            self._stages.keep(state())
+            self._stages.save()
+
+    def finish(self, result: Content) -> None:
+        """It is done; it is saved with the next state, or when the run ends."""
+        self._stages.keep(None, result)
+
+
+def whole(numbers: Mapping[str, Any], name: str, low: int, high: int) -> int:
+    """A whole number.
+
+    Raises:
+        ValueError: it is missing, or another thing, or out of range.
+    """
+    value = numbers.get(name)
+    if type(value) is not int or not low <= value <= high:
+        raise ValueError(f"{name} is no whole number from {low} to {high}")
+    return value
+
+
+def real(numbers: Mapping[str, Any], name: str, low: float, high: float) -> float:
+    """A number, see ``whole``."""
+    value = numbers.get(name)
+    if not isinstance(value, (int, float)) or not low <= value <= high:
+        raise ValueError(f"{name} is no number from {low:g} to {high:g}")
+    return float(value)
+
+
+def flag(numbers: Mapping[str, Any], name: str) -> bool:
+    """A truth, see ``whole``."""
+    value = numbers.get(name)
+    if type(value) is not bool:
+        raise ValueError(f"{name} is neither true nor false")
+    return value
+
+
+def _joined(results: list[Content], state: Content | None) -> Content:
+    """All as one: arrays have the number of their fit before their name."""
+    parts = [*results, state] if state else results
+    arrays = {f"{i}/{name}": array for i, part in enumerate(parts) for name, array in part.arrays.items()}
+    return Content({"fits": [part.numbers for part in parts], "under way": state is not None}, arrays)
+
+
+def _split(content: Content) -> tuple[list[Content], Content | None]:
+    """What ``_joined`` made one."""
+    fits = content.numbers.get("fits")
+    if not isinstance(fits, list) or len(fits) > MOST_FITS or not all(isinstance(fit, dict) for fit in fits):
+        raise ValueError("fits are no list of tables")
+    parts = [Content(numbers, {}) for numbers in fits]
+    for name, array in content.arrays.items():
+        number, _, rest = name.partition("/")
+        if not number.isdecimal() or int(number) >= len(parts):
+            raise ValueError("an array is of no fit")
+        parts[int(number)].arrays[rest] = array
+    return (parts[:-1], parts[-1]) if flag(content.numbers, "under way") and parts else (parts, None)

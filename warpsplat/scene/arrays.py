@@ -1,0 +1,130 @@
+"""A scene's shapes as named arrays, for files, and back: what comes from a file is checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.scene.attributes import (
+    ATTRIBUTES,
+    NO_DASHES,
+    NO_PICTURE,
+    TRAITS,
+    Attribute,
+    Basis,
+    Cap,
+    Join,
+    Kind,
+    Paint,
+    Rule,
+    Spread,
+    Unit,
+)
+from warpsplat.scene.scene import Scene
+
+Array = npt.NDArray[Any]
+
+LAYOUT = ("kind", "basis", "first", "starts", "closed", "stop_first")
+"""Arrays that say what the rows of the others are."""
+
+STARTS = ("first", "starts", "stop_first")
+"""Those of them that ascend from 0."""
+
+FARTHEST = 1e9
+"""Largest coordinate or length [canvas units]."""
+
+MOST_LAYERS = 1_000_000
+
+CHOICES = {
+    "kind": Kind,
+    "basis": Basis,
+    "rule": Rule,
+    "cap": Cap,
+    "join": Join,
+    "paint": Paint,
+    "spread": Spread,
+}
+
+
+def to_arrays(scene: Scene) -> dict[str, Array]:
+    """The shapes of ``scene``; its canvas, pictures, names of layers and patterns of dashes are left out."""
+    names = (*LAYOUT, *(row.name for row in (*TRAITS, *ATTRIBUTES)))
+    return {name: getattr(scene, name) for name in names}
+
+
+def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
+    """The scene of which ``to_arrays`` made ``arrays``, with what these lack from ``like``.
+
+    Raises:
+        ValueError: one is missing, of another type or size, or has numbers that no scene has.
+    """
+    whole = {name: np.int32 for name in LAYOUT} | {trait.name: trait.dtype for trait in TRAITS}
+    values: dict[str, Any] = {name: typed(arrays, name, dtype) for name, dtype in whole.items()}
+    if any(array.ndim != 1 for array in values.values()):
+        raise ValueError("an array has more dimensions than one")
+    values |= {attribute.name: numbers(arrays, attribute) for attribute in ATTRIBUTES}
+    for name in STARTS:
+        starts = values[name]
+        if len(starts) < 2 or starts[0] != 0 or (np.diff(starts) < 0).any():
+            raise ValueError(f"{name} does not ascend from 0")
+    if (np.diff(values["first"]) < 1).any() or values["starts"][-1] != len(values["points"]):
+        raise ValueError("first and starts are not those of the points")
+    if len(values["stop_first"]) != len(values["first"]):
+        raise ValueError("stop_first is not that of the shapes")
+    limits: dict[str, tuple[float, float]] = {
+        name: (min(kinds), max(kinds)) for name, kinds in CHOICES.items()
+    }
+    limits |= {
+        "closed": (0, 1),
+        "twin": (0, 1),
+        "layer": (0, MOST_LAYERS),
+        "miter_limits": (0.0, math.inf),
+        "dash": (NO_DASHES, len(like.dashes) - 1),
+        "picture": (NO_PICTURE, len(like.pictures) - 1),
+    }
+    for name, (low, high) in limits.items():
+        between(name, values[name], low, high)
+    if ((values["paint"] == Paint.PICTURE) != (values["picture"] != NO_PICTURE)).any():
+        raise ValueError("picture is not that of the paints")
+    return replace(like, **values)
+
+
+def typed(arrays: Mapping[str, Array], name: str, dtype: Any) -> Array:
+    """The array ``name``.
+
+    Raises:
+        ValueError: it is missing, or its elements are not ``dtype``.
+    """
+    array = arrays.get(name)
+    if array is None or array.dtype != dtype:
+        raise ValueError(f"{name} is missing" if array is None else f"{name} has elements of another type")
+    return array
+
+
+def between(name: str, values: Array, low: float, high: float) -> None:
+    """Check that all ``values`` lie between two.
+
+    Raises:
+        ValueError: one does not, or is no number.
+    """
+    if not ((values >= low) & (values <= high)).all():
+        raise ValueError(f"{name} has numbers that are not from {low:g} to {high:g}")
+
+
+def numbers(arrays: Mapping[str, Array], attribute: Attribute) -> Array:
+    """The values of an attribute.
+
+    Raises:
+        ValueError: they are none that it can have.
+    """
+    values = typed(arrays, attribute.name, np.float32)
+    if attribute.low[1] == attribute.high[1] == Unit.ONE:  # what was read from a file may be opaque, or 0
+        between(attribute.name, values, min(attribute.low[0], 0.0), max(attribute.high[0], 1.0))
+    else:
+        between(attribute.name, values, 0.0 if attribute.name == "widths" else -FARTHEST, FARTHEST)
+    return values
