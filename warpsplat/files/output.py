@@ -181,8 +181,13 @@ PNG_HEADER = 33
 
 def write_svg_text(path: Path, text: str) -> None:
     """Write an SVG, gzipped where the name of ``path`` says so, see ``write_result``."""
+    write_result(path, svg_bytes(path, text))
+
+
+def svg_bytes(path: Path, text: str) -> bytes:
+    """What an SVG's file holds, gzipped where the name of ``path`` says so."""
     data = text.encode()
-    write_result(path, gzip.compress(data, mtime=0) if path.suffix.lower() == SVG_ENDINGS[1] else data)
+    return gzip.compress(data, mtime=0) if path.suffix.lower() == SVG_ENDINGS[1] else data
 
 
 def write_result(path: Path, data: bytes) -> None:

@@ -18,7 +18,7 @@ import os
 import shutil
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +74,10 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
                 with messages_hidden():
                     wp.load_module(module, device, block_dim=block_dim)
             else:
-                _announce()
-                _wait_for(lambda: wp.load_module(module, device, block_dim=block_dim))
+                with alone_in(_place()):
+                    if not folder.exists():
+                        _announce()
+                    _wait_for(lambda: wp.load_module(module, device, block_dim=block_dim))
         except Exception as error:  # Warp and its compiler raise all kinds
             if explain(error)[0].startswith("not enough memory"):
                 raise
@@ -88,6 +90,26 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
         f"kernel cache {wp.config.kernel_cache_dir}: kernels cannot be compiled or loaded: "
         f"{_cause(failure)}; set WARP_CACHE_PATH to another folder"
     ) from failure
+
+
+@contextlib.contextmanager
+def alone_in(place: Path) -> Iterator[None]:
+    """Compile in the cache ``place`` while other processes wait: what one has made, the next ones only load.
+
+    The folder itself is locked, which leaves nothing behind. Where that cannot be done, several compile the
+    same, each for itself, which Warp allows.
+    """
+    handle = None
+    try:
+        with contextlib.suppress(OSError, ImportError):
+            import fcntl  # POSIX only
+
+            handle = os.open(place, os.O_RDONLY)
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
 
 
 @functools.cache

@@ -1,0 +1,49 @@
+"""How many processes a batch has, and how many threads each."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from warpsplat.fit.settings import Settings
+from warpsplat.rendering.backend import available_cores
+
+WORTH = 400_000
+"""Shapes times steps of a batch from which processes save more than the seconds that they take to start."""
+
+MEMORY = 1 << 30
+"""What a process has room for, where their number is not given [bytes]: an image of 10 million pixels."""
+
+
+def divided(
+    settings: Iterable[Settings], workers: int | None, threads: int | None, *, on_cpu: bool
+) -> tuple[int, int | None]:
+    """Workers, and threads of each.
+
+    A process a core, each with one thread, does more than one process with all threads: what is not split
+    among threads (reading, scoring, writing, surgery) is done at the same time as well. On a GPU they would
+    share the one device.
+
+    Args:
+        settings: of each image.
+        workers: as given; None: chosen.
+        threads: as given; None: the cores are shared.
+        on_cpu: whether that is where images are done.
+    """
+    cores = available_cores()
+    if workers is None:
+        efforts = [one.curves * one.iterations for one in settings]
+        workers = 1
+        if on_cpu and sum(efforts) >= WORTH:
+            workers = max(1, min(cores // (threads or 1), len(efforts), _free_memory() // MEMORY))
+    return workers, threads if threads or not on_cpu else max(1, cores // workers)
+
+
+def _free_memory() -> int:
+    """Memory that can be had without swapping [bytes]."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) << 10
+    return MEMORY * available_cores()  # not Linux: as much as is asked for

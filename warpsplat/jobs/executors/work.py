@@ -1,0 +1,115 @@
+"""Doing one task, in whatever process: bytes in, a result and its figures out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+from warpsplat.errors import OutputError, explain, printable
+from warpsplat.files.inputs import read_input
+from warpsplat.files.output import svg_bytes
+from warpsplat.fit.loop import Progress
+from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
+from warpsplat.jobs.vectorize import job_key, load_target, vectorize_image
+from warpsplat.metrics import score_svg
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.rendering.turns import turn
+from warpsplat.svg.inspect import svg_text
+
+Report = Callable[[Progress], None]
+
+
+def do(task: Task, stop: Stop | None = None, report: Report | None = None) -> Outcome:
+    """Do ``task``; whatever goes wrong is in the outcome.
+
+    Args:
+        task: what to do.
+        stop: asked after every step; once true, the shapes as they are make the file.
+        report: called every few steps.
+
+    Raises:
+        KeyboardInterrupt: by a signal's handler, with nothing of this image to save.
+    """
+    key = ""
+    try:
+        image = read(task.image)
+        mask = None if task.mask is None else read(task.mask)
+        key = job_key(task.settings, image, mask)
+        if task.measure:
+            return _measured(task, key, image)
+        return _made(task, key, image, stop, report)
+    except (KeyboardInterrupt, SystemExit, GeneratorExit):
+        raise
+    except BaseException as error:  # a panic of Rust code derives from no Exception
+        return Outcome(task.number, "failed", key=key, error=failure(error, task.name, task.output))
+
+
+def failure(error: BaseException, *names: str) -> str:
+    """What to tell a user of an error of an image, one line with the image's name, the first of ``names``."""
+    message, _ = explain(error)
+    shown = [printable(name) for name in names]
+    return message if any(name in message for name in shown) else f"{shown[0]}: {message}"
+
+
+def read(source: Source) -> bytes:
+    """The bytes of an image.
+
+    Raises:
+        ImageError: it cannot be read.
+    """
+    return source if isinstance(source, bytes) else read_input(Path(source))
+
+
+def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report | None) -> Outcome:
+    output = Path(task.output)
+    start_warp()
+    backend = Backend.on(choose_device(task.device), task.threads)
+    if not task.bring:
+        make_folder(output.parent)
+    with turn(backend.device):
+        result = vectorize_image(
+            image,
+            task.settings,
+            backend,
+            output=None if task.bring else output,
+            name=task.name,
+            importance=task.mask,
+            keyed=True,
+            report=report,
+            stop=stop,
+        )
+    data = svg_bytes(output, result.svg)
+    return Outcome(
+        task.number,
+        "stopped" if result.stopped else "made",
+        key=key,
+        digest=digest(data),
+        data=data if task.bring else None,
+        figures=result.as_dict(),
+    )
+
+
+def _measured(task: Task, key: str, image: bytes) -> Outcome:
+    data = read_input(Path(task.output), "an SVG")
+    target = load_target(image, task.name, task.settings.background)
+    score = score_svg(svg_text(data, task.output), target, eyes=False)
+    return Outcome(task.number, "measured", key=key, digest=digest(data), figures=score.as_dict())
+
+
+def digest(data: bytes) -> str:
+    """Names the bytes of a result."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of a result, if it is not there.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from error
