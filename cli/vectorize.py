@@ -22,10 +22,13 @@ from warpsplat.jobs.options import settings_from
 
 def summary(output: Path, values: dict[str, Any]) -> str:
     """One line on the result, for people."""
+    from warpsplat.jobs.formats import PICTURE_ENDINGS
+
     name = "standard output" if str(output) == "-" else output
     note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
+    picture = " as an SVG" if output.suffix.lower() in PICTURE_ENDINGS else ""
     if values["paths"] is None:
-        size = f"{values['bytes'] / 1000:.1f} kB"
+        size = f"{values['bytes'] / 1000:.1f} kB{picture}"
         return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
     ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
@@ -37,7 +40,7 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     note += f"; the first {levels}" if levels else ""
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
-        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
+        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped){picture}, "
         f"{values['seconds']:.1f} s{note}"
     )
 
@@ -53,7 +56,7 @@ def _level(level: dict[str, Any]) -> str:
     "-o",
     "--output",
     type=FILE,
-    help="SVG to write; - is the standard output.  [default: IMAGE with .svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf; - is the standard output.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
 @quality_options
@@ -84,7 +87,8 @@ def command(
     """
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
-    from warpsplat.files.output import SVG_ENDINGS, check_output
+    from warpsplat.files.output import check_output
+    from warpsplat.jobs.formats import ENDINGS, check_format
 
     if output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
@@ -95,7 +99,8 @@ def command(
     data = read_input(image)
     output = output or Path(image.name).with_suffix(".svg")
     inputs = (image,) if importance is None else (image, importance)
-    check_output(output, *inputs, endings=SVG_ENDINGS, overwrite=overwrite)
+    check_output(output, *inputs, endings=ENDINGS, overwrite=overwrite)
+    check_format(output)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(

@@ -17,7 +17,6 @@ from PIL import Image
 from warpsplat._version import __version__
 from warpsplat.errors import Stopped
 from warpsplat.files.importance import load_importance
-from warpsplat.files.output import write_svg_text
 from warpsplat.files.sources import ImageSource, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export, finished
@@ -27,6 +26,7 @@ from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.step import model_for
+from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
@@ -87,13 +87,14 @@ class Result:
     """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the SVG; a name that ends in ``.svgz`` has it gzipped. An existing file is replaced in one
-        step: it is there as it was, or whole.
+        """Write the SVG, or as the name ends: ``.svgz`` gzipped, ``.png`` as a viewer shows it, ``.pdf`` (the
+        extra ``pdf``) its paths. An existing file is replaced in one step: it is there as it was, or whole.
 
         Raises:
+            UsageError: the package that makes PDFs is not installed.
             OutputError: it cannot be written.
         """
-        write_svg_text(Path(path), self.svg)
+        write_named(Path(path), self.svg)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
@@ -365,7 +366,8 @@ def vectorize_image(
         source: the image.
         settings: all that decides the result.
         backend: where to compute.
-        output: the SVG; ``-`` is the standard output; None: it is not written.
+        output: the SVG, or its picture (``jobs.formats``); ``-`` is the standard output; None: it is not
+            written.
         name: how messages call the image; default: its file's name.
         importance: a mask, see ``load_importance``.
         keyed: whether the file names the job that made it (``job_key``), for batches to go on from; image and
@@ -399,7 +401,7 @@ def vectorize_image(
         importance=None if importance is None else load_importance(importance, width, height, mask_name),
         report=noting(history, report),
         stop=stop,
-        write=None if output is None else lambda svg: write_svg_text(output, on_paper(svg)),
+        write=None if output is None else lambda svg: write_named(output, on_paper(svg)),
     )
     return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
 
