@@ -21,33 +21,17 @@ from warpsplat.fit.schedule import (
     phase_at,
     phases,
     shapes_at,
-    work_done,
 )
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
+from warpsplat.fit.work import Progress as Progress  # noqa: PLC0414 - it is offered here as well
+from warpsplat.fit.work import fit_cost
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
-
-
-@dataclass(frozen=True)
-class Progress:
-    """State of a run between two steps."""
-
-    step: int
-    """Steps done."""
-    steps: int
-    """Steps in all."""
-    psnr: float
-    """Of the internal render at the current training size [dB]."""
-    seconds: float
-    """Since the start of the training."""
-    work: float
-    """Share of the run's work that is done, 0 to 1: a step counts by what its size makes it cost."""
-    fine: bool
-    """Whether the size is the finest: on a reduced image the same shapes have more decibels."""
+from warpsplat.scene.scene import level_ends
 
 
 @dataclass(frozen=True)
@@ -114,6 +98,7 @@ def fit(
     weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
     step: Step | None = None
     phase = None
+    ends = (*level_ends(below), len(below)) if below else ()
     interrupted = False
     settled = rounding = False
     while True:
@@ -130,7 +115,9 @@ def fit(
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:
             step.make_room()
             if report:
-                spent, work = time.monotonic() - started, work_done(settings, plan, done)
+                spent = time.monotonic() - started
+                cost, whole = (fit_cost(settings, plan, n, begin, ends) for n in (done, settings.iterations))
+                work = cost / whole if not seconds else min(spent / seconds, 1.0)
                 report(Progress(done, settings.iterations, step.psnr(), spent, work, finest))
         if stop and stop():
             interrupted = True

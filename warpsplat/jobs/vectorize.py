@@ -26,6 +26,7 @@ from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.step import model_for
+from warpsplat.fit.work import Meter, run_cost, score_cost
 from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
@@ -158,6 +159,8 @@ def vectorize(
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
     traced = scene is None and settings.subject not in {"auto", "photo"}
+    height, width = target.shape[:2]
+    after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
     pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
@@ -168,12 +171,15 @@ def vectorize(
             importance=importance,
             seconds=seconds,
             report=report,
+            after=after,
             stop=stop,
         )
     elif traced:
-        made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop)
+        made = draw(target, settings, backend, seconds=seconds, report=report, after=after, stop=stop)
     elif scene is None and settings.levels:
-        made = fit_layered(target, settings, backend, importance=importance, report=report, stop=stop)
+        made = fit_layered(
+            target, settings, backend, importance=importance, report=report, after=after, stop=stop
+        )
     else:
         if settings.simplify and scene is None:
             settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
@@ -184,7 +190,7 @@ def vectorize(
             scene=scene,
             importance=importance,
             seconds=seconds,
-            report=report,
+            report=Meter(report, after).stage(run_cost(settings, width, height), 0),
             stop=stop,
         )
     if not pursued and not traced and settings.renderer != "gaussian":
@@ -268,8 +274,8 @@ takes about a second."""
 
 
 def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
-    """Whether a run's report has SSIMULACRA2: up to ``QUICK_PIXELS`` it takes a twentieth of a run of the
-    default effort; within a time budget other things are worth more.
+    """Whether a run's report has SSIMULACRA2, where it is installed: up to ``QUICK_PIXELS`` it takes a
+    twentieth of a run of the default effort; within a time budget other things are worth more.
     """
     return target.shape[0] * target.shape[1] <= QUICK_PIXELS and settings.time_budget is None
 
