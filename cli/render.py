@@ -27,7 +27,7 @@ from warpsplat.errors import ImageError, UsageError
     type=click.Choice(["viewer", "exact", "splat", "gaussian"]),
     default="viewer",
     show_default=True,
-    help="viewer: resvg. exact, splat: those that curves are fitted with, for SVGs of paths.",
+    help="viewer: resvg. exact, splat: those that shapes are fitted with, for SVGs of paths.",
 )
 @click.option("--device", default="auto", show_default=True, help="Of exact and splat.")
 @threads_option

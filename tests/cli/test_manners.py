@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -101,3 +104,41 @@ def test_objects_keep_out_of_the_way_of_a_file(
     assert json_stream(["vectorize", "-", "--output=-", "--json"]) == "stderr"
     assert json_stream(["vectorize", "--", "--json"]) is None
     assert json_stream(["vectorize", "a", "--json", "--", "-o", "-"]) == "stdout"
+
+
+@pytest.mark.parametrize(
+    ("shell", "words"), [("bash", "plain,--quality"), ("zsh", "--quality"), ("fish", "--quality")]
+)
+def test_completion(
+    shell: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_source")
+    if shell != "bash":  # whose version click asks for
+        assert run() == 0
+        assert "_warpsplat_completion" in capsys.readouterr().out
+    last = "--qual" if shell == "fish" else "2"
+    for name, value in {"COMPLETE": f"{shell}_complete"}.items():
+        monkeypatch.setenv(f"_WARPSPLAT_{name}", value)
+    monkeypatch.setenv("COMP_WORDS", "warpsplat vectorize --qual")
+    monkeypatch.setenv("COMP_CWORD", last)
+    assert run() == 0
+    assert words in capsys.readouterr().out
+
+
+def test_completion_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from warpsplat.cli.main import main\n"
+        "try: main([])\n"
+        "except SystemExit as e: assert not e.code\n"
+        "heavy = {'warp', 'torch', 'cv2', 'PIL', 'resvg_py'} & set(sys.modules); assert not heavy, heavy"
+    )
+    asked = {
+        "_WARPSPLAT_COMPLETE": "bash_complete",
+        "COMP_WORDS": "warpsplat vectorize --qu",
+        "COMP_CWORD": "2",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | asked, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.decode().split() == ["plain,--quality", "plain,--quiet"]

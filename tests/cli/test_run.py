@@ -92,9 +92,9 @@ def test_the_bar_weighs_steps_and_shows_no_decibels_that_fall() -> None:
     assert [p.fine for p in seen] == [False] * 5 + [True] * 5
     work = [p.work for p in seen]
     coarse, fine = np.diff(work[:5]), np.diff(work[5:])
-    # Four times the pixels, and outlines that are twice as long.
-    assert 2 < fine.min() / coarse.max() < fine.max() / coarse.min() < 4
-    assert 0.2 < work[-1] < 0.9, "then the file is measured"
+    # Four times the pixels, and outlines that are twice as long; meanwhile shapes come.
+    assert 1.7 < fine.min() / coarse.max() < fine.max() / coarse.min() < 5
+    assert 0.2 < work[-1] < 0.99, "then the file is measured"
     bar = Bar()
     texts = [bar.update(progress, 30.0 + 100 * progress.work) for progress in seen]
     assert texts[0] == "reduced image"

@@ -25,7 +25,7 @@ from warpsplat.native import messages_hidden
 from warpsplat.scene import FloatArray
 
 MIN_SIDE = 2
-"""Smallest side of an image [px]: with one pixel there is nothing to fit a curve to."""
+"""Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""
 
 MAX_PIXELS = 120_000_000
 """Largest image [pixels]: the largest that cameras give. A small file may claim any size (a bomb)."""

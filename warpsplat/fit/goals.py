@@ -81,7 +81,8 @@ TRIES = 3
 PILOT_TIME, MAIN_TIME = 0.15, 0.7
 """Shares of a time budget; the rest is for the rounds."""
 
-USUAL_PILOTS, USUAL_ROUNDS = 2, 2
+USUAL_PILOTS = 2
+USUAL_ROUNDS = {"target_psnr": 4, "max_bytes": 1}
 """How many there are in most runs, as progress is shown."""
 
 
@@ -120,7 +121,9 @@ def pursue(
         if change is None or pursuit.over():
             break
         cost = pursuit.cost(replace(settings, curves=len(change.base.fit.scene)), LAST_STEPS)
-        result = pursuit.changed(change, pursuit.meter.stage(cost, max(USUAL_ROUNDS - turn - 1, 0) * cost))
+        result = pursuit.changed(
+            change, pursuit.meter.stage(cost, max(_usual_rounds(settings) - turn - 1, 0) * cost)
+        )
         done += result.iterations
         if result.interrupted:
             break
@@ -131,6 +134,10 @@ def pursue(
     best = min(tried, key=lambda made: _rank(made, settings))
     interrupted = bool(stop and stop())
     return replace(best.fit, iterations=done, interrupted=interrupted)
+
+
+def _usual_rounds(settings: Settings) -> int:
+    return USUAL_ROUNDS["target_psnr" if settings.target_psnr else "max_bytes"]
 
 
 def _first(pursuit: Pursuit) -> tuple[int, Fit]:
@@ -148,7 +155,7 @@ def _first(pursuit: Pursuit) -> tuple[int, Fit]:
     results = []
     for turn in range(tries):
         seeded = replace(settings, seed=(settings.seed + turn) % 2**32)
-        cost, later = pursuit.cost(settings), USUAL_ROUNDS * pursuit.cost(settings, LAST_STEPS)
+        cost, later = pursuit.cost(settings), _usual_rounds(settings) * pursuit.cost(settings, LAST_STEPS)
         report = pursuit.meter.stage(cost, (tries - turn - 1) * cost + later)
         results.append(pursuit.run(seeded, report, pursuit.seconds(MAIN_TIME / (tries - turn))))
         done += results[-1].iterations
@@ -178,7 +185,7 @@ def _pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
     for turn in range(PILOTS):
         chosen = replace(settings, curves=curves, **draft)
         cost, main = pursuit.cost(chosen), replace(settings, curves=curves)
-        later = pursuit.cost(main) + USUAL_ROUNDS * pursuit.cost(main, LAST_STEPS)
+        later = pursuit.cost(main) + _usual_rounds(settings) * pursuit.cost(main, LAST_STEPS)
         report = pursuit.meter.stage(cost, max(USUAL_PILOTS - turn - 1, 0) * cost + later)
         seconds = pursuit.seconds(PILOT_TIME / PILOTS)
         pilot = pursuit.run(chosen, report, seconds)

@@ -67,7 +67,7 @@ def fold_weight(settings: Settings, step: int) -> float:
 
 
 def opacity_threshold(density: Density, progress: float) -> float:
-    """Falls linearly with ``progress`` (fraction of the run) until the set of curves is fixed."""
+    """Falls linearly with ``progress`` (fraction of the run) until the set of shapes is fixed."""
     t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0
     return density.opacity_start + t * (density.opacity_end - density.opacity_start)
 

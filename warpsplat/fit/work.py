@@ -1,7 +1,8 @@
 """What a run's parts cost, in units of their own: for progress that goes on evenly, not for results.
 
-A unit is the time that a pixel takes in a step of fills on one thread, about 30 ns. Figures were measured on
-photographs of 0.4 and 2.8 million pixels with 128 to 2,000 shapes.
+A unit is what a step takes on one thread of a CPU for the pixels alone, where there are 100,000 of them: some
+milliseconds. Figures were fitted to the processor time of runs of three efforts on photographs of 0.4 and 2.8
+million pixels with 128 to 512 shapes: what is left was foreseen within a third from the first tenth on.
 """
 
 from __future__ import annotations
@@ -39,14 +40,20 @@ class Progress:
 
 Report = Callable[[Progress], None]
 
-SHAPE_COST = 4.3
-"""Units of a shape in a step, for each pixel of the image's side: outlines are long as the image is wide."""
+PIXELS = 100_000
+"""Of the picture whose step costs a unit."""
+
+PIXEL_POWER = 0.6
+"""By which a step's cost grows with the pixels: there is more to each of few."""
+
+SHAPE_COST = 0.01
+"""Of a shape in a step, at that size; it grows with the picture's side, as outlines do."""
 
 STROKE_COST, SPLAT_COST = 2.5, 4.0
 """Factors of strokes, and of splats."""
 
-EYES_COST, SCORE_COST = 130.0, 20.0
-"""Units of measuring a file, for each of its pixels: with SSIMULACRA2 and without."""
+EYES_COST, SCORE_COST = 80.0, 20.0
+"""Of measuring a file of that size: with SSIMULACRA2 and without."""
 
 GPU_THREADS = 30
 """Threads of a CPU that a GPU's steps are as fast as; files are measured on the CPU all the same."""
@@ -57,11 +64,11 @@ PARTS = 24
 
 def step_cost(settings: Settings, phase: Phase, shapes: float) -> float:
     """Of a step with so many shapes."""
-    pixels = phase.width * phase.height
+    size = phase.width * phase.height / PIXELS
     factor = STROKE_COST if settings.kind == Kind.STROKE else 1.0
     if settings.renderer != "exact":
         factor = SPLAT_COST
-    return factor * (pixels + SHAPE_COST * shapes * math.sqrt(pixels))
+    return factor * (size**PIXEL_POWER + SHAPE_COST * shapes * math.sqrt(size))
 
 
 def fit_cost(
@@ -93,7 +100,7 @@ def run_cost(
 def score_cost(width: int, height: int, backend: Backend, *, eyes: bool) -> float:
     """Of making and measuring a file, which one thread does."""
     threads = backend.threads if backend.device.is_cpu else GPU_THREADS
-    return (EYES_COST if eyes else SCORE_COST) * width * height * threads
+    return (EYES_COST if eyes else SCORE_COST) * width * height / PIXELS * threads
 
 
 class Meter:

@@ -99,6 +99,7 @@ class Result:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
+        shapes = len(self.scene) - len(self.scene.pictures)
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
             **(self.score.as_dict() if self.score else figures),
@@ -108,7 +109,8 @@ class Result:
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
-            "curves": len(self.scene) - len(self.scene.pictures),
+            "shapes": shapes,
+            "curves": shapes,  # what it was called at first
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
@@ -140,7 +142,7 @@ def vectorize(
     stop: Callable[[], bool] | None = None,
     write: Callable[[str], None] | None = None,
 ) -> Result:
-    """Fit curves to ``target`` and score the file they make.
+    """Fit shapes to ``target`` and score the file they make.
 
     Args:
         target: the image, sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape
@@ -148,11 +150,11 @@ def vectorize(
         settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
-        scene: curves to start from; without, new ones.
+        scene: shapes to start from; without, new ones.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
             those of the whole image all the same.
         report: called every few steps.
-        stop: asked after every step; once true, the curves as they are make the file. True later, the score
+        stop: asked after every step; once true, the shapes as they are make the file. True later, the score
             is given up.
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
     """
@@ -237,7 +239,7 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
-    """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
+    """The SVG, and the shapes in it: all, or those that show most where ``max_bytes`` has room for few."""
 
     def made() -> str:
         return finished(scene, settings, per_pixel, metadata)
