@@ -40,12 +40,12 @@ def table(values: dict[str, Any], verbose: int) -> str:
     )
     return "\n".join(
         [
-            f"{values['curves']} {values['kind']} curves, {values['width']}x{values['height']} px, "
+            f"{values['shapes']} {values['kind']} shapes, {values['width']}x{values['height']} px, "
             f"opacity {values['opacity']:g}, {values['renderer']} renderer, {where}",
             f"{values['pairs']} (tile, shape) pairs, {values['samples']} samples",
             f"{'':36}{'median':>10}{'low':>10}{'high':>10}  ms",
             *(f"{name:36}{s['median']:10.2f}{s['low']:10.2f}{s['high']:10.2f}" for name, s in rows),
-            f"{values['megapixels_per_s']:.1f} megapixels/s, {values['us_per_curve']:.1f} us a curve, "
+            f"{values['megapixels_per_s']:.1f} megapixels/s, {values['us_per_shape']:.1f} us a shape, "
             f"{values['ns_per_pixel']:.1f} ns a pixel"
             + (f", peak memory {memory / 1e6:.0f} MB" if memory else "")
             + (f"; through PyTorch {both['ratio']:.2f} times as long" if both else ""),

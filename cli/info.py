@@ -13,24 +13,19 @@ from warpsplat.cli.say import say
 @click.command("info", context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(as_json: bool) -> None:
-    """Show the version, the devices and where compiled kernels are kept."""
-    import platform
+    """Show the version, the devices and where compiled kernels are kept; doctor checks them."""
+    from warpsplat.jobs.doctor import check_cache, check_devices, check_machine, check_packages, check_python
 
-    import warp as wp
-
-    from warpsplat._version import __version__
-    from warpsplat.rendering.backend import available_cores
-    from warpsplat.rendering.device import choose_device, start_warp
-
-    start_warp()
+    python, packages, found = (check().values for check in (check_python, check_packages, check_devices))
+    devices = [{"name": d["name"], "description": d["description"]} for d in found["devices"]]
     values: dict[str, Any] = {
-        "warpsplat": __version__,
-        "warp": wp.__version__,
-        "python": platform.python_version(),
-        "cpu_threads": available_cores(),
-        "devices": [{"name": str(d), "description": d.name} for d in wp.get_devices()],
-        "default_device": str(choose_device("auto")),
-        "kernel_cache": str(wp.config.kernel_cache_dir),
+        "warpsplat": python["warpsplat"],
+        "warp": packages["versions"]["warp-lang"],
+        "python": python["python"],
+        "cpu_threads": check_machine().values["cpu_threads"],
+        "devices": devices,
+        "default_device": found["default_device"],
+        "kernel_cache": check_cache().values["folder"],
     }
     if as_json:
         say(json.dumps(values))

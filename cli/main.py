@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import difflib
 import importlib
+import itertools
+import json
 import os
 import signal
 import sys
 import traceback
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import click
 
@@ -25,11 +29,20 @@ COMMANDS = {
     "compare": "Compare our files with another program's.",
     "bench": "Time the stages of a training step.",
     "info": "Show version and devices.",
+    "doctor": "Check that all that is needed is there and works.",
 }
 
 
 MODULES = {"eval": "evaluate"}
 """Commands whose file has another name: ``eval`` is a built-in function."""
+
+
+FOR_FILES = {
+    ".svg": ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg"),
+    ".yaml": ("batch FILE.yaml",),
+}
+"""What can be done with files that are no images."""
+FOR_FILES[".svgz"], FOR_FILES[".yml"] = FOR_FILES[".svg"], FOR_FILES[".yaml"]
 
 
 class LazyGroup(click.Group):
@@ -44,6 +57,29 @@ class LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         return getattr(importlib.import_module(f"warpsplat.cli.{MODULES.get(cmd_name, cmd_name)}"), "command")  # noqa: B009
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is meant, and its arguments. A file in its place is an image to vectorize.
+
+        Raises:
+            click.UsageError: none is; the message says which one may be.
+        """
+        name = args[0]
+        if name in COMMANDS or ctx.resilient_parsing:
+            return super().resolve_command(ctx, args)
+        if not os.path.isfile(name):
+            found = difflib.get_close_matches(name, COMMANDS, 1)
+            hint = f"; did you mean {found[0]}?" if found else "; commands are " + ", ".join(COMMANDS)
+            ctx.fail(f"no such command or file: {name}{hint}")
+        others = FOR_FILES.get(os.path.splitext(name)[1].lower())
+        if others:
+            ctx.fail(f"{name}: with which command? " + " or ".join(f"warpsplat {o}" for o in others))
+        say(
+            f"warpsplat: {name}: no command given, so it is vectorized (warpsplat vectorize {name})", err=True
+        )
+        return super().resolve_command(ctx, ["vectorize", *args])
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command. Of a reader of stdout that has gone, click would say nothing and exit with 1."""
@@ -80,6 +116,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     Where a signal came, the code says so, whatever else there is to say: a shell's loop must not go on.
     """
     code: Any = ExitCode.INTERNAL
+    given = sys.argv[1:] if arguments is None else arguments
     try:
         with signals.handled():
             open_standard_streams()
@@ -89,7 +126,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     except SystemExit as error:
         code = error.code
     except BaseException as error:
-        code = report(error)
+        code = report(error, json_stream(given))
     number = signals.received()
     if number:
         code = 128 + number
@@ -97,28 +134,54 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     sys.exit(int(code or 0))
 
 
-def report(error: BaseException) -> int:
-    """Say what was raised, and return the exit code for it."""
+def json_stream(arguments: list[str]) -> Literal["stdout", "stderr"] | None:
+    """Where objects of ``--json`` go: to stderr where a file goes to stdout. None without the flag.
+
+    Read from the words themselves, which need not be right.
+    """
+    words = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    if "--json" not in words:
+        return None
+    outputs = [after for word, after in itertools.pairwise(words) if word in {"-o", "--output"}]
+    aside = "-" in outputs or "--data-uri" in words or {"-o-", "--output=-"} & set(words)
+    return "stderr" if aside else "stdout"
+
+
+def report(error: BaseException, objects: Literal["stdout", "stderr"] | None = None) -> int:
+    """Say what was raised, and return the exit code for it.
+
+    Args:
+        error: what was raised.
+        objects: where an object of JSON on it goes as well.
+    """
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        click.echo(error.format_message())
+        return ExitCode.USAGE
+    message, code = told(error)
+    if isinstance(error, OSError) and error.filename is None:
+        silence(sys.stdout)  # what is left in its buffer cannot be written either
+    say(f"warpsplat: {message}", err=True)
+    if objects:
+        with contextlib.suppress(Exception):  # what failed may be this as well
+            say(json.dumps({"error": message, "exit_code": int(code)}), err=objects == "stderr")
+    return code
+
+
+def told(error: BaseException) -> tuple[str, int]:
+    """What to say of what was raised, and the exit code for it."""
     number = signals.received() or (signal.SIGINT if isinstance(error, KeyboardInterrupt) else None)
     if os.environ.get("WARPSPLAT_TRACEBACK"):
         traceback.print_exception(error)
     if number or isinstance(error, click.exceptions.Abort):
         # What a library makes of an interruption inside of it (an ImportError, say) is an interruption.
-        say("warpsplat: interrupted", err=True)
-        return 128 + (number or signal.SIGINT)
-    if isinstance(error, click.exceptions.NoArgsIsHelpError):
-        click.echo(error.format_message())
-        return ExitCode.USAGE
+        return "interrupted", 128 + (number or signal.SIGINT)
     if isinstance(error, click.ClickException):
         context = getattr(error, "ctx", None)
         help_of = f" (see {context.command_path} --help)" if context else ""
-        message, code = printable(error.format_message()) + help_of, error.exit_code
-    else:
-        message, code = explain(error)
-    if isinstance(error, OSError) and error.filename is None:
-        silence(sys.stdout)  # what is left in its buffer cannot be written either
-    say(f"warpsplat: {message}", err=True)
-    return code
+        if isinstance(error, click.NoSuchOption) and context and context.command is cli:
+            help_of = " (options follow a command: warpsplat vectorize IMAGE ...)"
+        return printable(" ".join(error.format_message().split())) + help_of, error.exit_code
+    return explain(error)
 
 
 if __name__ == "__main__":

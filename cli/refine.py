@@ -12,7 +12,7 @@ from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_opti
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
-from warpsplat.files.output import SVG_ENDINGS, check_output
+from warpsplat.files.output import check_output
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.options import BY_NAME
 
@@ -20,7 +20,13 @@ from warpsplat.jobs.options import BY_NAME
 @click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=FILE)
 @click.argument("image", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="SVG to write; - is the standard output.")
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    required=True,
+    help="SVG to write, or .svgz, .png, .pdf; - is the standard output.",
+)
 @overwrite_option
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @flag(BY_NAME["time-budget"])
@@ -63,7 +69,10 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
-    check_output(output, svg, image, endings=SVG_ENDINGS, overwrite=overwrite)
+    from warpsplat.jobs.formats import ENDINGS, check_format
+
+    check_output(output, svg, image, endings=ENDINGS, overwrite=overwrite)
+    check_format(output)
     if checkpoint:
         check_output(checkpoint, svg, image)
     from warpsplat.api import refine

@@ -13,7 +13,13 @@ from warpsplat.errors import ImageError, UsageError
 
 @click.command("render", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="PNG to write; - is the standard output.")
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    required=True,
+    help="PNG to write, or .pdf; - is the standard output, for a PNG.",
+)
 @overwrite_option
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
 @click.option(
@@ -21,32 +27,38 @@ from warpsplat.errors import ImageError, UsageError
     type=click.Choice(["viewer", "exact", "splat", "gaussian"]),
     default="viewer",
     show_default=True,
-    help="viewer: resvg. exact, splat: those that curves are fitted with, for SVGs of paths.",
+    help="viewer: resvg. exact, splat: those that shapes are fitted with, for SVGs of paths.",
 )
 @click.option("--device", default="auto", show_default=True, help="Of exact and splat.")
 @threads_option
 def command(
     svg: Path, output: Path, overwrite: bool, scale: float, renderer: Any, device: str, threads: int | None
 ) -> None:
-    """Render SVG (any, not only ours; - for the standard input) to a PNG."""
-    from warpsplat.files.inputs import input_name
+    """Render SVG (any, not only ours; - for the standard input) to a PNG, or its paths to a PDF."""
+    from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.output import check_output, mark_png, write_result
+    from warpsplat.jobs.formats import PICTURE_ENDINGS, check_format, write_named
     from warpsplat.jobs.render import NO_GAUSSIANS, check_scale, to_png
     from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
     from warpsplat.svg.viewer import draw_png
 
     if renderer == "gaussian":
         raise UsageError(NO_GAUSSIANS)
-    check_output(output, svg, endings=(".png",), overwrite=overwrite)
+    check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=overwrite)
+    check_format(output)
+    if renderer != "viewer" and output.suffix.lower() == ".pdf":
+        raise UsageError(f"--renderer {renderer} makes pixels: give an output that ends with .png")
     text = read_svg_text(svg)
     try:
         check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
-        if renderer == "viewer":
-            png = draw_png(text, zoom=scale)  # packed as it comes: a picture may have 200 million pixels
-        else:
+        if renderer != "viewer":
             from warpsplat.api import render
 
             png = to_png(render(text, scale=scale, renderer=renderer, device=device, threads=threads))
+            write_result(output, mark_png(png))
+        elif output == STANDARD:
+            write_result(output, mark_png(draw_png(text, zoom=scale)))
+        else:
+            write_named(output, text, zoom=scale)
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
-    write_result(output, mark_png(png))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -30,15 +32,32 @@ BAR_LENGTH = 1000
 """Of a progress bar: thousandths of the work."""
 
 
-def _quality(progress: Progress) -> str:
-    """The decibels, but only of the finest size: a reduced image has more, and they would seem to fall."""
-    return f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
+class Bar:
+    """What a bar shows of a run's reports: nothing of it goes back."""
 
+    def __init__(self) -> None:
+        self._first: tuple[float, float] | None = None
+        self._best = -math.inf
+        self.work = 0.0
 
-def time_left(first: Progress, now: Progress) -> int | None:
-    """Seconds that the rest takes if work goes on as it did since ``first``; None at the very start."""
-    done = now.work - first.work
-    return round((now.seconds - first.seconds) / done * (1 - now.work)) if done > 0 else None
+    def update(self, progress: Progress, now: float) -> str:
+        """Take note of a report, and say what there is to say, at a time ``now`` [s]."""
+        self.work = max(self.work, progress.work)
+        if progress.fine:  # a reduced image has more decibels than the whole one
+            self._best = max(self._best, progress.psnr)
+        self._first = self._first or (now, self.work)
+        left = self._seconds_left(now)
+        quality = f"{self._best:.2f} dB" if self._best > -math.inf else "reduced image"
+        return (f"{left // 60}:{left % 60:02} left, " if left is not None else "") + quality
+
+    def _seconds_left(self, now: float) -> int | None:
+        """What the rest takes if work goes on as it did since the first report; None at the very start.
+
+        What was before, as kernels being compiled, says nothing of the rest.
+        """
+        assert self._first
+        done = self.work - self._first[1]
+        return round((now - self._first[0]) / done * (1 - self.work)) if done > 0 else None
 
 
 @contextlib.contextmanager
@@ -50,33 +69,26 @@ def progress_bar(
 
         def tell(progress: Progress) -> None:
             if verbose > 1:
+                quality = f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
                 step = f"step {progress.step}/{progress.steps}"
-                say(f"{source}: {step}, {_quality(progress)}, {progress.seconds:.1f} s", err=True)
+                say(f"{source}: {step}, {quality}, {progress.seconds:.1f} s", err=True)
 
         yield tell
         return
     bar: Any
-    first: Progress | None = None
-
-    def state(progress: Progress | None) -> str | None:
-        if progress is None or first is None:
-            return None
-        seconds = time_left(first, progress)
-        left = "" if seconds is None else f"{seconds // 60}:{seconds % 60:02} left, "
-        return left + _quality(progress)
+    state = Bar()
 
     with click.progressbar(
         length=BAR_LENGTH,
         label=printable(source.name),
         file=sys.stderr,
-        item_show_func=state,
+        item_show_func=lambda text: text,
         show_eta=False,  # it would count the time that kernels took to compile
     ) as bar:
 
         def show(progress: Progress) -> None:
-            nonlocal first
-            first = first or progress
-            bar.update(round(BAR_LENGTH * progress.work) - bar.pos, progress)
+            text = state.update(progress, time.monotonic())
+            bar.update(round(BAR_LENGTH * state.work) - bar.pos, text)
 
         yield show
 

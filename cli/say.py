@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import click
 
 from warpsplat.errors import OutputError, printable
+from warpsplat.native import write_message
 
 
 def open_standard_streams() -> None:
@@ -61,20 +62,27 @@ def silence(stream: object) -> None:
 
 
 class _Notices(logging.Handler):
-    """Shows the library's notices on stderr."""
+    """Shows the library's notices on stderr; on a terminal those that pass as well, in one line."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__()
+        self._start = "\r\x1b[2K" if terminal else ""  # a progress bar may stand in the line
+        self._terminal = terminal
 
     def emit(self, record: logging.LogRecord) -> None:
-        # A progress bar may stand in the line.
-        start = "\r\x1b[2K" if sys.stderr.isatty() else ""
+        text = printable(record.getMessage())
         with contextlib.suppress(OSError):
-            click.echo(f"{start}warpsplat: {printable(record.getMessage())}", err=True)
+            if not getattr(record, "passing", False):
+                click.echo(f"{self._start}warpsplat: {text}", err=True)
+            elif self._terminal:
+                write_message(self._start + (f"warpsplat: {text}" if text else ""))
 
 
 @contextlib.contextmanager
 def notices() -> Iterator[None]:
     """Show the library's warnings, and on a terminal what it is busy with; ``set_voice`` changes that."""
     log = logging.getLogger("warpsplat")
-    before, handler = (log.propagate, log.level), _Notices()
+    before, handler = (log.propagate, log.level), _Notices(terminal=sys.stderr.isatty())
     log.addHandler(handler)
     log.propagate = False
     log.setLevel(logging.INFO if sys.stderr.isatty() else logging.WARNING)

@@ -8,10 +8,13 @@ from typing import Any
 
 def summary(output: Path, values: dict[str, Any]) -> str:
     """One line on the result, for people."""
+    from warpsplat.jobs.formats import PICTURE_ENDINGS
+
     name = "standard output" if str(output) == "-" else output
     note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
+    picture = " as an SVG" if output.suffix.lower() in PICTURE_ENDINGS else ""
     if values["paths"] is None:
-        size = f"{values['bytes'] / 1000:.1f} kB"
+        size = f"{values['bytes'] / 1000:.1f} kB{picture}"
         return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
     ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
@@ -23,7 +26,7 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     note += f"; the first {levels}" if levels else ""
     return (
         f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
-        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
+        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped){picture}, "
         f"{values['seconds']:.1f} s{note}"
     )
 

@@ -29,7 +29,8 @@ from warpsplat.jobs.options import settings_from
     "-o",
     "--output",
     type=FILE,
-    help="SVG to write, or of several images a folder; - is stdout.  [default: IMAGE with .svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder."
+    "  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
 @quality_options
@@ -75,7 +76,8 @@ def command(
     image = images[0]
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
-    from warpsplat.files.output import SVG_ENDINGS, check_output
+    from warpsplat.files.output import check_output
+    from warpsplat.jobs.formats import ENDINGS, check_format
 
     if output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
@@ -86,7 +88,8 @@ def command(
     data = read_input(image)
     output = output or Path(image.name).with_suffix(".svg")
     inputs = (image,) if importance is None else (image, importance)
-    check_output(output, *inputs, endings=SVG_ENDINGS, overwrite=overwrite)
+    check_output(output, *inputs, endings=ENDINGS, overwrite=overwrite)
+    check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
     from warpsplat.cli.run import leave, run_file

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 
 import click
 import pytest
 
 from warpsplat.cli import say as voice
+from warpsplat.cli.say import _Notices
 from warpsplat.errors import OutputError
+from warpsplat.native import messages_hidden
 
 
 def _failing(number: int) -> None:
@@ -32,3 +35,21 @@ def test_a_reader_that_has_gone_is_for_the_caller(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(click, "echo", lambda *_, **__: _failing(errno.EPIPE))
     with pytest.raises(BrokenPipeError):
         voice.say("figures")
+
+
+class Passing(logging.LogRecord):
+    """What is said while one waits."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__("warpsplat", logging.INFO, "", 0, text, (), None)
+        self.passing = True
+
+
+def test_what_passes_is_for_terminals(capfd: pytest.CaptureFixture[str]) -> None:
+    """Also while native code's messages are hidden."""
+    for terminal, said in ((False, ""), (True, "\r\x1b[2Kwarpsplat: compiling: 3 s\r\x1b[2K")):
+        handler = _Notices(terminal=terminal)
+        with messages_hidden():
+            handler.emit(Passing("compiling: 3 s"))
+            handler.emit(Passing(""))
+        assert capfd.readouterr().err == said

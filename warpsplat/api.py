@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import ImageError, UsageError
-from warpsplat.files.output import write_svg_text
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import Progress
@@ -28,6 +27,7 @@ from warpsplat.fit.stages import INTERVAL
 from warpsplat.fit.step import model_for
 from warpsplat.fit.texts import parse_duration
 from warpsplat.jobs.checkpoint import CheckpointFile
+from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.refine import refine as refine_scene
 from warpsplat.jobs.render import RendererName, drawn
@@ -130,7 +130,8 @@ def vectorize(
         precision: most decimals of a pixel in coordinates.
         settings: all of these at once, made by ``make_settings``; none of the others may be given then.
         importance: mask of the image's proportions, in any of the image's forms: how much errors count.
-        output: file to write the SVG to, before it is measured; ``-`` is the standard output.
+        output: file to write the SVG to, before it is measured, or what its name ends with (``Result.save``);
+            ``-`` is the standard output.
         device: ``auto``, ``cpu``, ``cuda`` or ``cuda:N``.
         threads: of a CPU, default one a core; they do not change the result.
         callback: see ``Callback``.
@@ -288,7 +289,7 @@ def refine(
             checkpoint=kept,
         )
     if output is not None:
-        write_svg_text(Path(output), result.svg)
+        write_named(Path(output), result.svg)
     if kept and not result.stopped:
         kept.remove()
     return result
@@ -418,7 +419,7 @@ def save_svg(
 
     Args:
         scene: what to write.
-        path: one that ends in ``.svgz`` is gzipped.
+        path: says by its ending what is written, see ``Result.save``.
         precision: decimals of a pixel in coordinates; default: two.
         title: as for ``vectorize``, as are ``ids`` and ``minify``.
         ids: see there.
@@ -432,7 +433,7 @@ def save_svg(
     text = export(scene, settings, finest(settings))
     text = minified(text) if minify else text
     if path is not None:
-        write_svg_text(Path(path), text)
+        write_named(Path(path), text)
     return text
 
 

@@ -27,6 +27,16 @@ def messages_hidden() -> Iterator[None]:
         _show()
 
 
+def write_message(text: str) -> None:
+    """Write to the standard error as it is, or was before it was hidden.
+
+    Raises:
+        OSError: it takes no more.
+    """
+    with _lock:
+        os.write(_saved if _hiding and _saved >= 0 else 2, text.encode(errors="backslashreplace"))
+
+
 def _hide() -> None:
     global _hiding, _saved  # noqa: PLW0603 - a process has one standard error
     with _lock:

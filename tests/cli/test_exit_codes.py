@@ -67,6 +67,7 @@ TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
     (ExitCode.DONE, "nothing", "render drawing.svg -o a.png", None),
     (ExitCode.DONE, "nothing", "bench --curves 4 --size 32x32 --repeats 1", None),
     (ExitCode.DONE, "nothing", "info", None),
+    (ExitCode.USAGE, "unknown option", "doctor --nonsense", None),
     (ExitCode.INTERNAL, "a fault of the program", f"vectorize photo.png {QUICK}", FAULT),
     (ExitCode.INTERNAL, "a fault of the program", f"refine drawing.svg photo.png -o a.svg {REFINE}", FAULT),
     (ExitCode.INTERNAL, "a fault of the program", "eval photo.png drawing.svg --json", FAULT_OF_JSON),

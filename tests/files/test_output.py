@@ -137,7 +137,7 @@ def test_names_that_cannot_be_files(tmp_path: Path) -> None:
     for name in ("x" * 300 + ".svg", "a\0.svg"):
         with pytest.raises(UsageError, match="cannot be written"):
             check_output(tmp_path / name)
-    with pytest.raises(UsageError, match=r"type \.svg"):
+    with pytest.raises(UsageError, match=r"ends with \.svg or \.svgz"):
         check_output(tmp_path / "a.png", endings=SVG_ENDINGS)
     check_output(tmp_path / "a.SVG", endings=SVG_ENDINGS)
     check_output(tmp_path / "a.svgz", endings=SVG_ENDINGS)

@@ -32,7 +32,7 @@ def test_what_ends_resvg_is_one_line(name: str, tmp_path: Path, capfd: pytest.Ca
         assert run(*arguments) == 3
         assert (
             one_line(capfd.readouterr().err)
-            == f"warpsplat: {svg}: cannot be rendered: resvg fails on what it draws"
+            == f"warpsplat: {svg}: cannot be rendered: the renderer fails on what it draws"
         )
     assert run("refine", svg, image, "-o", tmp_path / "b.svg") == 3
     assert one_line(capfd.readouterr().err).startswith(f"warpsplat: {svg}: ")

@@ -20,11 +20,12 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError
 from warpsplat.files.inputs import input_name, read_input
+from warpsplat.files.profile import Profile, profile_of
 from warpsplat.native import messages_hidden
 from warpsplat.scene import FloatArray
 
 MIN_SIDE = 2
-"""Smallest side of an image [px]: with one pixel there is nothing to fit a curve to."""
+"""Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""
 
 MAX_PIXELS = 120_000_000
 """Largest image [pixels]: the largest that cameras give. A small file may claim any size (a bomb)."""
@@ -43,7 +44,7 @@ LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 def load_image(
     source: Path | bytes, name: str | None = None, *, paper: float | FloatArray | None = 1.0
 ) -> FloatArray:
-    """Read an image: first frame, EXIF rotation applied, transparency composited on ``paper``.
+    """Read an image: first frame, EXIF rotation and colour profile applied, transparency on ``paper``.
 
     Args:
         source: a file, ``-`` for the standard input, or the bytes of an image.
@@ -80,7 +81,7 @@ def load_image(
                 opened.load()
                 _mend_transparency(opened, rawmode, source)
                 ImageOps.exif_transpose(opened, in_place=True)
-                return to_srgb(opened, paper)
+                return to_srgb(opened, paper, name)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except MemoryError:
@@ -154,21 +155,27 @@ def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
         yield slice(top, bottom), image.crop((0, top, width, bottom))
 
 
-def to_srgb(image: Image.Image, paper: float | FloatArray | None = 1.0) -> FloatArray:
-    """A loaded Pillow image of any mode as sRGB in [0, 1], see ``load_image``.
+def to_srgb(
+    image: Image.Image, paper: float | FloatArray | None = 1.0, name: str = "the image"
+) -> FloatArray:
+    """A loaded Pillow image of any mode as sRGB in [0, 1], by its colour profile; see ``load_image``.
 
     Raises:
         ImageError: pixels that are no numbers.
     """
+    profile = profile_of(image, name)
     if image.mode == "F" or image.mode.startswith("I"):
         grey, opacity = _grey(image)
+        if profile:
+            grey = np.interp(grey, np.linspace(0, 1, 256), profile.grey()).astype(np.float32)
         return composited([(slice(None), np.repeat(grey, 3, axis=2), opacity)], image.size, paper)
     transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
     if transparent:
-        return composited(_straight_strips(image), image.size, paper)
+        return composited(_straight_strips(image, profile), image.size, paper)
     out = np.empty((image.height, image.width, 3), np.float32)
     for rows, part in _strips(image):
-        np.divide(np.asarray(part.convert("RGB")), np.float32(255), out=out[rows])
+        rgb = profile.rgb(part) if profile else part.convert("RGB")
+        np.divide(np.asarray(rgb), np.float32(255), out=out[rows])
     return out
 
 
@@ -176,9 +183,11 @@ Strip = tuple[slice, FloatArray, FloatArray | None]
 """Rows, their colours (height, width, 3), and their opacity (height, width, 1) where there is any."""
 
 
-def _straight_strips(image: Image.Image) -> Iterator[Strip]:
+def _straight_strips(image: Image.Image, profile: Profile | None) -> Iterator[Strip]:
     for rows, part in _strips(image):
-        rgba = np.asarray(part.convert("RGBA"), np.float32) / np.float32(255)
+        rgba = np.asarray(profile.rgba(part) if profile else part.convert("RGBA"), np.float32) / np.float32(
+            255
+        )
         yield rows, rgba[..., :3], rgba[..., 3:]
 
 

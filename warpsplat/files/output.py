@@ -36,6 +36,9 @@ SHORT_SVG = re.compile(
 PNG_SOFTWARE = "warpsplat"
 """Text of the ``Software`` chunk of every PNG written here."""
 
+PDF_MARK = b"\n%warpsplat\n"
+"""Comment behind the end of every PDF written here."""
+
 HEAD = 2000
 """Bytes at the start of a file in which its mark stands."""
 
@@ -68,7 +71,8 @@ def check_output(path: Path, *sources: Path, endings: tuple[str, ...] = (), over
     try:
         _check_output(path, sources)
         if endings and path.suffix.lower() not in endings:
-            raise UsageError(f"{path}: the result is a file of type {endings[0]}, and its name has to say so")
+            known = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+            raise UsageError(f"{path}: says no type that the result can have; its name ends with {known}")
         if not overwrite and not may_replace(path):
             raise UsageError(f"{path}: exists and was not written by warpsplat; --overwrite replaces it")
     except (OSError, ValueError) as error:
@@ -147,6 +151,10 @@ def may_replace(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             head = file.read(HEAD)
+            if head.startswith(b"%PDF-"):
+                size = file.seek(0, os.SEEK_END)
+                file.seek(max(0, size - len(PDF_MARK)))
+                return file.read() == PDF_MARK
     except FileNotFoundError:
         return True
     head = unpacked(head)

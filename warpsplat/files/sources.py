@@ -92,7 +92,7 @@ def _of_pillow(image: Image.Image, name: str, paper: float | FloatArray | None) 
     """As ``load_image``: upright; a file that Pillow has not read yet may be damaged."""
     _check_size(image.width, image.height)
     try:
-        return to_srgb(ImageOps.exif_transpose(image), paper)
+        return to_srgb(ImageOps.exif_transpose(image), paper, name)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except (OSError, ValueError, SyntaxError) as error:

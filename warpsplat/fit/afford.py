@@ -22,29 +22,29 @@ SEPARATOR = 1.6
 """Bytes of a number, besides those of its digits in whole pixels."""
 
 SPARE_CURVES = 1.3
-"""Curves trained over those expected to fit: what is too many goes with the surplus."""
+"""Shapes trained over those expected to fit: what is too many goes with the surplus."""
 
 LATER = 0.92
 """Bytes of a shape in the file over those before the last steps: opacities become 1, the grid coarser."""
 
 
 def affordable_curves(settings: Settings, width: int, height: int) -> int:
-    """Curves that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
+    """Shapes that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
 
-    Coordinates are relative: each has as many digits before the point as the distance of two curves.
+    Coordinates are relative: each has as many digits before the point as the distance of two shapes.
     """
     assert settings.max_bytes
     numbers = 4 + 2 * settings.density.mean_points
     room = settings.max_bytes - HEAD_BYTES
     count = float(settings.curves)
-    for _ in range(8):  # settles within a curve
+    for _ in range(8):  # settles within a shape
         digits = max(0.0, 0.5 * math.log10(width * height / max(count, 1.0)))
         count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (SEPARATOR + digits)))
     return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 
 
 def affordable(step: Step) -> Settings:
-    """The settings of a run whose surplus is thinned, with no more curves than ``max_bytes`` has room for.
+    """The settings of a run whose surplus is thinned, with no more shapes than ``max_bytes`` has room for.
 
     Shapes take the bytes that they have now, less those of the points that they are still to lose.
     """

@@ -13,12 +13,13 @@ from dataclasses import replace
 from warpsplat.fit.afford import affordable_curves
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.pursuit import Change, Made, Pursuit, Report, Stop
+from warpsplat.fit.pursuit import LAST_STEPS, Change, Made, Pursuit, Stop
 from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.tiny import FEW, for_few
+from warpsplat.fit.work import Meter, Report
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS
@@ -81,8 +82,9 @@ TRIES = 3
 PILOT_TIME, MAIN_TIME = 0.15, 0.7
 """Shares of a time budget; the rest is for the rounds."""
 
-PILOT_WORK, MAIN_WORK = 0.1, 0.7
-"""Shares of the work, as progress is shown."""
+USUAL_PILOTS = 2
+USUAL_ROUNDS = {"target_psnr": 4, "max_bytes": 1}
+"""How many there are in most runs, as progress is shown."""
 
 
 def pursue(
@@ -94,13 +96,14 @@ def pursue(
     importance: FloatArray | None = None,
     seconds: float | None = None,
     report: Report | None = None,
+    after: float = 0.0,
     stop: Stop | None = None,
     stages: Stages | None = None,
 ) -> Fit:
     """The smallest file that has ``target_psnr``, within ``max_bytes``; without a target the best in these.
 
-    Arguments are those of ``fit``, and the ``metadata`` of the file. Where a goal is out of reach, the result
-    is what comes nearest to it.
+    Arguments are those of ``fit``, the ``metadata`` of the file, and the work that comes ``after`` it
+    (``fit.work``). Where a goal is out of reach, the result is what comes nearest to it.
     """
     most = settings.curves
     if settings.simplify:
@@ -110,7 +113,8 @@ def pursue(
         room = affordable_curves(settings, image.shape[1], image.shape[0])
         settings = replace(for_few(replace(settings, curves=room)), curves=most)
     deadline = math.inf if seconds is None else time.monotonic() + seconds
-    pursuit = Pursuit(image, settings, backend, metadata, importance, deadline, report, stop, stages)
+    meter = Meter(report, after)
+    pursuit = Pursuit(image, settings, backend, metadata, importance, deadline, meter, stop, stages)
     done, first = _first(pursuit)
     if first.interrupted:
         return replace(first, iterations=done)
@@ -119,9 +123,10 @@ def pursue(
         change = _next(tried, settings)
         if change is None or pursuit.over():
             break
-        share = (1 - MAIN_WORK) / ROUNDS
-        now = MAIN_WORK + turn * share
-        result = pursuit.changed(change, pursuit.told(now, now + share))
+        cost = pursuit.cost(replace(settings, curves=len(change.base.fit.scene)), LAST_STEPS)
+        result = pursuit.changed(
+            change, pursuit.meter.stage(cost, max(_usual_rounds(settings) - turn - 1, 0) * cost)
+        )
         done += result.iterations
         if result.interrupted:
             break
@@ -132,6 +137,10 @@ def pursue(
     best = min(tried, key=lambda made: _rank(made, settings))
     interrupted = bool(stop and stop())
     return replace(best.fit, iterations=done, interrupted=interrupted)
+
+
+def _usual_rounds(settings: Settings) -> int:
+    return USUAL_ROUNDS["target_psnr" if settings.target_psnr else "max_bytes"]
 
 
 def _first(pursuit: Pursuit) -> tuple[int, Fit]:
@@ -145,11 +154,12 @@ def _first(pursuit: Pursuit) -> tuple[int, Fit]:
         if pilot.interrupted:
             return done, pilot
     settings = replace(settings, curves=curves)
-    report = pursuit.told(PILOT_WORK if done else 0.0, MAIN_WORK)
     tries = TRIES if settings.max_bytes and curves <= FEW else 1
     results = []
     for turn in range(tries):
         seeded = replace(settings, seed=(settings.seed + turn) % 2**32)
+        cost, later = pursuit.cost(settings), _usual_rounds(settings) * pursuit.cost(settings, LAST_STEPS)
+        report = pursuit.meter.stage(cost, (tries - turn - 1) * cost + later)
         results.append(pursuit.run(seeded, report, pursuit.seconds(MAIN_TIME / (tries - turn))))
         done += results[-1].iterations
         if results[-1].interrupted or pursuit.over():
@@ -176,10 +186,12 @@ def _pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
     curves, done = min(PILOT_CURVES, most), 0
     seen: dict[int, float] = {}
     for turn in range(PILOTS):
-        share = PILOT_WORK / PILOTS
-        report = pursuit.told(turn * share, (turn + 1) * share)
+        chosen = replace(settings, curves=curves, **draft)
+        cost, main = pursuit.cost(chosen), replace(settings, curves=curves)
+        later = pursuit.cost(main) + _usual_rounds(settings) * pursuit.cost(main, LAST_STEPS)
+        report = pursuit.meter.stage(cost, max(USUAL_PILOTS - turn - 1, 0) * cost + later)
         seconds = pursuit.seconds(PILOT_TIME / PILOTS)
-        pilot = pursuit.run(replace(settings, curves=curves, **draft), report, seconds)
+        pilot = pursuit.run(chosen, report, seconds)
         done += pilot.iterations
         seen[curves] = pursuit.made(pilot).psnr
         used, curves = curves, _curves_for(aim, seen, most)

@@ -11,13 +11,12 @@ import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
-from warpsplat.fit.loop import Fit, Progress, fit
+from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Stages
+from warpsplat.fit.work import Meter, Report, run_cost
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
-
-Report = Callable[[Progress], None]
 
 EARLIER, LAST = 0.75, 1.25
 """Steps of an earlier round and of the last, over those of a run without levels: the last has to move the
@@ -31,19 +30,26 @@ def fit_layered(
     *,
     importance: FloatArray | None = None,
     report: Report | None = None,
+    after: float = 0.0,
     stop: Callable[[], bool] | None = None,
     stages: Stages | None = None,
 ) -> Fit:
     """A scene whose first ``settings.levels`` shapes are pictures of their own: its layers.
 
-    Arguments are those of ``fit``.
+    Arguments are those of ``fit``, and the work that comes ``after`` it (``fit.work``).
     """
     below: Scene | None = None
     done = 0
     rounds = _rounds(settings)
     steps = sum(each.iterations for each in rounds)
-    for each in rounds:
+    height, width = image.shape[:2]
+    costs = [
+        run_cost(each, width, height, ends=settings.levels[:number]) for number, each in enumerate(rounds)
+    ]
+    meter = Meter(report, after)
+    for number, each in enumerate(rounds):
         finish = each is rounds[-1]
+        told = meter.stage(costs[number], sum(costs[number + 1 :]))
         made = fit(
             image,
             each,
@@ -51,7 +57,7 @@ def fit_layered(
             below=below,
             finish=finish,
             importance=importance,
-            report=_told(report, done, each.iterations, steps, finish),
+            report=_told(told, done, steps, finish),
             stop=stop,
             stages=stages,
         )
@@ -84,13 +90,8 @@ def _rounds(settings: Settings) -> list[Settings]:
     return rounds
 
 
-def _told(report: Report | None, before: int, own: int, steps: int, finish: bool) -> Report | None:
-    """Progress of a round of ``own`` steps as that of the run, ``before`` and ``steps`` in all."""
+def _told(report: Report | None, before: int, steps: int, finish: bool) -> Report | None:
+    """Steps of a round as those of the run, ``before`` and ``steps`` in all."""
     if report is None:
         return None
-
-    def told(now: Progress) -> None:
-        work = (before + own * now.work) / steps
-        report(replace(now, step=before + now.step, steps=steps, work=work, fine=now.fine and finish))
-
-    return told
+    return lambda now: report(replace(now, step=before + now.step, steps=steps, fine=now.fine and finish))

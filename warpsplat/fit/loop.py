@@ -23,7 +23,6 @@ from warpsplat.fit.schedule import (
     phase_at,
     phases,
     shapes_at,
-    work_done,
 )
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Content, Stages, real, whole
@@ -31,27 +30,12 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
+from warpsplat.fit.work import Progress as Progress  # noqa: PLC0414 - it is offered here as well
+from warpsplat.fit.work import fit_cost
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.arrays import from_arrays, to_arrays
-
-
-@dataclass(frozen=True)
-class Progress:
-    """State of a run between two steps."""
-
-    step: int
-    """Steps done."""
-    steps: int
-    """Steps in all."""
-    psnr: float
-    """Of the internal render at the current training size [dB]."""
-    seconds: float
-    """Since the start of the training."""
-    work: float
-    """Share of the run's work that is done, 0 to 1: a step counts by what its size makes it cost."""
-    fine: bool
-    """Whether the size is the finest: on a reduced image the same shapes have more decibels."""
+from warpsplat.scene.scene import level_ends
 
 
 @dataclass(frozen=True)
@@ -120,8 +104,22 @@ def fit(
             return _fit_from(stage.result, start)
     plan = phases(settings, image.shape[1], image.shape[0])
     weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
+    ends = (*level_ends(below), len(below)) if below else ()
+    grows = scene is None
     task = _Task(
-        image, start, plan, weights, palette, begin, per_pixel, scene is None, thrifty, finish, report
+        image,
+        start,
+        plan,
+        weights,
+        palette,
+        begin,
+        per_pixel,
+        grows,
+        thrifty,
+        finish,
+        report,
+        seconds,
+        ends,
     )
     base, budget = len(below) if below else 0, None
     if stage and stage.state:
@@ -167,6 +165,9 @@ class _Task:
     thrifty: bool
     finish: bool
     report: Callable[[Progress], None] | None
+    seconds: float | None
+    ends: tuple[int, ...]
+    """Shapes up to the end of each earlier level."""
     started: float = field(default_factory=time.monotonic)
 
     def target(self, settings: Settings, step: int) -> Target:
@@ -201,15 +202,14 @@ class _Run:
 
     def progress(self) -> Progress:
         """For people."""
-        step, plan, done = self.step, self.task.plan, self.step.state.step
-        return Progress(
-            done,
-            step.settings.iterations,
-            step.psnr(),
-            time.monotonic() - self.task.started,
-            work_done(step.settings, plan, done),
-            step.target.phase is plan[-1],
+        step, task, done = self.step, self.task, self.step.state.step
+        settings, spent = step.settings, time.monotonic() - task.started
+        cost, whole = (
+            fit_cost(settings, task.plan, n, task.begin, task.ends) for n in (done, settings.iterations)
         )
+        work = min(spent / task.seconds, 1.0) if task.seconds else cost / whole
+        fine = step.target.phase is task.plan[-1]
+        return Progress(done, settings.iterations, step.psnr(), spent, work, fine)
 
     def turn(self) -> None:
         """What is due after the steps so far: rounding, a look at the file, surgery."""

@@ -49,7 +49,7 @@ LEAST_CURVES = 32
 """For the simplest of drawings."""
 
 PIXELS_A_CURVE = 8
-"""Least pixels of an image for each curve: a curve has about as many numbers as these have."""
+"""Least pixels of an image for each shape: a shape has about as many numbers as these have."""
 
 LEAST_SHARE = 0.02
 """Of a picture that is not empty, as far as the places of first shapes are made denser for it."""
@@ -75,9 +75,9 @@ def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
 
 
 def simple_curves(target: FloatArray) -> int:
-    """The most curves that make sense: few for a drawing in a few flat colours, or for a tiny image.
+    """The most shapes that make sense: few for a drawing in a few flat colours, or for a tiny image.
 
-    A drawing gets ``SHAPES_A_REGION`` curves for each region of one colour, any image at the most one for
+    A drawing gets ``SHAPES_A_REGION`` shapes for each region of one colour, any image at the most one for
     ``PIXELS_A_CURVE`` of its pixels.
     """
     height, width = target.shape[:2]

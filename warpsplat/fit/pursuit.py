@@ -14,7 +14,7 @@ from warpsplat.fit.afford import STYLE_BYTES
 from warpsplat.fit.density import densify
 from warpsplat.fit.export import finished
 from warpsplat.fit.importance import pixel_weights
-from warpsplat.fit.loop import Fit, Progress, fit
+from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.rounding import STAGES, stage_steps
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
@@ -23,6 +23,7 @@ from warpsplat.fit.stages import Stages
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.tiny import FEW, grounded
+from warpsplat.fit.work import Meter, Report, run_cost, score_cost
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
@@ -30,7 +31,6 @@ from warpsplat.scene.geometry import areas
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.write import path_sizes
 
-Report = Callable[[Progress], None]
 Stop = Callable[[], bool]
 
 LAST_STEPS = 0.2
@@ -72,7 +72,7 @@ class Pursuit:
     importance: FloatArray | None
     deadline: float
     """Of ``time.monotonic``; infinite where there is none."""
-    report: Report | None
+    meter: Meter
     stop: Stop | None
     stages: Stages | None = None
 
@@ -85,12 +85,12 @@ class Pursuit:
         """Whether there is no time for another round, or the user wants no more."""
         return time.monotonic() > self.deadline or bool(self.stop and self.stop())
 
-    def told(self, first: float, last: float) -> Report | None:
-        """Progress that counts as the work from ``first`` to ``last``."""
-        report = self.report
-        if report is None:
-            return None
-        return lambda now: report(replace(now, work=first + (last - first) * now.work))
+    def cost(self, settings: Settings, share: float = 1.0) -> float:
+        """Of the last ``share`` of a run, and of measuring its file (``fit.work``)."""
+        height, width = self.image.shape[:2]
+        begin = (1 - share) * settings.iterations
+        measured = score_cost(width, height, self.backend, eyes=False)
+        return run_cost(settings, width, height, begin) + measured
 
     def seconds(self, share: float) -> float | None:
         """A share of the time that is left."""

@@ -60,14 +60,6 @@ def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
     return plan[0] if step < settings.coarse * settings.iterations else plan[-1]
 
 
-def work_done(settings: Settings, plan: list[Phase], step: int) -> float:
-    """Share of a run's work that ``step`` steps are: a step costs what its pixels cost."""
-    coarse = settings.coarse * settings.iterations if len(plan) > 1 else 0.0
-    first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
-    done = min(step, coarse) * first + max(step - coarse, 0.0) * last
-    return done / (coarse * first + (settings.iterations - coarse) * last)
-
-
 def fold_weight(settings: Settings, step: int) -> float:
     """Weight of the fold loss; it grows geometrically over the run."""
     growth = settings.fold_end / settings.fold_start
@@ -75,7 +67,7 @@ def fold_weight(settings: Settings, step: int) -> float:
 
 
 def opacity_threshold(density: Density, progress: float) -> float:
-    """Falls linearly with ``progress`` (fraction of the run) until the set of curves is fixed."""
+    """Falls linearly with ``progress`` (fraction of the run) until the set of shapes is fixed."""
     t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0
     return density.opacity_start + t * (density.opacity_end - density.opacity_start)
 

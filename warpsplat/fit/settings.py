@@ -71,12 +71,12 @@ def default_rates() -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Density:
-    """Pruning and densification (paper section 3.4), and growth from few curves to all."""
+    """Pruning and densification (paper section 3.4), and growth from few shapes to all."""
 
     start: float = 1 / 3
-    """Fraction of the curves at the start: the first ones settle as large shapes."""
+    """Fraction of the shapes at the start: the first ones settle as large ones."""
     grown: float = 0.5
-    """Fraction of the run at which all curves are there; until then their number grows geometrically."""
+    """Fraction of the run at which all shapes are there; until then their number grows geometrically."""
     surplus: float = 1.5
     """Shapes at the most, over those that are left in the end."""
     thin: float = 0.65
@@ -86,18 +86,18 @@ class Density:
     interval: int = 25
     """Steps between two turns."""
     stop: float = 0.85
-    """Fraction of the run after which the set of curves stays as it is."""
+    """Fraction of the run after which the set of shapes stays as it is."""
     opacity_start: float = 0.2
     """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""
     opacity_end: float = 0.05
     area: float = 6.0
     """Prune below this area [px of the canvas, squared]."""
     duplicate_color: float = 0.03
-    """Two curves are alike below this distance of colours ..."""
+    """Two shapes are alike below this distance of colours ..."""
     duplicate_overlap: float = 0.9
     """... and above this overlap (intersection over union) of their boxes."""
     replace: float = 0.1
-    """Replace at least this fraction of the curves each turn: those without which the error grows least."""
+    """Replace at least this fraction of the shapes each turn: those without which the error grows least."""
 
     def __post_init__(self) -> None:
         """Check ranges.
@@ -126,7 +126,7 @@ class Settings:
     """Control points of a new spline."""
     curves: int = 512
     simplify: bool = False
-    """Whether an image that is simple gets fewer curves (``place.simple_curves``)."""
+    """Whether an image that is simple gets fewer shapes (``place.simple_curves``)."""
     iterations: int = 1000
     coarse: float = 0.82
     """Fraction of the iterations on a reduced image."""
@@ -138,7 +138,7 @@ class Settings:
     opacity: float = 0.98
     """Of a new shape: it hides what it should replace, and may still become translucent."""
     chain_cubics: int = 2
-    """Cubics in each of the two chains of a closed curve."""
+    """Cubics in each of the two chains of a fill."""
     renderer: Renderer = "exact"
     """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
     look like the paths, or the paper's own soft ones."""
@@ -162,7 +162,7 @@ class Settings:
     """Weight of the bending of the cubics [squared error of a pixel, summed over channels, per pixel]: burrs
     and loops that do not lower the error straighten."""
     fold_start: float = 0.2
-    """Weight of the fold loss (the area where a closed curve's strip folds over itself) at the start; it
+    """Weight of the fold loss (the area where a fill's strip folds over itself) at the start; it
     grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
     fold_end: float = 3.0
     through_scales: bool = True

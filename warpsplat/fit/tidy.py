@@ -15,6 +15,9 @@ from warpsplat.fit.drawing import Refinement, matching, refine_drawing
 from warpsplat.fit.nodes import CELL, Edit, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
+from warpsplat.fit.schedule import Phase
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.work import Meter, Report, step_cost
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters
@@ -24,6 +27,12 @@ from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 ROUNDS = 16
 """In which candidates are tried, at the most."""
+
+USUAL_ROUNDS = 8
+"""How many there are in most drawings, as progress is shown."""
+
+ROUND_REFITS, GRID_REFITS = 2.5, 5.0
+"""What a round, and choosing the grid, take, in times that a drawing is fitted anew."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
 """After each round."""
@@ -64,6 +73,8 @@ def finish_drawing(
     how: Refinement | None = None,
     *,
     finest: float = GRIDS[-1],
+    report: Report | None = None,
+    after: float = 0.0,
     stop: Stop | None = None,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
@@ -75,50 +86,77 @@ def finish_drawing(
         backend: where to compute.
         how: rates and steps of the first refinement.
         finest: most units of the view box a pixel.
+        report: called every few steps.
+        after: work that comes then (``fit.work``).
         stop: asked after every step and round; once true, what there is is rounded.
     """
 
     def refined(
-        drawing: Drawing, how: Refinement | None, held: npt.NDArray[np.bool_] | None = None
+        drawing: Drawing, how: Refinement, told: Report | None, held: npt.NDArray[np.bool_] | None = None
     ) -> Drawing:
         fields = (drawing.scene, drawing.joints, drawing.same)
-        return replace(drawing, scene=refine_drawing(target, *fields, backend, how, held=held, stop=stop))
+        scene = refine_drawing(target, *fields, backend, how, held=held, report=told, stop=stop)
+        return replace(drawing, scene=scene)
 
     target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
         return Finished(drawing, min(USUAL_GRID, finest))
-    drawing = tidied(target, refined(drawing, how), backend, stop)
-    drawing = refined(drawing, replace(REFIT, steps=2 * REFIT.steps))
+    how, meter = how or Refinement(), Meter(report, after)
+    refit = REFIT.steps * step_cost(Settings(), Phase(*target.shape[1::-1]), len(drawing.scene))
+    rounds, last = ROUND_REFITS * refit, (3 + GRID_REFITS) * refit
+    first = how.steps / REFIT.steps * refit
+    drawing = refined(drawing, how, meter.stage(first, USUAL_ROUNDS * rounds + last))
+
+    def told(later: float) -> Report | None:
+        return meter.stage(rounds, later * rounds + last)
+
+    drawing = tidied(target, drawing, backend, told, stop)
+    drawing = refined(
+        drawing, replace(REFIT, steps=2 * REFIT.steps), meter.stage(2 * refit, last - 2 * refit)
+    )
     grid = drawing_grid(target, drawing, backend, finest)
     on, _ = drawing.links()
     held = np.zeros(len(drawing.joints), np.bool_)
     held[on] = True
     low = rounded(drawing.scene, grid)
     points = np.where(held[:, None], low.points, drawing.scene.points)
-    drawing = refined(replace(drawing, scene=replace(drawing.scene, points=points)), REFIT, held)
+    drawing = replace(drawing, scene=replace(drawing.scene, points=points))
+    drawing = refined(drawing, REFIT, meter.stage(last - 2 * refit, 0), held)
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
 
 
-def tidied(target: FloatArray, drawing: Drawing, backend: Backend, stop: Stop | None = None) -> Drawing:
+def tidied(
+    target: FloatArray,
+    drawing: Drawing,
+    backend: Backend,
+    told: Callable[[float], Report | None] = lambda later: None,
+    stop: Stop | None = None,
+) -> Drawing:
     """A drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round candidates that do not meet are made together and fitted anew; each is judged by the pixels
-    around it, and where some cost too much, the others are made alone.
+    around it, and where some cost too much, the others are made alone. ``told``: what a round reports to,
+    by how many may come after it.
     """
     refused: set[tuple[object, ...]] = set()
     how = replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
     errors = error_map(target, drawing, backend)
 
+    report: Report | None = None
+
     def refitted(edits: Sequence[Edit]) -> tuple[Drawing, Floats]:
         made = applied(drawing, edits)
-        scene = refine_drawing(target, made.scene, made.joints, made.same, backend, how, stop=stop)
+        fields = (made.scene, made.joints, made.same)
+        scene = refine_drawing(target, *fields, backend, how, report=report, stop=stop)
         made = replace(made, scene=scene)
         return made, error_map(target, made, backend)
 
-    for _ in range(ROUNDS):
-        edits = apart([e for e in Outlines(drawing).edits() if e.key not in refused])
+    for turn in range(ROUNDS):
+        candidates = [e for e in Outlines(drawing).edits() if e.key not in refused]
+        edits = apart(candidates)
         if not edits or (stop and stop()):
             break
+        report = told(min(len(candidates) / len(edits), ROUNDS - 1 - turn))
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
         growth = error_map(target, applied(drawing, edits), backend) - errors

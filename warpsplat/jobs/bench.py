@@ -124,7 +124,8 @@ def bench(
         "device": str(backend.device),
         "device_name": backend.device.name,
         "threads": backend.threads,
-        "curves": curves,
+        "shapes": curves,
+        "curves": curves,  # what it was called at first
         "width": width,
         "height": height,
         "opacity": opacity,
@@ -132,7 +133,8 @@ def bench(
         "samples": int(step.renderer.needed_samples.numpy()[0]),
         **times.as_dict(),
         "megapixels_per_s": round(width * height / 1e3 / whole.median, 3),
-        "us_per_curve": round(1e3 * whole.median / curves, 3),
+        "us_per_shape": round(1e3 * whole.median / curves, 3),
+        "us_per_curve": round(1e3 * whole.median / curves, 3),  # what it was called at first
         "ns_per_pixel": round(1e6 * whole.median / (width * height), 3),
         **({"through_torch": _through_torch(step.renderer, repeats)} if through_torch else {}),
         "peak_memory": peak_memory(backend.device),

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.fit.loop import Fit, Progress, fit
+from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.fit.stages import Stages
+from warpsplat.fit.work import Meter, Report, run_cost
 from warpsplat.jobs.areas import filled
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
@@ -28,6 +29,9 @@ POINT_RATE = 0.12
 WIDTH_RATE = 0.06
 """Of widths [px]."""
 
+TOUR_WORK = 0.3
+"""What comes after the refinement, over what that takes."""
+
 FINE_PIXELS = 1_000_000
 """Largest size of the image that the refinement sees [pixels]."""
 
@@ -38,11 +42,12 @@ def draw_lines(
     backend: Backend,
     *,
     seconds: float | None = None,
-    report: Callable[[Progress], None] | None = None,
+    report: Report | None = None,
+    after: float = 0.0,
     stop: Callable[[], bool] | None = None,
     stages: Stages | None = None,
 ) -> Fit:
-    """Trace line art as strokes, and refine them against its ink; arguments are those of ``fit``.
+    """Trace line art as strokes, and refine them against its ink; arguments are those of ``draw``.
 
     What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: if the settings say mixed its
     filled areas, and strokes in an order of little way with the pen lifted.
@@ -58,7 +63,9 @@ def draw_lines(
     if not len(traced.scene) and not traced.areas:
         raise ImageError("no lines found: nothing is darker than the paper around it")
     fills = filled(traced, backend, finest(settings), stop) if traced.areas else None
-    made = _fitted(ink, traced, settings, backend, seconds=seconds, report=report, stop=stop, stages=stages)
+    made = _fitted(
+        ink, traced, settings, backend, after, seconds=seconds, report=report, stop=stop, stages=stages
+    )
     if fills:
         both = fills.scene.append(made.scene)
         made = replace(
@@ -76,9 +83,10 @@ def _fitted(
     traced: TracedLines,
     settings: Settings,
     backend: Backend,
+    after: float,
     *,
     seconds: float | None,
-    report: Callable[[Progress], None] | None,
+    report: Report | None,
     stop: Callable[[], bool] | None,
     stages: Stages | None,
 ) -> Fit:
@@ -92,14 +100,16 @@ def _fitted(
     if traced.areas:  # into which strokes reach
         importance = 1 - traced.areas.cover
         ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
+    fitted = line_settings(settings, len(lines))
+    cost = run_cost(fitted, lines.canvas.width, lines.canvas.height)
     made = fit(
         inked(ink, lines),
-        line_settings(settings, len(lines)),
+        fitted,
         backend,
         scene=start,
         importance=importance,
         seconds=seconds,
-        report=report,
+        report=Meter(report, after).stage(cost, TOUR_WORK * cost),
         stop=stop,
         stages=stages,
     )

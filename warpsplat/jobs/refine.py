@@ -13,6 +13,7 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.settings import Density, Settings, solid_color
+from warpsplat.fit.work import Meter, run_cost, score_cost
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, noting, training_seconds
 from warpsplat.metrics import psnr, score_svg
@@ -74,13 +75,15 @@ def refine(
     )
     seconds = training_seconds(settings, target, started)
     history: list[Progress] = []
+    height, width = target.shape[:2]
+    after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
     made = fit(
         target,
         settings,
         backend,
         scene=scene,
         seconds=seconds,
-        report=noting(history, report),
+        report=Meter(noting(history, report), after).stage(run_cost(settings, width, height), 0),
         stop=stop,
         stages=None if settings.time_budget else stages,
     )

@@ -12,12 +12,13 @@ import numpy as np
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import Refinement, matching
 from warpsplat.fit.export import finished
-from warpsplat.fit.loop import Fit, Progress
+from warpsplat.fit.loop import Fit
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.tidy import finish_drawing
+from warpsplat.fit.work import Report
 from warpsplat.jobs.line import draw_lines
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
@@ -27,7 +28,6 @@ from warpsplat.trace.pixels import cell_size, trace_pixels
 from warpsplat.trace.subject import guess_subject
 from warpsplat.trace.trace import trace
 
-Report = Callable[[Progress], None]
 Stop = Callable[[], bool]
 
 
@@ -56,10 +56,13 @@ def draw(
     *,
     seconds: float | None = None,
     report: Report | None = None,
+    after: float = 0.0,
     stop: Stop | None = None,
     stages: Stages | None = None,
 ) -> Fit:
-    """Trace ``target`` as its ``settings.subject`` asks for; arguments are those of ``fit``."""
+    """Trace ``target`` as its ``settings.subject`` asks for; arguments are those of ``fit``, and the work
+    that comes ``after`` it (``fit.work``).
+    """
     deadline = math.inf if seconds is None else time.monotonic() + seconds
 
     def over() -> bool:
@@ -70,9 +73,15 @@ def draw(
         scene = limited(scene, settings)
         return _made(scene, per_pixel, target, backend, interrupted=False)
     if settings.subject == "line":
-        return draw_lines(target, settings, backend, seconds=seconds, report=report, stop=stop, stages=stages)
+        return draw_lines(
+            target, settings, backend, seconds=seconds, report=report, after=after, stop=stop, stages=stages
+        )
     most = None if settings.simplify else settings.curves
-    made = _drawn(target, settings, backend, most, over, stop)
+
+    def drawn(most: int | None) -> Fit:
+        return _drawn(target, settings, backend, most, over, stop, report, after)
+
+    made = drawn(most)
     low, high = 0, len(made.scene)  # regions that fit into the size, and that do not
     best, size = made, _size(made, settings)
     if not settings.max_bytes or size <= settings.max_bytes:
@@ -82,7 +91,7 @@ def draw(
         count = min(max(low + round(share * (high - low)), low + 1), high - 1)
         if count <= low or over():
             break
-        made = _drawn(target, settings, backend, count, over, stop)
+        made = drawn(count)
         size = _size(made, settings)
         if size <= settings.max_bytes:
             low, best = count, made
@@ -102,7 +111,14 @@ FEWER_ROUNDS = 5
 
 
 def _drawn(
-    target: FloatArray, settings: Settings, backend: Backend, most: int | None, over: Stop, stop: Stop | None
+    target: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    most: int | None,
+    over: Stop,
+    stop: Stop | None,
+    report: Report | None,
+    after: float,
 ) -> Fit:
     """A drawing of ``most`` regions, finished."""
     size = enlargement(target)
@@ -115,6 +131,8 @@ def _drawn(
         backend,
         Refinement(),
         finest=finest(settings),
+        report=report,
+        after=after,
         stop=over,
     )
     scene, per_pixel = enlarged(done.drawing.scene, size), done.per_pixel / size

@@ -17,7 +17,6 @@ from PIL import Image
 from warpsplat._version import __version__
 from warpsplat.errors import Stopped
 from warpsplat.files.importance import load_importance
-from warpsplat.files.output import write_svg_text
 from warpsplat.files.sources import ImageSource, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export, finished
@@ -28,7 +27,9 @@ from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
+from warpsplat.fit.work import Meter, run_cost, score_cost
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
+from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
@@ -89,16 +90,18 @@ class Result:
     """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the SVG; a name that ends in ``.svgz`` has it gzipped. An existing file is replaced in one
-        step: it is there as it was, or whole.
+        """Write the SVG, or as the name ends: ``.svgz`` gzipped, ``.png`` as a viewer shows it, ``.pdf`` (the
+        extra ``pdf``) its paths. An existing file is replaced in one step: it is there as it was, or whole.
 
         Raises:
+            UsageError: the package that makes PDFs is not installed.
             OutputError: it cannot be written.
         """
-        write_svg_text(Path(path), self.svg)
+        write_named(Path(path), self.svg)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON. Figures that were not measured are None."""
+        shapes = len(self.scene) - len(self.scene.pictures)
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {
             **(self.score.as_dict() if self.score else figures),
@@ -108,7 +111,8 @@ class Result:
             "render_psnr": round(self.render_psnr, 3),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
-            "curves": len(self.scene) - len(self.scene.pictures),
+            "shapes": shapes,
+            "curves": shapes,  # what it was called at first
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
@@ -141,7 +145,7 @@ def vectorize(
     write: Callable[[str], None] | None = None,
     stages: Stages | None = None,
 ) -> Result:
-    """Fit curves to ``target`` and score the file they make.
+    """Fit shapes to ``target`` and score the file they make.
 
     Args:
         target: the image, sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape
@@ -149,11 +153,11 @@ def vectorize(
         settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
-        scene: curves to start from; without, new ones.
+        scene: shapes to start from; without, new ones.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
             those of the whole image all the same.
         report: called every few steps.
-        stop: asked after every step; once true, the curves as they are make the file. True later, the score
+        stop: asked after every step; once true, the shapes as they are make the file. True later, the score
             is given up.
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
         stages: what the run goes on from, and is told of its state. A run within a time budget, and tracing,
@@ -163,6 +167,8 @@ def vectorize(
     fits = None if settings.time_budget else stages
     seconds = training_seconds(settings, target, started)
     traced = scene is None and settings.subject not in {"auto", "photo"}
+    height, width = target.shape[:2]
+    after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
     pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
@@ -173,14 +179,24 @@ def vectorize(
             importance=importance,
             seconds=seconds,
             report=report,
+            after=after,
             stop=stop,
             stages=fits,
         )
     elif traced:
-        made = draw(target, settings, backend, seconds=seconds, report=report, stop=stop, stages=fits)
+        made = draw(
+            target, settings, backend, seconds=seconds, report=report, after=after, stop=stop, stages=fits
+        )
     elif scene is None and settings.levels:
         made = fit_layered(
-            target, settings, backend, importance=importance, report=report, stop=stop, stages=fits
+            target,
+            settings,
+            backend,
+            importance=importance,
+            report=report,
+            after=after,
+            stop=stop,
+            stages=fits,
         )
     else:
         if settings.simplify and scene is None:
@@ -192,7 +208,7 @@ def vectorize(
             scene=scene,
             importance=importance,
             seconds=seconds,
-            report=report,
+            report=Meter(report, after).stage(run_cost(settings, width, height), 0),
             stop=stop,
             stages=fits,
         )
@@ -242,7 +258,7 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
-    """The SVG, and the curves in it: all, or those that show most where ``max_bytes`` has room for few."""
+    """The SVG, and the shapes in it: all, or those that show most where ``max_bytes`` has room for few."""
 
     def made() -> str:
         return finished(scene, settings, per_pixel, metadata)
@@ -279,8 +295,8 @@ takes about a second."""
 
 
 def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
-    """Whether a run's report has SSIMULACRA2: up to ``QUICK_PIXELS`` it takes a twentieth of a run of the
-    default effort; within a time budget other things are worth more.
+    """Whether a run's report has SSIMULACRA2, where it is installed: up to ``QUICK_PIXELS`` it takes a
+    twentieth of a run of the default effort; within a time budget other things are worth more.
     """
     return target.shape[0] * target.shape[1] <= QUICK_PIXELS and settings.time_budget is None
 
@@ -378,7 +394,8 @@ def vectorize_image(
         source: the image.
         settings: all that decides the result.
         backend: where to compute.
-        output: the SVG; ``-`` is the standard output; None: it is not written.
+        output: the SVG, or its picture (``jobs.formats``); ``-`` is the standard output; None: it is not
+            written.
         name: how messages call the image; default: its file's name.
         importance: a mask, see ``load_importance``.
         keyed: whether the file names the job that made it (``job_key``), for batches to go on from; image and
@@ -418,7 +435,7 @@ def vectorize_image(
         importance=mask,
         report=noting(history, report),
         stop=stop,
-        write=None if output is None else lambda svg: write_svg_text(output, on_paper(svg)),
+        write=None if output is None else lambda svg: write_named(output, on_paper(svg)),
         stages=stages,
     )
     if checkpoint and not result.stopped:

@@ -18,6 +18,7 @@ import os
 import shutil
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -115,15 +116,28 @@ def alone_in(place: Path) -> Iterator[None]:
 @functools.cache
 def _announce() -> None:
     """Say why nothing seems to happen; a process says it once for all its modules."""
-    log.info("compiling kernels, once: some seconds")
+    log.info("compiling kernels, which is done once and takes up to a minute")
 
 
 COMPILER = "warpsplat compiler"
 """Name of the thread that compiles."""
 
 
+PASSING = "passing"
+"""Attribute of records that the next one takes the place of, and that an empty one removes."""
+
+SAID_EVERY = 1.0
+"""Seconds between two of them."""
+
+
+class _Waited:
+    """How long the process has waited for the compiler [s]: it compiles module by module."""
+
+    seconds = 0.0
+
+
 def _wait_for(work: Callable[[], None]) -> None:
-    """Do ``work`` in a thread, so that Ctrl-C need not wait until the compiler is done."""
+    """Do ``work`` in a thread, so that Ctrl-C need not wait until the compiler is done, and say how long."""
     errors: list[BaseException] = []
 
     def run() -> None:
@@ -135,7 +149,14 @@ def _wait_for(work: Callable[[], None]) -> None:
     thread = threading.Thread(target=run, name=COMPILER, daemon=True)
     with messages_hidden():
         thread.start()
-        thread.join()
+        started = time.monotonic()
+        thread.join(SAID_EVERY)
+        while thread.is_alive():
+            seconds = _Waited.seconds + time.monotonic() - started
+            log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
+            thread.join(SAID_EVERY)
+        _Waited.seconds += time.monotonic() - started
+    log.info("", extra={PASSING: True})
     if errors:
         raise errors[0]
 

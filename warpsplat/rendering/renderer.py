@@ -210,7 +210,7 @@ class Renderer:
         if samples > SAMPLE_LIMIT or slots > SLOT_LIMIT:
             raise CapacityError(
                 f"the scene needs {samples} samples and {slots} tile slots, more than the limits of "
-                f"{SAMPLE_LIMIT} and {SLOT_LIMIT}: fewer curves or a smaller image are needed"
+                f"{SAMPLE_LIMIT} and {SLOT_LIMIT}: fewer shapes or a smaller image are needed"
             )
         now = self.capacity
         if samples <= now.samples and slots <= now.slots:

@@ -1,9 +1,9 @@
-"""Draws one SVG with resvg in a process of its own: what ends or stalls there leaves the program standing.
+"""Draws one SVG in a process of its own: what ends or stalls there leaves the program standing.
 
 Run as a script by ``warpsplat.svg.viewer``; imports nothing of warpsplat, so that it starts within 30 ms.
 Standard input: one line of JSON (``path``: module search path, ``seconds`` and ``memory``: limits,
-``options``: of resvg_py), then the SVG's text in UTF-8. Standard output: a PNG. A text that resvg refuses
-ends it with ``REFUSED`` and the cause on standard error.
+``form``: ``png`` or ``pdf``, ``options``: of its function here), then the SVG's text in UTF-8. Standard
+output: the picture. A text that is refused ends it with ``REFUSED`` and the cause on standard error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import threading
 from typing import Any
 
 REFUSED = 3
-"""Exit status where resvg says what is wrong; any other but 0 is a crash."""
+"""Exit status where the library says what is wrong; any other but 0 is a crash."""
 
 STACK = 128 << 20
 """Stack [bytes]: resvg recurses with the document's depth, and main threads have 1 MiB on some systems."""
@@ -36,12 +36,44 @@ def limit_resources(seconds: int, memory: int) -> None:
             resource.setrlimit(kind, (lowest, hard))
 
 
-def draw(text: str, options: dict[str, Any], result: list[bytes | str]) -> None:
-    """Append the PNG, or the cause why there is none, to ``result``; left empty by a panic."""
+def png(text: str, options: dict[str, Any]) -> bytes:
+    """Pixels, by resvg; ``options`` are those of ``resvg_py``."""
     import resvg_py
 
+    return bytes(resvg_py.svg_to_bytes(svg_string=text, **options))
+
+
+def pdf(text: str, options: dict[str, Any]) -> bytes:
+    """Paths, on a sheet of their size, by Typst, which reads SVGs with resvg's parser.
+
+    ``options``: ``width`` [pt], or none for the SVG's own; ``skip_system_fonts``.
+    """
+    import typst
+
+    width = options["width"]
+    size = "auto" if width is None else f"{width!r}pt"
+    sheet = f'{SHEET}#image("/picture.svg", width: {size})'
+    files = {"main.typ": sheet.encode(), "picture.svg": text.encode()}
+    fonts = options["skip_system_fonts"]
+    make: Any = typst.compile  # its types know of no files in memory
     try:
-        result.append(bytes(resvg_py.svg_to_bytes(svg_string=text, **options)))
+        return bytes(make(files, ignore_system_fonts=fonts, pdf_tags=False))  # tags are for texts
+    except typst.TypstError as error:
+        raise ValueError(error.message) from error
+
+
+SHEET = """#set document(date: none)
+#set page(width: auto, height: auto, margin: 0pt, fill: none)
+"""
+"""How a document of Typst says that there is nothing but a picture, and no date: files would differ."""
+
+FORMS = {"png": png, "pdf": pdf}
+
+
+def draw(text: str, request: dict[str, Any], result: list[bytes | str]) -> None:
+    """Append the picture, or the cause why there is none, to ``result``; left empty by a panic."""
+    try:
+        result.append(FORMS[request["form"]](text, request["options"]))
     except ValueError as error:
         result.append(str(error))
 
@@ -55,7 +87,7 @@ def main() -> int:
     text = sys.stdin.buffer.read().decode()
     result: list[bytes | str] = []
     threading.stack_size(STACK)
-    worker = threading.Thread(target=draw, args=(text, request["options"], result))
+    worker = threading.Thread(target=draw, args=(text, request, result))
     worker.start()
     worker.join()
     if not result:

@@ -75,11 +75,32 @@ def draw_png(
         ResourceError: no further process can be started.
     """
     pixels = shown_pixels(text, width, height, zoom)
+    options = {**OPTIONS, "width": width, "height": height, "zoom": zoom}
+    return _drawn("png", text, options, pixels)
+
+
+def draw_pdf(text: str, *, zoom: float = 1.0) -> bytes:
+    """Any SVG text as a PDF of the same paths, on a sheet of its own size times ``zoom``; the same text gives
+    the same bytes.
+
+    Raises:
+        ImageError, ResourceError: as for ``draw_png``.
+    """
+    own = svg_size(inspect_svg(text).root)
+    width = own[0] * zoom * POINTS_PER_PIXEL if own else None
+    return _drawn("pdf", text, {"width": width}, shown_pixels(text, None, None, None))
+
+
+POINTS_PER_PIXEL = 72 / OPTIONS["dpi"]
+
+
+def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> bytes:
+    """What ``draw_child`` makes of ``text`` within limits for a picture of so many ``pixels``."""
     seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
     memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
-    options = {**OPTIONS, "width": width, "height": height, "zoom": zoom}
-    options["skip_system_fonts"] = TEXT.search(text) is None
-    request = {"path": sys.path, "seconds": seconds, "memory": memory, "options": options}
+    options = {**options, "skip_system_fonts": TEXT.search(text) is None}
+    limits = {"seconds": seconds, "memory": memory}
+    request = {"path": sys.path, **limits, "form": form, "options": options}
     try:
         done = subprocess.run(
             # Isolated, and with this program's module path instead of one of its own making.
@@ -103,7 +124,7 @@ def draw_png(
         raise ImageError(f"cannot be rendered with {memory >> 20} MiB of memory")
     if -done.returncode in LIMIT_SIGNALS:
         raise ImageError(f"cannot be rendered within {seconds} s of processor time")
-    raise ImageError("cannot be rendered: resvg fails on what it draws")
+    raise ImageError("cannot be rendered: the renderer fails on what it draws")
 
 
 CPU_SECONDS = 4.0

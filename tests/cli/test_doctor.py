@@ -1,0 +1,71 @@
+"""``doctor``: what is broken is found, named, and stops no other check."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import warp as wp
+
+from tests.cli.helpers import run
+from warpsplat.jobs import doctor
+from warpsplat.rendering.renderer import Renderer
+
+
+def looked_at(capsys: pytest.CaptureFixture[str], code: int) -> dict[str, dict[str, Any]]:
+    """The checks of a run by their names."""
+    assert run("doctor", "--device", "cpu", "--json") == code
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is (code == 0)
+    return {check["name"]: check for check in found["checks"]}
+
+
+def test_all_is_well(capsys: pytest.CaptureFixture[str]) -> None:
+    found = looked_at(capsys, 0)
+    assert "broken" not in {check["status"] for check in found.values()}
+    assert found["packages"]["versions"].keys() >= {"numpy", "warp-lang", "pillow"}
+    assert "cpu" in [device["name"] for device in found["devices"]["devices"]]
+    assert found["self-test"]["psnr"] == pytest.approx(doctor.KNOWN_PSNR, abs=doctor.NEAR_PSNR)
+    assert 0 < found["adjoint"]["difference"] < doctor.MOST_DIFFERENCE
+
+
+def test_a_broken_package_and_wrong_kernels(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    monkeypatch.setattr(Renderer, "backward", lambda self: None)
+    monkeypatch.setattr(doctor, "check_itself", lambda device: 1 / 0)
+    assert run("doctor", "--device", "cpu") == 7
+    lines = capsys.readouterr().out.splitlines()
+    broken = [line.split(":")[0] for line in lines if line.startswith("BROKEN")]
+    assert broken == ["BROKEN  packages", "BROKEN  self-test", "BROKEN  adjoint"]
+    assert next(line for line in lines if "pyyaml (" in line)
+    assert lines[-1] == "broken: packages, self-test, adjoint"
+    assert sum("-> " in line for line in lines) >= 2
+
+
+def test_a_figure_that_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "KNOWN_PSNR", 40.0)
+    assert doctor.check_itself("cpu").status == "broken"
+
+
+def test_a_kernel_cache_of_no_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "file" / "kernels"))
+    found = doctor.check_cache()
+    assert found.status == "broken"
+    assert "WARP_CACHE_PATH" in found.hint
+    module = tmp_path / "wp_one"
+    module.mkdir()
+    (module / "warpsplat.sha256.json").write_text("no JSON")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    found = doctor.check_cache()
+    assert (found.status, found.values["modules"]) == ("note", 1)
+
+
+def test_an_unknown_device_is_found(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("doctor", "--device", "cuda:99") == 7
+    assert "BROKEN  self-test: unknown device 'cuda:99'" in capsys.readouterr().out

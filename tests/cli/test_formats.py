@@ -1,0 +1,133 @@
+"""Results are what their names say."""
+
+from __future__ import annotations
+
+import gzip
+import sys
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import QUICK, one_line, run
+from warpsplat.api import load_svg, save_svg
+from warpsplat.errors import UsageError
+from warpsplat.files.output import may_replace
+from warpsplat.jobs.formats import write_named
+from warpsplat.metrics import psnr
+from warpsplat.svg.viewer import on_white, render_svg
+
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="64" height="48">
+<clipPath id="c"><circle cx="20" cy="20" r="15"/></clipPath>
+<linearGradient id="g"><stop stop-color="#f80"/>
+<stop offset="1" stop-color="#08f" stop-opacity=".3"/></linearGradient>
+<radialGradient id="h"><stop stop-color="#fff"/><stop offset="1" stop-color="#402"/></radialGradient>
+<path d="M2 2H40V40H2z" fill="url(#g)"/>
+<g clip-path="url(#c)"><path d="M5 5H40V40H5z" fill="#063" fill-opacity=".5"/></g>
+<path d="M30 6H60V36H30zM38 12H52V30H38z" fill-rule="evenodd" fill="url(#h)"/>
+<path d="M4 44Q30 20 60 42" fill="none" stroke="#609" stroke-width="4" stroke-linecap="round"
+ stroke-opacity=".7"/>
+<path d="M34 4h24" stroke="#000" stroke-width="3" stroke-dasharray="5 3"/>
+</svg>"""
+"""Gradients, opacities, a clip, a hole, caps and dashes."""
+
+
+def shown(path: Path, scale: float) -> npt.NDArray[np.float64]:
+    """A PDF's page as its viewer shows it, at so many pixels a point."""
+    pdfium = pytest.importorskip("pypdfium2")
+    document = pdfium.PdfDocument(path)
+    assert len(document) == 1
+    return on_white(document[0].render(scale=scale).to_pil())
+
+
+def test_a_pdf_shows_what_the_svg_shows(tmp_path: Path) -> None:
+    pytest.importorskip("typst")
+    path = tmp_path / "a.pdf"
+    write_named(path, SVG)
+    data = path.read_bytes()
+    assert data.startswith(b"%PDF-")
+    assert b"/Subtype/Image" not in data, "pixels"
+    # Four pixels for each of the SVG's, of which a point has 4/3.
+    expected = on_white(render_svg(SVG, zoom=4))
+    found = shown(path, 4 * 96 / 72)
+    assert found.shape == expected.shape
+    assert psnr(found, expected) > 35
+    write_named(path, SVG)
+    assert path.read_bytes() == data
+    write_named(path, SVG, zoom=2)
+    assert shown(path, 2 * 96 / 72).shape == expected.shape
+
+
+def test_a_pdf_of_ours_is_known(tmp_path: Path) -> None:
+    pytest.importorskip("typst")
+    path = tmp_path / "a.pdf"
+    write_named(path, SVG)
+    assert may_replace(path)
+    path.write_bytes(path.read_bytes() + b"\n")
+    assert not may_replace(path)
+    path.write_bytes(b"%PDF-")
+    assert not may_replace(path)
+
+
+def test_vectorize_and_refine_write_what_the_name_says(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = {ending: tmp_path / f"a{ending}" for ending in (".svg", ".svgz", ".PNG")}
+    for path in paths.values():
+        assert run("vectorize", image, "-o", path, *QUICK) == 0
+    assert "kB gzipped) as an SVG, " in capsys.readouterr().out.splitlines()[-1]
+    text = paths[".svg"].read_text()
+    assert gzip.decompress(paths[".svgz"].read_bytes()).decode() == text
+    with Image.open(paths[".PNG"]) as png:
+        assert png.format == "PNG"
+        assert png.tobytes() == render_svg(text).convert(png.mode).tobytes()
+    refined = tmp_path / "refined.png"
+    for _ in range(2):  # what is there is ours and may be replaced
+        assert run("refine", paths[".svg"], image, "-o", refined, "--iterations", 3, "--device", "cpu") == 0
+    with Image.open(refined) as png:
+        assert (png.format, png.size) == ("PNG", (60, 40))
+
+
+def test_the_library_writes_them_as_well(tmp_path: Path) -> None:
+    save_svg(
+        load_svg('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="7"><path d="M1 1h5v5z"/></svg>'),
+        tmp_path / "a.png",
+    )
+    with Image.open(tmp_path / "a.png") as png:
+        assert (png.format, png.size) == ("PNG", (9, 7))
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.eps", "a"])
+@pytest.mark.parametrize("command", ["vectorize", "refine", "render"])
+def test_other_endings_are_refused_before_any_work(
+    image: Path, capsys: pytest.CaptureFixture[str], command: str, name: str
+) -> None:
+    inputs = {"vectorize": (image,), "refine": ("a.svg", image), "render": ("a.svg",)}[command]
+    assert run(command, *inputs, "-o", image.parent / name) == 2
+    known = ".png or .pdf" if command == "render" else ".svg, .svgz, .png or .pdf"
+    assert one_line(capsys.readouterr().err).endswith(f"its name ends with {known}")
+
+
+def test_a_missing_package_is_named_before_any_work(
+    image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "typst", None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    path = image.parent / "a.pdf"
+    assert run("vectorize", image, "-o", path, *QUICK) == 2
+    assert "pip install typst, or warpsplat with its extra: '.[pdf]'" in one_line(capsys.readouterr().err)
+    with pytest.raises(UsageError, match="pip install typst"):
+        write_named(path, SVG)
+    assert not path.exists()
+
+
+def test_own_renderers_make_no_pdf(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("typst")
+    svg = tmp_path / "a.svg"
+    svg.write_text(SVG)
+    assert run("render", svg, "-o", tmp_path / "a.pdf", "--renderer", "exact") == 2
+    assert "makes pixels" in one_line(capsys.readouterr().err)
+    assert run("render", svg, "-o", tmp_path / "a.pdf", "--scale", 2) == 0
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF-")

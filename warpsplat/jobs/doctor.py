@@ -1,0 +1,316 @@
+"""What a run needs, looked at piece by piece. What may be broken is imported only when it is looked at."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import platform
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from warpsplat._version import __version__
+from warpsplat.errors import explain
+
+Status = Literal["ok", "note", "broken"]
+
+MODULES = {
+    "warp-lang": "warp",
+    "opencv-contrib-python-headless": "cv2",
+    "pillow": "PIL",
+    "pyyaml": "yaml",
+    "resvg-py": "resvg_py",
+}
+"""What packages are imported as, where that is not their name."""
+
+EXTRAS = {
+    "torch": ("torch", "warpsplat.torch, and code written for DiffVG"),
+    "pdf": ("typst", "outputs that end in .pdf"),
+    "eyes": ("ssimulacra2", "SSIMULACRA2 in reports"),
+    "compare": ("vtracer", "warpsplat compare"),
+}
+"""Extra -> its package, and what it is for."""
+
+LEAST_MEMORY = 1.0
+"""Of the machine, free [GB]: what a photograph of some megapixels takes."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was found of one thing."""
+
+    name: str
+    status: Status
+    text: str
+    """One line, for people."""
+    hint: str = ""
+    """What to do about it."""
+    values: dict[str, Any] = field(default_factory=dict)
+    """The same for programs."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        found = {"name": self.name, "status": self.status, "text": self.text, **self.values}
+        return found | ({"hint": self.hint} if self.hint else {})
+
+
+def checks(device: str = "auto") -> Iterator[Check]:
+    """All that is looked at, in an order in which the first broken thing explains those after it.
+
+    Args:
+        device: that the self-test runs on.
+    """
+    looks: tuple[tuple[str, Callable[[], Check]], ...] = (
+        ("python", check_python),
+        ("packages", check_packages),
+        ("extras", check_extras),
+        ("devices", check_devices),
+        ("machine", check_machine),
+        ("kernel cache", check_cache),
+        ("viewer", check_viewer),
+        ("self-test", lambda: check_itself(device)),
+        ("adjoint", lambda: check_adjoint(device)),
+    )
+    for name, look in looks:
+        try:
+            yield look()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever is broken: to find it is what this is for
+            yield Check(name, "broken", explain(error)[0])
+
+
+def check_python() -> Check:
+    """The interpreter, the program and the system."""
+    values = {"warpsplat": __version__, "python": platform.python_version(), "executable": sys.executable}
+    values["system"] = f"{platform.system()} {platform.release()} {platform.machine()}"
+    text = f"warpsplat {__version__}, Python {values['python']} ({sys.executable}) on {values['system']}"
+    if sys.maxsize < 2**32:
+        return Check("python", "broken", f"{text}: 32 bits", "a Python of 64 bits is needed", values)
+    return Check("python", "ok", text, values=values)
+
+
+def needed() -> list[str]:
+    """Packages that warpsplat cannot do without, as it was installed."""
+    try:
+        requires = importlib.metadata.requires("warpsplat") or []
+    except importlib.metadata.PackageNotFoundError:  # a checkout that was not installed
+        requires = ["warp-lang", "numpy", "opencv-contrib-python-headless", "pillow", "click", "resvg-py"]
+    names = (re.match(r"[\w.-]+", line) for line in requires if "extra ==" not in line)
+    return sorted(name[0].lower() for name in names if name)
+
+
+def check_packages() -> Check:
+    """Each is imported: that it is installed says little."""
+    versions: dict[str, str] = {}
+    wrong: list[str] = []
+    for package in needed():
+        try:
+            module = importlib.import_module(MODULES.get(package, package))
+            versions[package] = version_of(package) or str(getattr(module, "__version__", "?"))
+        except BaseException as error:  # native libraries fail in their own ways
+            wrong.append(
+                f"{package} ({explain(error)[0].removeprefix('internal error: ').split(' (set ')[0]})"
+            )
+    if wrong:
+        return Check(
+            "packages",
+            "broken",
+            "cannot be imported: " + ", ".join(wrong),
+            "install warpsplat anew: pip install --force-reinstall warpsplat",
+            {"versions": versions},
+        )
+    text = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return Check("packages", "ok", text, values={"versions": versions})
+
+
+def version_of(package: str) -> str | None:
+    """Of what is installed; None: it is not."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def check_extras() -> Check:
+    """What is not needed, but of use."""
+    found = {extra: version_of(package) for extra, (package, _) in EXTRAS.items()}
+    there = [f"{extra} ({EXTRAS[extra][0]} {version})" for extra, version in found.items() if version]
+    missing = [f"{extra} (for {EXTRAS[extra][1]})" for extra, version in found.items() if not version]
+    parts = [", ".join(there)] * bool(there) + ["not installed: " + ", ".join(missing)] * bool(missing)
+    return Check("extras", "note" if missing else "ok", "; ".join(parts), values={"versions": found})
+
+
+def check_devices() -> Check:
+    """What Warp can compute on."""
+    import warp as wp
+
+    from warpsplat.rendering.device import choose_device, start_warp
+
+    start_warp()
+    driver = wp.get_cuda_driver_version()
+    devices: list[dict[str, Any]] = [
+        {"name": str(d), "description": d.name, "memory": None if d.is_cpu else d.total_memory}
+        for d in wp.get_devices()
+    ]
+    values = {
+        "devices": devices,
+        "default_device": str(choose_device("auto")),
+        "cuda_driver": None if driver is None else ".".join(map(str, driver)),
+    }
+    shown = [
+        f"{d['name']} ({d['description']}" + (f", {d['memory'] / 1e9:.0f} GB)" if d["memory"] else ")")
+        for d in devices
+    ]
+    text = ", ".join(shown) + f"; default: {values['default_device']}"
+    if driver and len(devices) == 1:
+        hint = "Warp finds none: nvidia-smi should list it, CUDA_VISIBLE_DEVICES may hide it"
+        return Check(
+            "devices", "note", f"{text}; a CUDA driver ({values['cuda_driver']}), no GPU", hint, values
+        )
+    return Check("devices", "ok", text, values=values)
+
+
+def check_machine() -> Check:
+    """Cores and memory."""
+    from warpsplat.rendering.backend import available_cores
+
+    values: dict[str, Any] = {"cpu_threads": available_cores(), "free_memory": free_memory()}
+    text, free = f"{values['cpu_threads']} CPU threads", values["free_memory"]
+    if free is None:
+        return Check("machine", "ok", text, values=values)
+    text += f", {free / 1e9:.1f} GB of memory free"
+    if free < 1e9 * LEAST_MEMORY:
+        return Check("machine", "note", text, "large images need more; end other programs", values)
+    return Check("machine", "ok", text, values=values)
+
+
+def free_memory() -> int | None:
+    """Bytes that can be had, swapping aside; None where the system does not say."""
+    try:
+        text = Path("/proc/meminfo").read_text()
+    except OSError:
+        return None
+    found = re.search(r"MemAvailable:\s+(\d+) kB", text)
+    return int(found[1]) * 1024 if found else None
+
+
+def check_cache() -> Check:
+    """Where compiled kernels are kept."""
+    import warp as wp
+
+    from warpsplat.rendering.kernel_cache import damaged
+
+    folder = Path(str(wp.config.kernel_cache_dir))
+    modules = [path for path in folder.glob("wp_*") if path.is_dir()] if folder.is_dir() else []
+    size = sum(file.stat().st_size for path in modules for file in path.iterdir())
+    values = {"folder": str(folder), "modules": len(modules), "bytes": size}
+    text = f"{folder}: {len(modules)} modules, {size / 1e6:.0f} MB"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        text = f"{folder}: cannot be written: {error.strerror}"
+        return Check("kernel cache", "broken", text, "WARP_CACHE_PATH names another folder", values)
+    bad = [path.name for path in modules if damaged(path)]
+    if bad:
+        return Check(
+            "kernel cache", "note", f"{text}, {len(bad)} damaged", "they are made anew when needed", values
+        )
+    return Check("kernel cache", "ok", text, values=values)
+
+
+def check_viewer() -> Check:
+    """The renderer that files are measured with."""
+    from warpsplat.svg.viewer import render_svg
+
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="2" height="2">'
+    text = f'{head}<path d="M0 0h1v2H0z" fill="red"/></svg>'
+    found = [render_svg(text).convert("RGBA").getpixel((x, 1)) for x in (0, 1)]
+    if found != [(255, 0, 0, 255), (0, 0, 0, 0)]:
+        return Check(
+            "viewer", "broken", f"resvg draws something else: {found}", "pip install --upgrade resvg-py"
+        )
+    return Check("viewer", "ok", "resvg draws what it should")
+
+
+KNOWN_PSNR = 23.65
+"""Of the self-test [dB]."""
+
+NEAR_PSNR = 1.0
+"""So far from it the figure may be: other devices round in other ways, and a run carries that on."""
+
+
+def check_itself(device: str) -> Check:
+    """A tiny run, whose figure is known."""
+    import numpy as np
+    import warp as wp
+
+    from warpsplat.api import vectorize
+
+    y, x = np.mgrid[:48, :48] / np.float32(48)
+    image = np.stack([x, y, 0.5 + 0.4 * np.sin(6 * x) * np.cos(5 * y)], axis=2).astype(np.float32)
+    folder = Path(str(wp.config.kernel_cache_dir))
+    before = set(folder.glob("wp_*"))
+    started = time.monotonic()
+    result = vectorize(image, 16, subject="photo", iterations=60, seed=0, device=device)
+    seconds = time.monotonic() - started
+    assert result.score
+    compiled = len(set(folder.glob("wp_*")) - before)
+    values = {"psnr": round(result.score.psnr, 2), "seconds": round(seconds, 2), "compiled": compiled}
+    text = f"16 shapes in 60 steps: {result.score.psnr:.1f} dB in {seconds:.1f} s"
+    text += f", {compiled} modules compiled" if compiled else ", kernels were compiled before"
+    if abs(result.score.psnr - KNOWN_PSNR) > NEAR_PSNR:
+        hint = "wrong kernels, or a wrong device: remove the kernel cache, try --device cpu"
+        return Check("self-test", "broken", f"{text}; {KNOWN_PSNR:.1f} dB are expected", hint, values)
+    return Check("self-test", "ok", text, values=values)
+
+
+MOST_DIFFERENCE = 0.02
+"""Relative, of a derivative and the difference quotient, in single precision."""
+
+
+def check_adjoint(device: str) -> Check:
+    """A derivative of a picture against a difference of pictures."""
+    import numpy as np
+
+    from warpsplat.api import starting_scene
+    from warpsplat.rendering.backend import Backend, Viewport
+    from warpsplat.rendering.device import choose_device
+    from warpsplat.rendering.parameters import Parameters
+    from warpsplat.rendering.renderer import Renderer
+
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[:32, :32] / np.float32(32)
+    scene = starting_scene(np.stack([x, y, 1 - x], axis=2).astype(np.float32), 6)
+    parameters = Parameters(scene, Backend.on(choose_device(device)))
+    renderer = Renderer(parameters, Viewport(32, 32))
+    renderer.forward_complete()
+    weights = np.stack([np.sin(5 * x), np.cos(4 * y), x * y], axis=2).astype(np.float32)
+    renderer.write_image_grad(weights)
+    renderer.backward()
+    way = rng.normal(size=scene.points.shape).astype(np.float32)
+    derivative = float((parameters.arrays["points_grad"].numpy() * way).sum(dtype="float64"))
+
+    def measured(step: float) -> float:
+        parameters.arrays["points"].assign(scene.points + np.float32(step) * way)
+        renderer.forward_complete()
+        return float((renderer.read_image() * weights).sum(dtype="float64"))
+
+    quotient = (measured(STEP) - measured(-STEP)) / (2 * STEP)
+    difference = abs(derivative - quotient) / max(abs(quotient), 1e-9)
+    text = f"derivative and difference quotient of a picture differ by {100 * difference:.2f} %"
+    values = {"difference": difference}
+    if not difference <= MOST_DIFFERENCE:
+        return Check("adjoint", "broken", text, "remove the kernel cache, try --device cpu", values)
+    return Check("adjoint", "ok", text, values=values)
+
+
+STEP = 0.01
+"""Of the difference [px]."""
