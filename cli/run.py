@@ -129,7 +129,16 @@ def run_file(
     if not traced and settings.simplify and not pursued and count < settings.curves and not quiet:
         hint = f"a simple image: {count} shapes; --curves N for another number"
         say(f"warpsplat: {input_name(source)}: {hint}", err=True)
+    if not quiet:
+        say_renewed(input_name(source), result)
     return result
+
+
+def say_renewed(name: str, result: Result) -> None:
+    """Say how many shapes had to be set anew in the training on ``name``, if there were some."""
+    if result.renewed:
+        found = f"numbers of shapes that are not finite, {result.renewed} times; these began anew"
+        say(f"warpsplat: {name}: {found}", err=True)
 
 
 def leave(result: Result) -> None:

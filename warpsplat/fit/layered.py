@@ -37,7 +37,7 @@ def fit_layered(
     Arguments are those of ``fit``.
     """
     below: Scene | None = None
-    done = 0
+    done = renewed = 0
     rounds = _rounds(settings)
     steps = sum(each.iterations for each in rounds)
     for each in rounds:
@@ -53,10 +53,11 @@ def fit_layered(
             stop=stop,
         )
         done += made.iterations
+        renewed += made.renewed
         below = made.scene
         if made.interrupted:
             break
-    return replace(made, iterations=done)
+    return replace(made, iterations=done, renewed=renewed)
 
 
 def _rounds(settings: Settings) -> list[Settings]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ import numpy as np
 from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
+from warpsplat.fit.mend import mend
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
@@ -64,6 +66,8 @@ class Fit:
     iterations: int
     """Steps done."""
     interrupted: bool
+    renewed: int = 0
+    """Times that a shape was set anew since a number of its was not finite."""
 
 
 def fit(
@@ -127,6 +131,12 @@ def fit(
             palette.choose(step)
         step.advance()
         done, finest = state.step, phase is plan[-1]
+        density = settings.density
+        surgical = done < density.stop * settings.iterations
+        due = density.interval > 0 and done % density.interval == 0
+        stage = stage_at(settings, done)
+        if due or done % CHECK_INTERVAL == 0 or stage is not None:  # before the values are looked at
+            step = mend(step, renews=grows and surgical)
         if done % CHECK_INTERVAL == 0 or done == settings.iterations:
             step.make_room()
             if report:
@@ -137,7 +147,6 @@ def fit(
             break
         if done >= settings.iterations or (budget and budget.over()):
             break
-        stage = stage_at(settings, done)
         if stage is not None and finish:
             if not rounding:
                 state.per_pixel = per_pixel or choose_grid(step, staged=True, thrifty=thrifty)
@@ -147,13 +156,10 @@ def fit(
         if finish and exact and not settled and done >= max(opacities_at(settings), begin + 1):
             hold_opacities(step)
             settled = True
-        density = settings.density
-        surgical = done < density.stop * settings.iterations
         # What is kept may show other than over what lies below.
         late = done >= LOOK_FROM * settings.iterations or bool(start.pictures)
         if settings.viewer and finish and finest and late and not rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
-        due = density.interval > 0 and done % density.interval == 0
         if due and budget and phase is plan[0] and surgical:  # then what is due when stays as it is
             slowness = (time.monotonic() - started) / (done * budget.costs[0])
             settings = budget.fit(settings, done, slowness)
@@ -164,7 +170,11 @@ def fit(
         missing = grows and state.parameters.shape_count != state.base + settings.curves
         if due and done < settings.iterations and (missing or done < density.stop * settings.iterations):
             step = operate(step, grows=grows)
+    step = mend(step, renews=False, last=True)
     if finish and not rounding:
         state.per_pixel = choose_grid(step, staged=False)
     done = state.step - begin
-    return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), done, interrupted)
+    render_psnr, estimated = step.render_psnr(), step.psnr()
+    if not math.isfinite(estimated):  # of a step before the last mending
+        estimated = render_psnr
+    return Fit(state.scene(), state.per_pixel, render_psnr, estimated, done, interrupted, state.renewed)

@@ -31,6 +31,8 @@ class FitState:
     """What outlines keep, where they have conditions."""
     base: int = 0
     """Shapes of earlier levels (``fit.layered``), which keep their number: the first ones."""
+    renewed: int = 0
+    """Times that a shape was set anew since a number of its was not finite (``fit.mend``)."""
 
     @staticmethod
     def start(

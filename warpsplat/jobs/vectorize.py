@@ -83,6 +83,8 @@ class Result:
     """What was reported of the training, in order."""
     before: float | None = None
     """Of a refined SVG, its own PSNR [dB]."""
+    renewed: int = 0
+    """Times that a shape was set anew in training since a number of its was not finite."""
     kept: str = ""
     """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
 
@@ -110,6 +112,7 @@ class Result:
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
+            "renewed": self.renewed,
             "missed": list(self.missed),
             "levels": [asdict(level) for level in self.levels],
         }
@@ -214,6 +217,7 @@ def vectorize(
         iterations=made.iterations,
         seconds=seconds,
         stopped=made.interrupted,
+        renewed=made.renewed,
         renderer=settings.renderer,
         render_ssim=render_ssim,
         missed=missed_goals(settings, score, seconds),

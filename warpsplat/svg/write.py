@@ -20,6 +20,7 @@ from warpsplat.svg.nest import Path, nested, painted
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
+from warpsplat.svg.valid import check_finite
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
@@ -267,7 +268,11 @@ def write_svg(
             shape is.
         title: of the picture; empty: none.
         ids: whether paths have identifiers, by their colours, and neighbours of one colour a group with one.
+
+    Raises:
+        UsageError: a number of the scene is not finite.
     """
+    check_finite(scene)
     scene = in_parts(scene)
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
