@@ -130,8 +130,15 @@ def run_file(
         hint = f"a simple image: {count} shapes; --curves N for another number"
         say(f"warpsplat: {input_name(source)}: {hint}", err=True)
     if not quiet:
+        say_reduced(input_name(source), result)
         say_renewed(input_name(source), result)
     return result
+
+
+def say_reduced(name: str, result: Result) -> None:
+    """Say what was done on ``name`` to stay below the limit of memory, if something was."""
+    if result.reduced:
+        say(f"warpsplat: {name}: {result.reduced}", err=True)
 
 
 def say_renewed(name: str, result: Result) -> None:

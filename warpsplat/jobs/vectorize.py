@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from warpsplat._version import __version__
 from warpsplat.errors import Stopped
 from warpsplat.files.importance import load_importance
 from warpsplat.files.output import write_svg_text
-from warpsplat.files.sources import ImageSource, image_of, source_bytes, source_name
+from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
@@ -27,6 +26,8 @@ from warpsplat.fit.loop import Progress, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.step import model_for
+from warpsplat.jobs.memory import has_room_for_eyes
+from warpsplat.jobs.reduction import Memory, Reduction
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
@@ -85,6 +86,8 @@ class Result:
     """Of a refined SVG, its own PSNR [dB]."""
     renewed: int = 0
     """Times that a shape was set anew in training since a number of its was not finite."""
+    reduced: str = ""
+    """What was done to stay below the limit of memory, for people; empty: nothing."""
     kept: str = ""
     """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
 
@@ -113,6 +116,7 @@ class Result:
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
             "renewed": self.renewed,
+            "reduced": self.reduced,
             "missed": list(self.missed),
             "levels": [asdict(level) for level in self.levels],
         }
@@ -140,6 +144,7 @@ def vectorize(
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
     write: Callable[[str], None] | None = None,
+    reduction: Reduction | None = None,
 ) -> Result:
     """Fit curves to ``target`` and score the file they make.
 
@@ -156,6 +161,7 @@ def vectorize(
         stop: asked after every step; once true, the curves as they are make the file. True later, the score
             is given up.
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
+        reduction: of a larger image to ``target``; the file is of that one's size.
     """
     started = time.monotonic()
     seconds = training_seconds(settings, target, started)
@@ -197,17 +203,26 @@ def vectorize(
         made = replace(made, scene=clear)
     if settings.ids and settings.subject != "line" and settings.renderer != "gaussian":
         made = replace(made, scene=made.scene.take(by_color(made.scene)))
+    if reduction:
+        made, settings = reduction.enlarged(made), reduction.settings(settings)
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
     )
     if write:
         write(svg)
-    score = _score(svg, target, settings, stop, interrupted=made.interrupted)
+    score = _score(svg, target, settings, stop, reduction, interrupted=made.interrupted)
     render_psnr, render_ssim = made.render_psnr, None
-    if settings.renderer == "gaussian" and target.shape[0] * target.shape[1] <= settings.fine_pixels:
+    fine = not reduction and target.shape[0] * target.shape[1] <= settings.fine_pixels
+    if settings.renderer == "gaussian" and fine:
         render_psnr, render_ssim = render_figures(made.scene, target, settings, backend)
     seconds = time.monotonic() - started
+
+    def measured(text: str) -> Score:
+        if reduction:
+            return reduction.score(text, target, None)
+        return score_svg(text, target, own=True, eyes=False)
+
     return Result(
         svg=svg,
         scene=scene,
@@ -221,7 +236,8 @@ def vectorize(
         renderer=settings.renderer,
         render_ssim=render_ssim,
         missed=missed_goals(settings, score, seconds),
-        levels=_level_scores(scene, settings, made.per_pixel, target) if score and settings.levels else (),
+        levels=_level_scores(scene, settings, made.per_pixel, measured) if score and settings.levels else (),
+        reduced=reduction.words() if reduction else "",
     )
 
 
@@ -272,9 +288,10 @@ takes about a second."""
 
 def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
     """Whether a run's report has SSIMULACRA2: up to ``QUICK_PIXELS`` it takes a twentieth of a run of the
-    default effort; within a time budget other things are worth more.
+    default effort; within a time budget other things are worth more, and it takes much memory.
     """
-    return target.shape[0] * target.shape[1] <= QUICK_PIXELS and settings.time_budget is None
+    pixels = target.shape[0] * target.shape[1]
+    return pixels <= QUICK_PIXELS and settings.time_budget is None and has_room_for_eyes(settings, pixels)
 
 
 def _score(
@@ -282,6 +299,7 @@ def _score(
     target: FloatArray,
     settings: Settings,
     stop: Callable[[], bool] | None,
+    reduction: Reduction | None,
     *,
     interrupted: bool,
 ) -> Score | None:
@@ -291,19 +309,21 @@ def _score(
     if (interrupted and not quick) or (not interrupted and stop and stop()):
         return None
     try:
+        if reduction:
+            return reduction.score(svg, target, stop)
         return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
     except Stopped:
         return None
 
 
 def _level_scores(
-    scene: Scene, settings: Settings, per_pixel: float, target: FloatArray
+    scene: Scene, settings: Settings, per_pixel: float, measured: Callable[[str], Score]
 ) -> tuple[LevelScore, ...]:
-    """Of the files that the first layers alone make."""
+    """Of the files that the first layers alone make, as they are ``measured``."""
     found = []
     for end in (*level_ends(scene), len(scene)):
         text = export(scene.take(np.arange(end)), settings, per_pixel)
-        score = score_svg(text, target, own=True, eyes=False)
+        score = measured(text)
         found.append(LevelScore(end, score.as_dict()["psnr"]))
     return tuple(found)
 
@@ -338,14 +358,16 @@ def noting(history: list[Progress], report: Callable[[Progress], None] | None) -
     return note
 
 
-def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
+def load_target(source: ImageSource, name: str | None, background: str, factor: int = 1) -> FloatArray:
     """An image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
+
+    ``factor``: how many times smaller to read it.
 
     Raises:
         ImageError: as ``image_of``.
     """
     color = solid_color(background)
-    image = image_of(source, name, paper=color)
+    image = image_of(source, name, paper=color, factor=factor)
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
@@ -380,16 +402,26 @@ def vectorize_image(
     Raises:
         ImageError: ``source`` or the mask cannot be read, or their proportions differ.
         OutputError: ``output`` cannot be written.
+        ResourceError: the limit of memory is too low for any size.
     """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
     key = ""
+    source = _read(source)
     if keyed:
-        source, importance = _bytes(source), None if importance is None else _bytes(importance)
+        importance = None if importance is None else _read(importance)
+        assert isinstance(source, bytes), "pixels have no key"
+        assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    target = load_target(source, name, settings.background)
-    height, width = target.shape[:2]
+    memory = Memory.of(source, settings)
+    factor = memory.factor(name, settings)
+    target = load_target(source, name, settings.background, factor)
     chosen, why = decided(target, settings)
+    target, factor = memory.smaller(target, name, chosen, factor)
+    reduction = memory.reduction(factor, target, chosen)
+    height, width = target.shape[:2]
+    if reduction:
+        height, width = reduction.height, reduction.width
     history: list[Progress] = []
 
     def on_paper(svg: str) -> str:
@@ -404,10 +436,11 @@ def vectorize_image(
         report=noting(history, report),
         stop=stop,
         write=None if output is None else lambda svg: write_svg_text(output, on_paper(svg)),
+        reduction=reduction,
     )
     return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
 
 
-def _bytes(source: ImageSource) -> bytes:
-    assert not isinstance(source, (np.ndarray, Image.Image)), "pixels have no key"
-    return source_bytes(source)
+def _read(source: ImageSource) -> ImageSource:
+    """The bytes of a file; pixels, and what is no image, as they are."""
+    return source_bytes(source) if isinstance(source, (str, os.PathLike, bytes, Readable)) else source

@@ -303,10 +303,10 @@ def titled(title: str) -> str:
     return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
 
 
-OUR_HEAD = re.compile(
-    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" '
-    rf'viewBox="0 0 ([\d.]+) ([\d.]+)">{MARK}'
+HEAD = re.compile(
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)">'
 )
+OUR_HEAD = re.compile(HEAD.pattern + MARK)
 """How a file written here begins: its size in pixels, and that in units of its view box."""
 
 
@@ -314,11 +314,12 @@ def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> s
     """A file written here, ``scale`` px large for each pixel of its own, cut to the ``width`` x ``height`` px
     from the left and from ``top`` on.
     """
-    found = OUR_HEAD.match(text)
+    text = _plain(text)
+    found = HEAD.match(text)
     assert found
     unit = float(found[3]) / float(found[1]) / scale
     view = f"0 {top * unit:.9g} {width * unit:.9g} {height * unit:.9g}"
-    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">{MARK}'
+    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">'
     return head + text[found.end() :]
 
 
