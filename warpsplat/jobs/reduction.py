@@ -46,8 +46,10 @@ class Reduction:
         """Of the file against the image itself, else against the smaller one (``target``)."""
         if self.whole:
             return score_svg(svg, self.whole(), own=True, eyes=False, stop=stop)
-        small = resized(svg, target.shape[1], target.shape[0], 1 / self.factor)
-        score = score_svg(small, target, own=True, eyes=False, stop=stop)
+        # Of the pixels whose squares lie in the picture wholly.
+        wide, tall = self.width // self.factor, self.height // self.factor
+        small = resized(svg, wide, tall, 1 / self.factor)
+        score = score_svg(small, target[:tall, :wide], own=True, eyes=False, stop=stop)
         data = svg.encode()
         return replace(score, bytes=len(data), gzip_bytes=len(gzip.compress(data, 9, mtime=0)))
 
