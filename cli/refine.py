@@ -76,7 +76,7 @@ def command(
     if checkpoint:
         check_output(checkpoint, svg, image)
     from warpsplat.api import refine
-    from warpsplat.cli.run import leave, progress_bar
+    from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.summary import summary
     from warpsplat.svg.inspect import MAX_BYTES
@@ -103,6 +103,8 @@ def command(
     before = result.before or 0.0
     if result.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)
+    if not quiet:
+        say_renewed(input_name(svg), result)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept

@@ -143,7 +143,23 @@ def run_file(
     if not traced and settings.simplify and not pursued and count < settings.curves and not quiet:
         hint = f"a simple image: {count} shapes; --curves N for another number"
         say(f"warpsplat: {input_name(source)}: {hint}", err=True)
+    if not quiet:
+        say_reduced(input_name(source), result)
+        say_renewed(input_name(source), result)
     return result
+
+
+def say_reduced(name: str, result: Result) -> None:
+    """Say what was done on ``name`` to stay below the limit of memory, if something was."""
+    if result.reduced:
+        say(f"warpsplat: {name}: {result.reduced}", err=True)
+
+
+def say_renewed(name: str, result: Result) -> None:
+    """Say how many shapes had to be set anew in the training on ``name``, if there were some."""
+    if result.renewed:
+        found = f"numbers of shapes that are not finite, {result.renewed} times; these began anew"
+        say(f"warpsplat: {name}: {found}", err=True)
 
 
 def leave(result: Result) -> None:

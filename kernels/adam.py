@@ -79,8 +79,13 @@ def adam_update(
     value: wp.array2d[wp.float32],  # [row_count, size] updated
     moment1: wp.array2d[wp.float32],  # [row_count, size] updated
     moment2: wp.array2d[wp.float32],  # [row_count, size] updated
+    broken: wp.array[wp.int32],  # [shape_count] 1 where a number was not finite; every writer writes the same
 ):
-    """A step of Adam, one thread a number; bounds are kept by projection."""
+    """A step of Adam, one thread a number; bounds are kept by projection.
+
+    Where the gradient, the moments or the value are not finite nothing is updated, so that they stay as they
+    are for ``fit.mend`` to find.
+    """
     i, j = wp.tid()
     row = offset + i
     shape = owner[row]
@@ -88,13 +93,15 @@ def adam_update(
         return
     current = rate * decay[0]
     g = grad[row, j]
-    # A gradient that is not finite must not poison the moments.
-    if not wp.isfinite(g):
-        g = 0.0
     m1 = BETA1 * moment1[row, j] + (1.0 - BETA1) * g
     m2 = BETA2 * moment2[row, j] + (1.0 - BETA2) * g * g
-    moment1[row, j] = m1
-    moment2[row, j] = m2
     m1_hat = m1 / bias1[shape]
     m2_hat = m2 / bias2[shape]
-    value[row, j] = wp.clamp(value[row, j] - current * m1_hat / (wp.sqrt(m2_hat) + EPSILON), low, high)
+    new = value[row, j] - current * m1_hat / (wp.sqrt(m2_hat) + EPSILON)
+    # Whatever is not finite makes one of the two so: of an infinite moment2 alone the update would be 0.
+    if not (wp.isfinite(new) and wp.isfinite(m2)):
+        broken[shape] = 1
+        return
+    moment1[row, j] = m1
+    moment2[row, j] = m2
+    value[row, j] = wp.clamp(new, low, high)

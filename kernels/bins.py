@@ -83,7 +83,7 @@ def fill_slots(
     tile = int(INT_MAX)
     if front < shape_count:
         candidate = shape_count - 1 - front
-        if slot < slot_last[candidate]:
+        if slot >= slot_first[candidate] and slot < slot_last[candidate]:
             shape = candidate
             width = shape_tiles[shape, 2] - shape_tiles[shape, 0]
             local = slot - slot_first[shape]

@@ -121,7 +121,10 @@ EPSILON = 1.0e-6
 """Length [px] below which a difference vector has no direction."""
 
 INT_MAX = 2**31 - 1
-"""Sort key of an unused slot: sorts behind every tile."""
+"""Sort key of an unused slot: sorts behind every tile; a need that 32 bits do not hold."""
+
+COUNT_MAX = 2**30
+"""Where a shape's count of samples stays: more than any capacity, and two of them can be added."""
 
 PLATEAU = 0.985
 """Mean coverage well inside a splatted shape (its Gaussians overlap to a little less than 1). A solid path

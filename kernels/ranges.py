@@ -6,6 +6,15 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+INT_MAX = wp.constant(constants.INT_MAX)
+COUNT_MAX = wp.constant(constants.COUNT_MAX)
+
+
+@wp.func
+def bounded_product(a: wp.int32, b: wp.int32) -> wp.int32:
+    """``a`` times ``b`` as a count: from 0 to COUNT_MAX."""
+    return wp.int32(wp.clamp(wp.int64(a) * wp.int64(b), wp.int64(0), wp.int64(COUNT_MAX)))
+
 
 @wp.func
 def find_range(ends: wp.array[wp.int32], count: wp.int32, i: wp.int32) -> wp.int32:
@@ -32,13 +41,21 @@ def clip_ranges(
     # Out:
     range_first: wp.array[wp.int32],  # [n]
     range_last: wp.array[wp.int32],  # [n] one past the end; an empty range where the capacity is exceeded
-    needed: wp.array[wp.int32],  # [1] the largest total ever asked for
+    needed: wp.array[wp.int32],  # [1] the largest total ever asked for; INT_MAX: more than 32 bits hold
 ):
-    """Prefix sum -> ranges. What does not fit is left out whole and counted, never cut."""
+    """Prefix sum -> ranges. What does not fit is left out whole and counted, never cut.
+
+    A sum that exceeds 31 bits turns negative where it first does, as no count does by itself. What comes
+    behind may have any range within the capacity, until ``needed`` is looked at.
+    """
     i = offset + wp.tid()
     n = ends.shape[0]
     end = ends[i]
     start = end - count[i]
+    if end < 0 or start < 0:
+        wp.atomic_max(needed, 0, INT_MAX)
+        start = int(0)
+        end = int(0)
     if end > capacity:
         end = start
     index = i
@@ -47,4 +64,4 @@ def clip_ranges(
     range_first[index] = start
     range_last[index] = end
     if i == n - 1:
-        needed[0] = wp.max(needed[0], ends[i])
+        wp.atomic_max(needed, 0, ends[i])

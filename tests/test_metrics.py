@@ -259,3 +259,24 @@ def test_without_the_package_ssimulacra2_is_none(monkeypatch: pytest.MonkeyPatch
     assert score.ssimulacra2 is None
     assert score.as_dict()["ssimulacra2"] is None
     assert score.psnr > 60
+
+
+@pytest.mark.parametrize("size", [(64, 48), (65, 48), (64, 49)])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_strips_make_the_figures_of_the_whole(
+    size: tuple[int, int], channels: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of large images channels are made strip by strip, whenever they are asked for."""
+    width, height = size
+    rng = np.random.default_rng(0)
+    target = rng.uniform(0, 1, (height, width, channels)).astype(np.float32)
+    if channels == 4:
+        target[..., :3] *= target[..., 3:]
+    text = write_svg(random_scene(Kind.FILL, 5, width=width, height=height, seed=1))
+    whole = score_svg(text, target, own=True, eyes=False)
+    monkeypatch.setattr("warpsplat.metrics.WHOLE_PIXELS", 0)
+    monkeypatch.setattr("warpsplat.metrics.STRIP_PIXELS", 640)
+    monkeypatch.setattr(strips, "STRIP_PIXELS", 640)
+    pieces = score_svg(text, target, own=True, eyes=False)
+    for name, value in whole.as_dict().items():
+        assert pieces.as_dict()[name] == pytest.approx(value, abs=1e-6), name

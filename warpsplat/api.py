@@ -71,6 +71,7 @@ def vectorize(
     target_psnr: float | None = None,
     time_budget: float | str | None = None,
     max_bytes: int | str | None = None,
+    max_memory: int | str | None = None,
     seed: int | None = None,
     background: str | None = None,
     title: str | None = None,
@@ -119,6 +120,7 @@ def vectorize(
         target_psnr: the smallest file that has this [dB].
         time_budget: seconds, or ``"2m"``.
         max_bytes: the best file within this size, or ``"100KB"``.
+        max_memory: bytes, or ``"4GB"``: an image that takes more is worked on at a smaller size.
         seed: of random numbers.
         background: ``auto``, ``none`` or ``#rrggbb``.
         title: of the picture.
@@ -172,6 +174,7 @@ def vectorize(
         "target_psnr": target_psnr,
         "time_budget": time_budget,
         "max_bytes": max_bytes,
+        "max_memory": max_memory,
         "seed": seed,
         "background": background,
         "title": title,

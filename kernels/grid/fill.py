@@ -9,7 +9,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights, local_weight, ring_index, segment_at
 from warpsplat.kernels.grid.strips import row_plan, row_position, station_plan
-from warpsplat.kernels.ranges import find_range
+from warpsplat.kernels.ranges import bounded_product, find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -81,7 +81,7 @@ def plan_fill(
     shape_runs[shape] = 1
     shape_rows[shape] = int(rows[0])
     shape_reach[shape] = rows[1]
-    gaussian_count[shape] = stations * int(rows[0])
+    gaussian_count[shape] = bounded_product(stations, int(rows[0]))
     shape_sign[shape] = wp.sign(doubled_area)
 
 

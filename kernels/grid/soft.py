@@ -21,7 +21,7 @@ from warpsplat.kernels.bezier import cross, cubic_weights
 from warpsplat.kernels.grid.fill import chain_cubics, chain_point
 from warpsplat.kernels.grid.gaussians import difference, straightness
 from warpsplat.kernels.grid.strips import row_plan, station_plan
-from warpsplat.kernels.ranges import find_range
+from warpsplat.kernels.ranges import bounded_product, find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -78,7 +78,7 @@ def plan_soft(
                 length += wp.length(here - before)
                 before = here
             longest = wp.max(longest, length)
-        shape_stations[shape] = segments * soft_stations(longest, density)
+        shape_stations[shape] = bounded_product(segments, soft_stations(longest, density))
         shape_rows[shape] = 1
         shape_reach[shape] = 0.0
         shape_sign[shape] = 0.0
@@ -106,7 +106,7 @@ def plan_soft(
         shape_rows[shape] = wp.max(2, int(wp.ceil(density * rows[0])))
         shape_reach[shape] = rows[1]
         shape_sign[shape] = wp.sign(doubled_area)
-    gaussian_count[shape] = shape_stations[shape] * shape_rows[shape]
+    gaussian_count[shape] = bounded_product(shape_stations[shape], shape_rows[shape])
 
 
 @wp.kernel

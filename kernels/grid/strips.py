@@ -18,14 +18,16 @@ STATION_SPACING = wp.constant(constants.STATION_SPACING)
 STATION_DENSITY = wp.constant(constants.STATION_DENSITY)
 STATIONS_MIN = wp.constant(constants.STATIONS_MIN)
 EPSILON = wp.constant(constants.EPSILON)
+EDGE_MIN = wp.constant(2.0e-7)  # beyond, 1 - 2 x edge would be 1
 SQRT_HALF = wp.constant(0.7071067811865476)
 
 
 @wp.func
 def row_plan(width: wp.float32) -> wp.vec2:
     """(row count, reach) for a strip ``width`` [px] wide."""
-    # The outermost row at a quarter of the strip at the most: two rows are the least.
-    edge = wp.min(ROW_INSET / wp.max(width, EPSILON), 0.25)
+    # The outermost row at a quarter of the strip at the most: two rows are the least. And so far inside a
+    # strip of millions of pixels that a float can tell.
+    edge = wp.clamp(ROW_INSET / wp.max(width, EPSILON), EDGE_MIN, 0.25)
     reach = wp.erfinv(1.0 - 2.0 * edge) / SQRT_HALF
     # Near the boundary du = phi(z) dz and u = Phi(z), so the relative step is the hazard rate of the
     # normal distribution times dz; z + 1 / (z + 1) is close to it over the range in use.

@@ -10,7 +10,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cubic_tangent_weights, cubic_weights
 from warpsplat.kernels.grid.strips import row_plan, row_position, station_plan
-from warpsplat.kernels.ranges import find_range
+from warpsplat.kernels.ranges import bounded_product, find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -62,12 +62,12 @@ def plan_stroke(
             before = here
         longest = wp.max(longest, length)
     rows = row_plan(scale * widths[shape])
-    stations = segments * (station_plan(longest) + 2 * cap_plan(int(rows[0])))
+    stations = bounded_product(segments, station_plan(longest) + 2 * cap_plan(int(rows[0])))
     shape_stations[shape] = stations
     shape_runs[shape] = segments
     shape_rows[shape] = int(rows[0])
     shape_reach[shape] = rows[1]
-    gaussian_count[shape] = stations * int(rows[0])
+    gaussian_count[shape] = bounded_product(stations, int(rows[0]))
 
 
 @wp.func

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import random
 import re
 from collections.abc import Callable
@@ -13,7 +14,15 @@ from PIL import Image
 
 from tests.fuzz import checkpoints, corpus, mutate
 from tests.fuzz.corpus import Seed
-from tests.fuzz.vocabulary import SVG_SNIPPETS, SVG_WORDS, TEXT_OPTIONS, TOKENS, YAML_SNIPPETS, YAML_WORDS
+from tests.fuzz.vocabulary import (
+    FITS,
+    SVG_SNIPPETS,
+    SVG_WORDS,
+    TEXT_OPTIONS,
+    TOKENS,
+    YAML_SNIPPETS,
+    YAML_WORDS,
+)
 from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, Outcome
 from warpsplat.errors import ExitCode
 
@@ -71,18 +80,22 @@ FILES: dict[str, bytes] = {
 }
 """Laid into every case's folder; must be as they were afterwards."""
 
-INPUT, USAGE = int(ExitCode.INPUT), int(ExitCode.USAGE)
+INPUT, USAGE, MISSED = int(ExitCode.INPUT), int(ExitCode.USAGE), int(ExitCode.GOAL_MISSED)
 
 
 def _image_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
     given, stdin = ("-", name) if rng.random() < 0.05 else (name, "")
     commands = [Command(("eval", given, GOOD_SVG, "--json"), (INPUT,), stdin=stdin)]
     if rng.random() < 0.15:
-        kind = rng.choice(("--open", "--closed"))
-        commands.append(Command(("vectorize", name, "-o", "out.svg", kind, *QUICK), (INPUT,), "out.svg"))
+        kind = rng.choice(FITS)
+        fit = ("vectorize", name, "-o", "out.svg", *kind, *QUICK)
+        commands.append(Command(fit, (INPUT, USAGE, MISSED), "out.svg"))
     if rng.random() < 0.05:
         refine = ("refine", GOOD_SVG, name, "-o", "out2.svg", "--iterations", "1", "--device", "cpu")
         commands.append(Command(refine, (INPUT,), "out2.svg"))
+    if rng.random() < 0.02:
+        compare = ("compare", name, GOOD_IMAGE, "--against", "vtracer", "--json", *QUICK)
+        commands.append(Command(compare, (INPUT, USAGE, int(ExitCode.SOME_FAILED))))
     return tuple(commands)
 
 
@@ -208,21 +221,24 @@ def _judge_messages(command: Command, outcome: Outcome) -> str:
             if line and not BATCH_LINE.fullmatch(line)
         ]
         return f"odd line on stderr: {wrong[0][:100]!r}" if wrong else ""
-    if len(lines) > 1 or any(not LINE.fullmatch(line) for line in lines):
+    if (outcome.code and len(lines) > 1) or any(not LINE.fullmatch(line) for line in lines):
         return f"not one line on stderr: {outcome.stderr[:200]!r}"
     if outcome.code and not lines:
         return "failed without a word"
-    if outcome.code and outcome.stdout:
+    if outcome.code not in (0, ExitCode.GOAL_MISSED) and outcome.stdout:
         return "failed, and wrote to stdout"
+    if outcome.code == 0 and "--json" in command.arguments and not _is_json(outcome.stdout):
+        return f"no JSON on stdout: {outcome.stdout[:100]!r}"
     return ""
 
 
 def _judge_output(command: Command, code: int, folder: Path) -> str:
     if command.output:
         path = folder / command.output
-        if path.exists() != (code == 0):
+        made = code in (0, ExitCode.GOAL_MISSED)
+        if path.exists() != made:
             return f"exit code {code}, and {command.output} is {'there' if path.exists() else 'missing'}"
-        if code == 0:
+        if made:
             whole = _is_png(path) if path.suffix == ".png" else path.read_bytes().rstrip().endswith(b"</svg>")
             # Of a foreign SVG that cannot be improved, the copy ends as that does.
             if not whole and command.arguments[0] != "refine":
@@ -234,6 +250,18 @@ def _judge_output(command: Command, code: int, folder: Path) -> str:
         if (folder / name).read_bytes() != data:
             return f"{name} was changed"
     return ""
+
+
+def _refused(name: str) -> None:
+    raise ValueError(name)
+
+
+def _is_json(text: str) -> bool:
+    """Whether a text is one JSON object, in which there is no NaN."""
+    try:
+        return isinstance(json.loads(text, parse_constant=_refused), dict)
+    except ValueError:
+        return False
 
 
 def _is_png(path: Path) -> bool:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from tests.fuzz.vocabulary import HEAD, HEADS, HEIGHT, SHAPES, WIDTH, YAMLS
-from tests.scenes import ragged_scene
+from tests.scenes import ragged_scene, random_scene, with_gradients
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import write_svg
 
@@ -97,6 +97,7 @@ def svgs() -> list[Seed]:
     for kind in ("fill", "stroke"):
         seeds += [Seed(f"{kind}s.svg", own_svg(kind))] * 3
         seeds += [Seed(f"{kind}s-fine.svg", own_svg(kind, 100)), Seed(f"{kind}s-old.svg", older_svg(kind))]
+    seeds += [Seed("gradients.svg", gradient_svg()), Seed("layered.svg", layered_svg())] * 3
     seeds += [
         Seed(f"head-{i}.svg", f"{head}{''.join(SHAPES[: 3 * i + 2])}</svg>".encode())
         for i, head in enumerate(HEADS)
@@ -110,6 +111,19 @@ def own_svg(kind: str, per_pixel: float = 8) -> bytes:
     outlines = [(painted, basis, beziers) for beziers in (3, 9, 4) for basis in Basis]
     scene = ragged_scene(outlines, WIDTH, HEIGHT, seed=1)
     return write_svg(scene, per_pixel=per_pixel, metadata="0123ABab").encode()
+
+
+def gradient_svg() -> bytes:
+    """One of shapes with gradients of every kind, named for editors."""
+    scene = random_scene(Kind.FILL, 8, width=WIDTH, height=HEIGHT, seed=2)
+    return write_svg(with_gradients(scene), per_pixel=8, title="A <title>", ids=True).encode()
+
+
+def layered_svg() -> bytes:
+    """One of three levels in few colours."""
+    scene = random_scene(Kind.FILL, 6, width=WIDTH, height=HEIGHT, seed=4)
+    layers = np.array([0, 0, 1, 1, 2, 2], np.int32)
+    return write_svg(replace(scene, layer=layers, colors=np.round(scene.colors)), per_pixel=4).encode()
 
 
 def older_svg(kind: str) -> bytes:

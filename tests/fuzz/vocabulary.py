@@ -93,6 +93,9 @@ YAMLS = (
     "# comment\ndefaults: &d\n  open: true\n  output: 'out/deep'\njobs:\n- images:\n  - in/a.png\n  - \"in/\\u00e9.png\"\n  iterations: 2\n",
     "presets:\n  fine: {curves: 3, rates: {points: 1}}\ndefaults: {iterations: 1, device: cpu}\njobs:\n  - images: in\n    preset: fine\n"
     "    matrix: {seed: [1, 2], quality: [draft, high]}\n    output: 'out/{quality}/{stem}-{seed}.svg'\n",
+    "defaults: {curves: 4, iterations: 2, paint: auto, background: none, max-memory: 2GB, title: t}\n"
+    "jobs:\n  - {images: in/a.png, levels: '1,4', output: out}\n  - {images: in/b.jpg, colors: 3, subject: drawing}\n"
+    "  - {images: in/deep/c.gif, palette: '#f00,#00f', layered: false, opaque: true, size: 50x40mm, ids: true, minify: true}\n",
     "%YAML 1.2\n---\njobs:\n  - images: !!str in/a.png\n    output: >-\n      folded\n      name\n    quality: high\n...\n",
 )
 
@@ -100,6 +103,8 @@ YAML_WORDS = (
     "defaults", "jobs", "images", "curves", "quality", "iterations", "seed", "precision", "renderer", "target-psnr",
     "time-budget", "max-bytes", "closed", "open", "output", "device", "draft", "balanced", "high", "exact", "splat", "true", "false", "null", "yes", "~",
     "cpu", "cuda", "in", "a.png", "b.jpg", "out", "60s", "10GB", "1e3", "presets", "preset", "matrix", "rates", "{stem}", "{folder}", "{curves}",
+    "paint", "linear", "radial", "layered", "levels", "colors", "palette", "opaque", "max-memory", "background", "none", "title", "size", "page",
+    "units", "ids", "minify", "mixed", "subject", "photo", "drawing", "line", "pixel", "importance", "rates", "density", "2GB", "a4", "1,4",
 )  # fmt: skip
 
 YAML_SNIPPETS = (
@@ -115,10 +120,21 @@ NUMBERS = ("0", "-0", "1", "-1", "0.5", "1e-9", "1e9", "1e30", "-1e30", "3.5e38"
            "0x10", "1_000", "١٢", "1,5", "", "50%", "-50%", "1e400%", "2em", "3ex", "1in", "5rem", "10vw", "1q", "90deg")  # fmt: skip
 """What may stand where a number is expected."""
 
-TEXT_OPTIONS = ("--time-budget", "--max-bytes", "--target-psnr", "--curves", "--iterations", "--seed", "--precision", "--threads",
+TEXT_OPTIONS = ("--max-memory", "--colors", "--palette", "--levels", "--paint", "--background", "--size", "--page", "--units", "--title",
+                "--subject", "--time-budget", "--max-bytes", "--target-psnr", "--curves", "--iterations", "--seed", "--precision", "--threads",
                 "--device", "--quality", "--renderer", "-o")  # fmt: skip
 
-TOKENS = (*NUMBERS, "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
+FITS = (
+    ("--closed",), ("--open",), ("--mixed",), ("--paint", "auto"), ("--paint", "linear"), ("--paint", "radial", "--background", "none"),
+    ("--layered",), ("--levels", "2,4"), ("--levels", "1,4", "--paint", "auto"), ("--colors", "3"), ("--palette", "#f00,#0f0,#00f"),
+    ("--opaque",), ("--background", "none"), ("--background", "#204060"), ("--renderer", "splat"), ("--renderer", "gaussian"),
+    ("--subject", "photo"), ("--subject", "drawing"), ("--subject", "line"), ("--subject", "pixel"), ("--subject", "drawing", "--colors", "2"),
+    ("--max-memory", "300MB"), ("--max-memory", "310MB", "--json"), ("--max-memory", "1MB"), ("--max-memory", "100GB"), ("--json",),
+    ("--ids",), ("--minify", "--title", "<&>"), ("--size", "50x40mm"), ("--max-bytes", "700"), ("--target-psnr", "14"),
+)  # fmt: skip
+"""Ways of vectorizing."""
+
+TOKENS = (*NUMBERS, "#f00", "#ff8800,#fff", "#", "2,4", "4,2", "1,,4", "linear", "radial", "a4", "50x40mm", "0x0mm", "mm", "none", "photo", "1EB", "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
           "draft", "exact", "x.svg", "/", ".", "..", "a/b.svg", "é.svg", "\udcff.svg", "\n.svg", "\x1b[2J.svg", "x" * 300, "-", "--", "٣s", "x.SVG",
           "good.picture", "in", "in/a.png/x.svg", "/dev/null", "/dev/full", "/proc/x.svg")  # fmt: skip
 

@@ -22,7 +22,9 @@ from typing import Any
 from tests import ROOT
 
 MAX_SECONDS = 10.0
-"""No run on a small input may take longer."""
+"""No run on a small input may take longer [s of processor time, which other programs do not lengthen]."""
+PATIENCE = 10.0
+"""Seconds on the clock for each of those: beyond, a command waits for something that does not come."""
 MAX_MEMORY = 2 << 30
 """Nor hold more [bytes]."""
 DRIFT = 512 << 20
@@ -39,6 +41,7 @@ class Outcome:
     stdout: str
     stderr: str
     seconds: float
+    """Of processor time."""
     peak: int
     """Most memory that was held [bytes]; 0 where the system does not say."""
     ended: str = ""
@@ -52,6 +55,18 @@ def _status(process: int | str, key: str) -> int:
     except OSError:
         return 0
     return next((int(line.split()[1]) * 1024 for line in text.splitlines() if line.startswith(key)), 0)
+
+
+TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
+
+
+def _spent(process: int) -> float:
+    """Processor time of a process and of the children that it has waited for [s]; 0 where nobody says."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11:15])) / TICKS
 
 
 def _children(process: int) -> list[int]:
@@ -113,15 +128,17 @@ class Worker:
         with contextlib.suppress(BrokenPipeError):  # a process that has ended is seen below
             process.stdin.write(json.dumps(task).encode() + b"\n")
             process.stdin.flush()
-        started, peak, ended = time.monotonic(), 0, ""
+        started, before, peak, ended = time.monotonic(), _spent(process.pid), 0, ""
+        spent = 0.0
         while not ended and not select.select([process.stdout], [], [], 0.05)[0]:
-            held = sum(_status(p, "VmRSS") for p in (process.pid, *_children(process.pid)))
+            children = _children(process.pid)
+            held = sum(_status(p, "VmRSS") for p in (process.pid, *children))
             peak = max(peak, held)
-            if time.monotonic() - started > limit:
+            spent = _spent(process.pid) - before + sum(map(_spent, children))
+            if spent > limit or time.monotonic() - started > PATIENCE * limit:
                 ended = "time"
             elif held > MAX_MEMORY:
                 ended = "memory"
-        seconds = time.monotonic() - started
         if not ended:
             answer = process.stdout.readline()
             if answer:
@@ -130,7 +147,7 @@ class Worker:
                 return Outcome(**values)
             process.wait()
         self.close()
-        return Outcome(process.returncode, "", "", seconds, peak, ended)
+        return Outcome(process.returncode, "", "", spent, peak, ended)
 
 
 def _serve() -> None:
@@ -161,9 +178,9 @@ def _run(main: Any, task: dict[str, Any]) -> Outcome:
             open(number, mode, encoding="utf-8", errors="backslashreplace", closefd=False)  # noqa: SIM115
             for number, mode in enumerate("rww")
         )
-        started = time.monotonic()
+        started = sum(os.times()[:4])
         code = _call(main, task["arguments"])
-        seconds = time.monotonic() - started
+        seconds = sum(os.times()[:4]) - started
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(ValueError, OSError):
                 stream.flush()

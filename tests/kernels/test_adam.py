@@ -3,6 +3,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 import torch
 import warp as wp
 
@@ -27,6 +28,7 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
         "bias1": wp.zeros(len(kind), dtype=float, device=device),
         "bias2": wp.zeros(len(kind), dtype=float, device=device),
         "decay": wp.zeros(1, dtype=float, device=device),
+        "broken": wp.zeros(len(kind), dtype=int, device=device),
     }
 
 
@@ -59,10 +61,29 @@ def test_matches_torch(device: str) -> None:
     assert (s["ages"].numpy() == 20).all()
 
 
-def test_keeps_bounds_and_ignores_what_is_not_finite(device: str) -> None:
+def test_keeps_bounds(device: str) -> None:
     s = state(np.array([[0.5, 0.5]], np.float32), [0], [0], device)
-    step(s, np.array([[-1.0, np.nan]], np.float32), device, rate=5.0, low=0.0, high=1.0)
-    np.testing.assert_array_equal(s["value"].numpy(), [[1.0, 0.5]])
+    step(s, np.array([[-1.0, 1.0]], np.float32), device, rate=5.0, low=0.0, high=1.0)
+    np.testing.assert_array_equal(s["value"].numpy(), [[1.0, 0.0]])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["grad", "moment1", "moment2", "value"])
+def test_no_update_is_made_of_what_is_not_finite(device: str, where: str, bad: float) -> None:
+    """Its shape is marked, and nothing else changes: neither the row's moments nor other shapes."""
+    start = np.full((3, 2), 0.5, np.float32)
+    s, other = (state(start, [0, 1, 1], [0, 0], device) for _ in range(2))
+    gradient = np.ones((3, 2), np.float32)
+    step(other, gradient, device)
+    poisoned = gradient.copy() if where == "grad" else s[where].numpy().copy()
+    poisoned[1, 1] = bad
+    s[where].assign(poisoned)
+    step(s, poisoned if where == "grad" else gradient, device)
+    assert s["broken"].numpy().tolist() == [0, 1]
+    for name in ("value", "moment1", "moment2"):
+        after, wanted = s[name].numpy(), other[name].numpy().copy()
+        wanted[1, 1] = poisoned[1, 1] if name == where else (0.5 if name == "value" else 0.0)
+        np.testing.assert_array_equal(after, wanted)
 
 
 def test_a_row_is_corrected_by_the_age_of_its_own_shape(device: str) -> None:

@@ -9,20 +9,23 @@ import contextlib
 import io
 import threading
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError
 from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.native import messages_hidden
 from warpsplat.scene import FloatArray
+
+Taken = TypeVar("Taken")
 
 MIN_SIDE = 2
 """Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""
@@ -42,7 +45,11 @@ LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 
 
 def load_image(
-    source: Path | bytes, name: str | None = None, *, paper: float | FloatArray | None = 1.0
+    source: Path | bytes,
+    name: str | None = None,
+    *,
+    paper: float | FloatArray | None = 1.0,
+    factor: int = 1,
 ) -> FloatArray:
     """Read an image: first frame, EXIF rotation and colour profile applied, transparency on ``paper``.
 
@@ -50,6 +57,8 @@ def load_image(
         source: a file, ``-`` for the standard input, or the bytes of an image.
         name: what messages call it; without, the path.
         paper: grey level or colour that transparency is composited on; None: it is kept.
+        factor: how many times smaller to read it, see ``reduced``; JPEGs take less memory and time to decode
+            so.
 
     Returns:
         sRGB in [0, 1], shape (height, width, 3), float32; where transparency is kept and there is some,
@@ -58,6 +67,16 @@ def load_image(
     Raises:
         ImageError: missing, unreadable, truncated, not an image, too large, too small, or with pixels that
             are no numbers. The message is one line that names the image and the cause.
+    """
+    name = name or (input_name(source) if isinstance(source, Path) else "the image")
+    return read_image(source, name, lambda image, left: reduced(image, paper, left, name), factor)
+
+
+def read_image(
+    source: Path | bytes, name: str | None, take: Callable[[Image.Image, int], Taken], factor: int = 1
+) -> Taken:
+    """What ``take`` makes of an image that is decoded and upright, and of how many times smaller it is to
+    become: ``factor`` but for what decoding has done of it. Arguments and errors as for ``load_image``.
     """
     if isinstance(source, Path):
         name = name or input_name(source)
@@ -78,10 +97,11 @@ def load_image(
                     raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
                 _check_covered(opened)
                 rawmode = _rawmode(opened)
+                left = factor // _draft(opened, factor)
                 opened.load()
                 _mend_transparency(opened, rawmode, source)
                 ImageOps.exif_transpose(opened, in_place=True)
-                return to_srgb(opened, paper, name)
+                return take(opened, left)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except MemoryError:
@@ -146,6 +166,111 @@ def _mend_transparency(image: Image.Image, rawmode: str, data: bytes) -> None:
         image.putalpha(Image.fromarray(np.where(deep[..., 3] == 0, 0, 255).astype(np.uint8)))
 
 
+def _draft(image: Image.Image, factor: int) -> int:
+    """Have a JPEG decoded 2, 4 or 8 times smaller, ``factor`` at the most; how many times it is."""
+    width, height = image.size
+    if factor == 1 or image.format != "JPEG":
+        return 1
+    most = min(factor, DRAFTS[0])
+    image.draft(image.mode, (width // most, height // most))
+    return next(n for n in (*DRAFTS, 1) if image.size == (-(-width // n), -(-height // n)))
+
+
+DRAFTS = (8, 4, 2)
+"""How many times smaller a JPEG can be decoded."""
+
+
+def reduced(
+    image: Image.Image, paper: float | FloatArray | None, factor: int, name: str = "the image"
+) -> FloatArray:
+    """As ``to_srgb``, ``factor`` times smaller: a pixel is the mean of a square, at the right and lower
+    border of what there is of it. Beside the result only strips are held, but of deep grey images.
+    """
+    profile = profile_of(image, name)
+    if factor == 1:
+        return to_srgb(image, paper, profile)
+    if is_deep(image):
+        return boxed(to_srgb(image, paper, profile), factor)
+    width, height = image.size
+    out = np.empty((-(-height // factor), -(-width // factor), 3 if paper is not None else 4), np.float32)
+    step = max(1, STRIP_PIXELS // (width * factor))
+    for top in range(0, len(out), step):
+        part = image.crop((0, factor * top, width, min(factor * (top + step), height)))
+        small = boxed(to_srgb(part, paper, profile), factor)
+        out[top : top + step, :, : small.shape[2]] = small
+        if small.shape[2] < out.shape[2]:
+            out[top : top + step, :, 3] = 1
+    return out[..., :3] if paper is None and (out[..., 3] == 1).all() else out
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a file's head says of an image."""
+
+    width: int
+    """[px], upright."""
+    height: int
+    channels: int
+    """Of the floats that it is read as, at the most."""
+    decoded: int
+    """Bytes of a pixel that decoding takes, at the most, beside those."""
+    drafts: bool
+    """Whether it can be decoded smaller."""
+    kept: int = 0
+    """Bytes of a pixel of the whole image that decoding takes at any size."""
+    deep: bool = False
+    """See ``is_deep``."""
+
+
+def image_facts(source: bytes) -> Facts | None:
+    """What can be said of an image without decoding it; None where that is for ``load_image`` to refuse."""
+    try:
+        with _decoding, warnings.catch_warnings(), _pixel_limit(), messages_hidden():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(source)) as image:
+                width, height = image.size
+                turned = image.getexif().get(ExifTags.Base.Orientation, 1)
+                bands = 4 if is_deep(image) else SAMPLE_BYTES.get(image.mode, 4)
+                decoded = bands * (2 if turned != 1 else 1) + (0 if image.format in PLAIN_FORMATS else 8)
+                if is_deep(image):  # all of it is floats first
+                    decoded += 16
+                if turned in range(5, 9):
+                    width, height = height, width
+                transparent = "transparency" in image.info or image.mode[-1:] in {"A", "a"}
+                kept = PROGRESSIVE if image.info.get("progressive") else 0
+                drafts = image.format == "JPEG"
+                channels = 4 if transparent else 3
+                return Facts(width, height, channels, decoded, drafts, kept, is_deep(image))
+    except Exception:  # whatever Pillow's decoders raise on broken data
+        return None
+
+
+SAMPLE_BYTES = {"1": 1, "L": 1, "P": 1}
+"""Of a pixel, as Pillow holds it; 4 in all other modes."""
+
+PLAIN_FORMATS = {"JPEG", "PNG", "BMP", "GIF", "TIFF", "PPM", "TGA", "MPO"}
+"""Formats that are decoded row by row, or nearly so; of others the decoder holds all of it for itself."""
+
+PROGRESSIVE = 6
+"""Bytes of a pixel that the coefficients of a progressive JPEG take."""
+
+
+def is_deep(image: Image.Image) -> bool:
+    """Whether an image is one channel of 16 or 32 bits, whose white may be known from all of it only."""
+    return image.mode == "F" or image.mode.startswith("I")
+
+
+def boxed(pixels: FloatArray, factor: int) -> FloatArray:
+    """Means of squares of ``factor`` x ``factor`` px; what is missing at a border is as what is there."""
+    height, width = pixels.shape[:2]
+    size = (-(-width // factor), -(-height // factor))
+    below, right = size[1] * factor - height, size[0] * factor - width
+    whole: npt.NDArray[Any] = pixels
+    if below or right:
+        whole = cv2.copyMakeBorder(whole, 0, below, 0, right, cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
 def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
     """Rows, and the part of the image that they are."""
     width, height = image.size
@@ -156,15 +281,15 @@ def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
 
 
 def to_srgb(
-    image: Image.Image, paper: float | FloatArray | None = 1.0, name: str = "the image"
+    image: Image.Image, paper: float | FloatArray | None = 1.0, profile: Profile | None = None
 ) -> FloatArray:
-    """A loaded Pillow image of any mode as sRGB in [0, 1], by its colour profile; see ``load_image``.
+    """A loaded Pillow image of any mode, or a part of one, as sRGB in [0, 1], by its colour ``profile``
+    (``profile_of``); see ``load_image``.
 
     Raises:
         ImageError: pixels that are no numbers.
     """
-    profile = profile_of(image, name)
-    if image.mode == "F" or image.mode.startswith("I"):
+    if is_deep(image):
         grey, opacity = _grey(image)
         if profile:
             grey = np.interp(grey, np.linspace(0, 1, 256), profile.grey()).astype(np.float32)

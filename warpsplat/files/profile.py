@@ -57,10 +57,11 @@ class Profile:
         return np.asarray(self.rgb(ramp), np.float32)[0].mean(axis=1) / np.float32(255)
 
 
-def profile_of(image: Image.Image, name: str = "the image") -> Profile | None:
+def profile_of(image: Image.Image, name: str | None = "the image") -> Profile | None:
     """The profile that ``image`` has, or None where it has none, or one that changes nothing.
 
-    One that cannot be used, or not with such an image, is ignored with a warning that begins with ``name``.
+    One that cannot be used, or not with such an image, is ignored; with a ``name``, with a warning that
+    begins with it.
     """
     data = image.info.get("icc_profile")
     if not data:
@@ -69,7 +70,8 @@ def profile_of(image: Image.Image, name: str = "the image") -> Profile | None:
         return _profile(data, image)
     except Exception as error:  # of broken ones Little CMS and Pillow raise several kinds
         cause = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        log.warning("%s: its colour profile is ignored: %s", name, cause)
+        if name is not None:
+            log.warning("%s: its colour profile is ignored: %s", name, cause)
         return None
 
 

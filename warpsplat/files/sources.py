@@ -11,7 +11,7 @@ import numpy.typing as npt
 from PIL import Image, ImageOps
 
 from warpsplat.errors import ImageError
-from warpsplat.files.image import MAX_PIXELS, MIN_SIDE, composited, load_image, to_srgb
+from warpsplat.files.image import MAX_PIXELS, MIN_SIDE, boxed, composited, load_image, reduced
 from warpsplat.files.inputs import MAX_INPUT, input_name, read_input
 from warpsplat.scene import FloatArray
 
@@ -65,9 +65,14 @@ def source_name(source: object, default: str = "the image") -> str:
 
 
 def image_of(
-    source: ImageSource, name: str | None = None, *, paper: float | FloatArray | None = None
+    source: ImageSource,
+    name: str | None = None,
+    *,
+    paper: float | FloatArray | None = None,
+    factor: int = 1,
 ) -> FloatArray:
-    """The pixels of ``source``, see ``load_image``; the same image gives the same ones in whatever form.
+    """The pixels of ``source``, see ``load_image``; the same image gives the same ones in whatever form, but
+    for JPEGs that are read smaller.
 
     Raises:
         ImageError: as ``load_image``, or pixels of another shape or type.
@@ -76,23 +81,24 @@ def image_of(
     name = name or source_name(source)
     if isinstance(source, np.ndarray):
         try:
-            return _of_array(source, paper)
+            pixels = _of_array(source, paper)
+            return pixels if factor == 1 else boxed(pixels, factor)
         except ImageError as error:
             raise ImageError(f"{name}: {error}") from None
     if isinstance(source, Image.Image):
-        return _of_pillow(source, name, paper)
+        return _of_pillow(source, name, paper, factor)
     if isinstance(source, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
-        return load_image(source_bytes(source), name, paper=paper)
+        return load_image(source_bytes(source), name, paper=paper, factor=factor)
     raise TypeError(
         f"an image is a path, bytes, a file, a Pillow image or an array, not {type(source).__name__}"
     )
 
 
-def _of_pillow(image: Image.Image, name: str, paper: float | FloatArray | None) -> FloatArray:
+def _of_pillow(image: Image.Image, name: str, paper: float | FloatArray | None, factor: int) -> FloatArray:
     """As ``load_image``: upright; a file that Pillow has not read yet may be damaged."""
     _check_size(image.width, image.height)
     try:
-        return to_srgb(ImageOps.exif_transpose(image), paper, name)
+        return reduced(ImageOps.exif_transpose(image), paper, factor, name)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except (OSError, ValueError, SyntaxError) as error:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from warpsplat.fit.constraints import Constraints, Drawing, Ints, Keeper
 from warpsplat.fit.loop import Progress
+from warpsplat.fit.mend import mend
 from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -105,6 +106,7 @@ def refine_drawing(
     for done in range(1, how.steps + 1):
         step.advance()
         if done % CHECK_INTERVAL == 0 or done == how.steps:
+            mend(step, renews=False)
             found, error = _look(step)
             if error < (1 - GAIN) * least:
                 gained = done

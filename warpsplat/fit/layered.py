@@ -39,7 +39,7 @@ def fit_layered(
     Arguments are those of ``fit``, and the work that comes ``after`` it (``fit.work``).
     """
     below: Scene | None = None
-    done = 0
+    done = renewed = 0
     rounds = _rounds(settings)
     steps = sum(each.iterations for each in rounds)
     height, width = image.shape[:2]
@@ -62,10 +62,11 @@ def fit_layered(
             stages=stages,
         )
         done += made.iterations
+        renewed += made.renewed
         below = made.scene
         if made.interrupted:
             break
-    return replace(made, iterations=done)
+    return replace(made, iterations=done, renewed=renewed)
 
 
 def _rounds(settings: Settings) -> list[Settings]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -11,6 +12,7 @@ import numpy as np
 from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.importance import pixel_weights
+from warpsplat.fit.mend import mend
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
@@ -52,6 +54,8 @@ class Fit:
     iterations: int
     """Steps done."""
     interrupted: bool
+    renewed: int = 0
+    """Times that a shape was set anew since a number of its was not finite."""
 
 
 def fit(
@@ -195,10 +199,23 @@ class _Run:
         if task.palette and not state.rounding and task.palette.is_due(state):
             task.palette.choose(step)
         step.advance()
+        self._mend()
         if state.step % CHECK_INTERVAL == 0 or state.step == settings.iterations:
-            step.make_room()
+            self.step.make_room()
             if task.report:
                 task.report(self.progress())
+
+    def _mend(self) -> None:
+        """Find numbers that are not finite, before the values are looked at."""
+        step, settings, done = self.step, self.step.settings, self.step.state.step
+        if self._is_due() or done % CHECK_INTERVAL == 0 or stage_at(settings, done) is not None:
+            surgical = done < settings.density.stop * settings.iterations
+            self.step = mend(step, renews=self.task.grows and surgical)
+
+    def _is_due(self) -> bool:
+        """Whether it is time for surgery."""
+        interval = self.step.settings.density.interval
+        return interval > 0 and self.step.state.step % interval == 0
 
     def progress(self) -> Progress:
         """For people."""
@@ -222,7 +239,7 @@ class _Run:
         looks = settings.viewer and task.finish and step.target.phase is task.plan[-1] and late
         if looks and not state.rounding and done % LOOK_INTERVAL == 0:
             look_at_file(step)
-        due = settings.density.interval > 0 and done % settings.density.interval == 0
+        due = self._is_due()
         if due:
             self._fit_goals()
         settings = step.settings
@@ -260,11 +277,22 @@ class _Run:
 
     def result(self) -> Fit:
         """What there is now, as that of a run that was not interrupted."""
-        step, state = self.step, self.step.state
+        self.step = step = mend(self.step, renews=False, last=True)
+        state = step.state
         if self.task.finish and not state.rounding:
             state.per_pixel = choose_grid(step, staged=False)
-        done = state.step - self.task.begin
-        return Fit(state.scene(), state.per_pixel, step.render_psnr(), step.psnr(), done, interrupted=False)
+        done, render_psnr, estimated = state.step - self.task.begin, step.render_psnr(), step.psnr()
+        if not math.isfinite(estimated):  # of a step before the last mending
+            estimated = render_psnr
+        return Fit(
+            state.scene(),
+            state.per_pixel,
+            render_psnr,
+            estimated,
+            done,
+            interrupted=False,
+            renewed=state.renewed,
+        )
 
 
 MOST = 1_000_000_000
@@ -275,13 +303,13 @@ FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
 
 def _fit_content(made: Fit) -> Content:
     """A result as numbers and arrays."""
-    numbers = {name: getattr(made, name) for name in FIGURES} | {"iterations": made.iterations}
+    numbers = {name: getattr(made, name) for name in (*FIGURES, "iterations", "renewed")}
     return Content(numbers, to_arrays(made.scene))
 
 
 def _fit_from(content: Content, start: Scene) -> Fit:
     """The result of a fit that began with ``start``."""
     figures = {name: real(content.numbers, name, -MOST, MOST) for name in FIGURES}
-    iterations = whole(content.numbers, "iterations", 0, MOST)
+    iterations, renewed = (whole(content.numbers, name, 0, MOST) for name in ("iterations", "renewed"))
     scene = from_arrays(content.arrays, start)
-    return Fit(scene, iterations=iterations, interrupted=False, **figures)
+    return Fit(scene, iterations=iterations, interrupted=False, renewed=renewed, **figures)

@@ -57,6 +57,7 @@ def record_adam(
             group,
             buffers,
             parameters.arrays,
+            broken=parameters.broken,
             kinds=sum(1 << kind for kind in attribute.kinds),
             paints=sum(1 << paint for paint in attribute.paints),
             rate=units.resolve(settings.rates[name], attribute.rate_unit),

@@ -28,6 +28,9 @@ SPARE_ROOM = 64
 FINEST = 1e7
 """Units a pixel, at the most."""
 
+MOST_RENEWED = 1 << 40
+"""Shapes that were set anew, at the most."""
+
 TARGETS = 10.0
 """What the target comes to, at the most: the image, less what a viewer shows otherwise."""
 
@@ -42,6 +45,7 @@ def step_content(step: Step) -> Content:
         "per_pixel": state.per_pixel,
         "settled": state.settled,
         "rounding": state.rounding,
+        "renewed": state.renewed,
         "colored": state.colored == state.parameters.revision,
         "generator": state.rng.bit_generator.state,
         "room": [_room(renderer) for renderer in step.renderers],
@@ -93,6 +97,7 @@ def step_from(
         base=base,
         settled=flag(numbers, "settled"),
         rounding=flag(numbers, "rounding"),
+        renewed=whole(numbers, "renewed", 0, MOST_RENEWED),
         colored=parameters.revision if flag(numbers, "colored") else -1,
     )
     step = Step(state, settings, target(settings, done - 1), began=whole(numbers, "began", 0, done))

@@ -195,6 +195,9 @@ class Settings:
     """Size the run to end within this time [s], start of the program not included."""
     max_bytes: int | None = None
     """The best file that has no more [bytes]; ``curves`` as for ``target_psnr``."""
+    max_memory: int | None = None
+    """Memory that the run may take [bytes]: a larger image is worked on at a smaller size. None: what the
+    machine has (``jobs.memory``)."""
     colors: int | None = None
     """Most different colours that the file may have; its fills are opaque then."""
     palette: tuple[str, ...] = ()
@@ -237,6 +240,7 @@ class Settings:
             ("target-psnr", self.target_psnr),
             ("time-budget", self.time_budget),
             ("max-bytes", self.max_bytes),
+            ("max-memory", self.max_memory),
         )
         for name, goal in goals:
             if goal is not None and (
@@ -317,7 +321,10 @@ class Settings:
 
     def fingerprint(self) -> str:
         """A short hash of all that decides the result."""
-        text = json.dumps(asdict(self), sort_keys=True)
+        values = asdict(self)
+        if self.max_memory is None:  # which few runs depend on
+            del values["max_memory"]
+        text = json.dumps(values, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -401,6 +408,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         given["time_budget"] = parse_duration(given["time_budget"])
     if "max_bytes" in given:
         given["max_bytes"] = parse_bytes(given["max_bytes"])
+    if "max_memory" in given:
+        given["max_memory"] = parse_bytes(given["max_memory"])
     if "palette" in given:
         given["palette"] = parse_palette(given["palette"])
     if given.get("paint", "flat") != "flat" and (given.get("colors") or given.get("palette")):

@@ -37,6 +37,8 @@ class FitState:
     """Whether coordinates are being rounded and held, in stages."""
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: there was none."""
+    renewed: int = 0
+    """Times that a shape was set anew since a number of its was not finite (``fit.mend``)."""
 
     @staticmethod
     def start(

@@ -45,7 +45,7 @@ def operate(step: Step, *, grows: bool) -> Step:
         new = densify(settings, scene, step.target.image, image, missing, state.rng, weights)
         added = added.append(new)
     if state.base:
-        added = _in_front(added, scene.take(np.arange(state.base)))
+        added = in_front(added, scene.take(np.arange(state.base)))
     state.parameters.rearrange(keep, added)
     if grows:
         _thin_outlines(step, seen[keep])
@@ -56,8 +56,8 @@ def operate(step: Step, *, grows: bool) -> Step:
     return step.after_surgery()
 
 
-def _in_front(added: Scene, base: Scene) -> Scene:
-    """New shapes as those of the level after ``base``."""
+def in_front(added: Scene, base: Scene) -> Scene:
+    """New shapes as those of the level after ``base``, the shapes of earlier ones."""
     return replace(added, layer=np.full(len(added), int(base.layer.max()) + 1, np.int32))
 
 

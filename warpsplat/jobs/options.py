@@ -97,6 +97,13 @@ OPTIONS = (
     Option("target-psnr", float, "Smallest file that has this.", metavar="DB"),
     Option("time-budget", str, "Size the run to end within 60s, 2m ...", metavar="TIME"),
     Option("max-bytes", str, "Best file within 100KB, 1MB ...", metavar="SIZE"),
+    Option(
+        "max-memory",
+        str,
+        "Memory to stay below, as 4GB: a larger image is worked on at a smaller size.",
+        "the machine's",
+        "SIZE",
+    ),
     Option("seed", int, "Random seed.", str(_defaults.seed), "N"),
     Option(
         "background",

@@ -111,6 +111,7 @@ def refine(
         iterations=made.iterations,
         seconds=seconds,
         stopped=made.interrupted,
+        renewed=made.renewed,
         missed=missed_goals(settings, score, seconds),
         history=tuple(history),
         before=before.psnr,

@@ -23,7 +23,8 @@ from warpsplat.jobs.line import draw_lines
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.geometry import enlarged
 from warpsplat.trace.pixels import cell_size, trace_pixels
 from warpsplat.trace.subject import guess_subject
 from warpsplat.trace.trace import trace
@@ -121,7 +122,7 @@ def _drawn(
     after: float,
 ) -> Fit:
     """A drawing of ``most`` regions, finished."""
-    size = enlargement(target)
+    size, whole = enlargement(target), (target.shape[1], target.shape[0])
     shown, target = target, np.ascontiguousarray(target[::size, ::size])
     traced = trace(target, most=most)
     scene = limited(traced.scene, settings)
@@ -135,7 +136,7 @@ def _drawn(
         after=after,
         stop=over,
     )
-    scene, per_pixel = enlarged(done.drawing.scene, size), done.per_pixel / size
+    scene, per_pixel = enlarged(done.drawing.scene, size, *whole), done.per_pixel / size
     return _made(scene, per_pixel, shown, backend, interrupted=bool(stop and stop()))
 
 
@@ -150,12 +151,6 @@ def enlargement(image: FloatArray) -> int:
     size, side = cell_size(image), min(image.shape[:2])
     fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_SIDE)
     return max(fits, default=1)
-
-
-def enlarged(scene: Scene, size: int) -> Scene:
-    """A scene of fills, ``size`` times as large."""
-    canvas = Canvas(scene.canvas.width * size, scene.canvas.height * size, scene.canvas.background)
-    return replace(scene, canvas=canvas, points=scene.points * size, frames=scene.frames * size)
 
 
 def limited(scene: Scene, settings: Settings) -> Scene:

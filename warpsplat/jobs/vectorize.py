@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from warpsplat._version import __version__
 from warpsplat.errors import Stopped
 from warpsplat.files.importance import load_importance
-from warpsplat.files.sources import ImageSource, image_of, source_bytes, source_name
+from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
@@ -30,6 +29,8 @@ from warpsplat.fit.step import model_for
 from warpsplat.fit.work import Meter, run_cost, score_cost
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.formats import write_named
+from warpsplat.jobs.memory import has_room_for_eyes
+from warpsplat.jobs.reduction import Memory, Reduction
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
@@ -86,6 +87,10 @@ class Result:
     """What was reported of the training, in order."""
     before: float | None = None
     """Of a refined SVG, its own PSNR [dB]."""
+    renewed: int = 0
+    """Times that a shape was set anew in training since a number of its was not finite."""
+    reduced: str = ""
+    """What was done to stay below the limit of memory, for people; empty: nothing."""
     kept: str = ""
     """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
 
@@ -116,6 +121,8 @@ class Result:
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,
+            "renewed": self.renewed,
+            "reduced": self.reduced,
             "missed": list(self.missed),
             "levels": [asdict(level) for level in self.levels],
         }
@@ -144,6 +151,7 @@ def vectorize(
     stop: Callable[[], bool] | None = None,
     write: Callable[[str], None] | None = None,
     stages: Stages | None = None,
+    reduction: Reduction | None = None,
 ) -> Result:
     """Fit shapes to ``target`` and score the file they make.
 
@@ -162,6 +170,7 @@ def vectorize(
         write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
         stages: what the run goes on from, and is told of its state. A run within a time budget, and tracing,
             begin again: the one has no two runs alike, the other has no state but its beginning.
+        reduction: of a larger image to ``target``; the file is of that one's size.
     """
     started = time.monotonic()
     fits = None if settings.time_budget else stages
@@ -222,17 +231,26 @@ def vectorize(
         made = replace(made, scene=clear)
     if settings.ids and settings.subject != "line" and settings.renderer != "gaussian":
         made = replace(made, scene=made.scene.take(by_color(made.scene)))
+    if reduction:
+        made, settings = reduction.enlarged(made), reduction.settings(settings)
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
     )
     if write:
         write(svg)
-    score = _score(svg, target, settings, stop, interrupted=made.interrupted)
+    score = _score(svg, target, settings, stop, reduction, interrupted=made.interrupted)
     render_psnr, render_ssim = made.render_psnr, None
-    if settings.renderer == "gaussian" and target.shape[0] * target.shape[1] <= settings.fine_pixels:
+    fine = not reduction and target.shape[0] * target.shape[1] <= settings.fine_pixels
+    if settings.renderer == "gaussian" and fine:
         render_psnr, render_ssim = render_figures(made.scene, target, settings, backend)
     seconds = time.monotonic() - started
+
+    def measured(text: str) -> Score:
+        if reduction:
+            return reduction.score(text, target, None)
+        return score_svg(text, target, own=True, eyes=False)
+
     return Result(
         svg=svg,
         scene=scene,
@@ -242,10 +260,12 @@ def vectorize(
         iterations=made.iterations,
         seconds=seconds,
         stopped=made.interrupted,
+        renewed=made.renewed,
         renderer=settings.renderer,
         render_ssim=render_ssim,
         missed=missed_goals(settings, score, seconds),
-        levels=_level_scores(scene, settings, made.per_pixel, target) if score and settings.levels else (),
+        levels=_level_scores(scene, settings, made.per_pixel, measured) if score and settings.levels else (),
+        reduced=reduction.words() if reduction else "",
     )
 
 
@@ -296,9 +316,11 @@ takes about a second."""
 
 def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
     """Whether a run's report has SSIMULACRA2, where it is installed: up to ``QUICK_PIXELS`` it takes a
-    twentieth of a run of the default effort; within a time budget other things are worth more.
+    twentieth of a run of the default effort; within a time budget other things are worth more, and it takes
+    much memory.
     """
-    return target.shape[0] * target.shape[1] <= QUICK_PIXELS and settings.time_budget is None
+    pixels = target.shape[0] * target.shape[1]
+    return pixels <= QUICK_PIXELS and settings.time_budget is None and has_room_for_eyes(settings, pixels)
 
 
 def _score(
@@ -306,6 +328,7 @@ def _score(
     target: FloatArray,
     settings: Settings,
     stop: Callable[[], bool] | None,
+    reduction: Reduction | None,
     *,
     interrupted: bool,
 ) -> Score | None:
@@ -315,19 +338,21 @@ def _score(
     if (interrupted and not quick) or (not interrupted and stop and stop()):
         return None
     try:
+        if reduction:
+            return reduction.score(svg, target, stop)
         return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
     except Stopped:
         return None
 
 
 def _level_scores(
-    scene: Scene, settings: Settings, per_pixel: float, target: FloatArray
+    scene: Scene, settings: Settings, per_pixel: float, measured: Callable[[str], Score]
 ) -> tuple[LevelScore, ...]:
-    """Of the files that the first layers alone make."""
+    """Of the files that the first layers alone make, as they are ``measured``."""
     found = []
     for end in (*level_ends(scene), len(scene)):
         text = export(scene.take(np.arange(end)), settings, per_pixel)
-        score = score_svg(text, target, own=True, eyes=False)
+        score = measured(text)
         found.append(LevelScore(end, score.as_dict()["psnr"]))
     return tuple(found)
 
@@ -362,14 +387,16 @@ def noting(history: list[Progress], report: Callable[[Progress], None] | None) -
     return note
 
 
-def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
+def load_target(source: ImageSource, name: str | None, background: str, factor: int = 1) -> FloatArray:
     """An image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
+
+    ``factor``: how many times smaller to read it.
 
     Raises:
         ImageError: as ``image_of``.
     """
     color = solid_color(background)
-    image = image_of(source, name, paper=color)
+    image = image_of(source, name, paper=color, factor=factor)
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
@@ -408,20 +435,30 @@ def vectorize_image(
         ImageError: ``source`` or the mask cannot be read, or their proportions differ.
         OutputError: ``output`` cannot be written.
         CheckpointError, UsageError: see ``CheckpointFile``.
+        ResourceError: the limit of memory is too low for any size.
     """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
     key = ""
+    source = _read(source)
     if keyed:
-        source, importance = _bytes(source), None if importance is None else _bytes(importance)
+        importance = None if importance is None else _read(importance)
+        assert isinstance(source, bytes), "pixels have no key"
+        assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    target = load_target(source, name, settings.background)
+    memory = Memory.of(source, settings)
+    factor = memory.factor(name, settings)
+    target = load_target(source, name, settings.background, factor)
+    chosen, why = decided(target, settings)
+    target, factor = memory.smaller(target, name, chosen, factor)
+    reduction = memory.reduction(factor, target, chosen)
     height, width = target.shape[:2]
+    if reduction:
+        height, width = reduction.height, reduction.width
     mask = None if importance is None else load_importance(importance, width, height, mask_name)
     stages = None
     if checkpoint:
         stages = checkpoint.stages(identity("vectorize", settings, target, mask), backend)
-    chosen, why = decided(target, settings)
     history: list[Progress] = []
 
     def on_paper(svg: str) -> str:
@@ -437,12 +474,13 @@ def vectorize_image(
         stop=stop,
         write=None if output is None else lambda svg: write_named(output, on_paper(svg)),
         stages=stages,
+        reduction=reduction,
     )
     if checkpoint and not result.stopped:
         checkpoint.remove()
     return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
 
 
-def _bytes(source: ImageSource) -> bytes:
-    assert not isinstance(source, (np.ndarray, Image.Image)), "pixels have no key"
-    return source_bytes(source)
+def _read(source: ImageSource) -> ImageSource:
+    """The bytes of a file; pixels, and what is no image, as they are."""
+    return source_bytes(source) if isinstance(source, (str, os.PathLike, bytes, Readable)) else source

@@ -103,6 +103,8 @@ class Parameters:
         """Of exact coverage, that there are shapes of."""
         if constants.STYLED in self.parts:
             self._upload_styles(scene)
+        self.broken = self.backend.array(wp.int32, self.shape_count)
+        """[shape] 1 where an update met a number that is not finite; it was left out."""
         owners = {
             "point": self.arrays["point_shape"],
             "shape": self._ints(shapes),
@@ -256,6 +258,33 @@ class Parameters:
     def hold(self, name: str, rows: npt.NDArray[np.bool_]) -> None:
         """From now on only the other rows of attribute ``name`` are updated; until the next ``rearrange``."""
         self.groups[name].held.assign(rows.astype(np.int32))
+
+    def take_broken(self) -> npt.NDArray[np.bool_]:
+        """Which shapes an update left out since the last call, as a number was not finite, shape (shape,).
+
+        Reads a number a shape back from the device.
+        """
+        found = self.broken.numpy() != 0
+        if found.any():
+            self.broken.zero_()
+        return np.asarray(found)
+
+    def invalid(self) -> npt.NDArray[np.bool_]:
+        """Which shapes have a value or moment that is not finite, shape (shape,). Copies all to the host."""
+        found = np.zeros(self.shape_count, np.bool_)
+        for group in self.groups.values():
+            finite = [np.isfinite(x.numpy()).all(axis=1) for x in (group.value, group.moment1, group.moment2)]
+            found[group.owner.numpy()[~np.logical_and.reduce(finite)]] = True
+        return found
+
+    def reset(self, shapes: npt.NDArray[np.bool_]) -> None:
+        """Give ``shapes`` the values that they had after the last surgery, or at the start, and no past."""
+        for name, group in self.groups.items():
+            rows = shapes[group.owner.numpy()]
+            first = getattr(self._scene, name).reshape(group.value.shape)
+            for array, values in ((group.value, first), (group.moment1, 0.0), (group.moment2, 0.0)):
+                array.assign(np.where(rows[:, None], values, array.numpy()).astype(np.float32))
+        self.arrays["ages"].assign(np.where(shapes, 0, self.arrays["ages"].numpy()).astype(np.int32))
 
     def rearrange(self, keep: IndexArray, added: Scene) -> None:
         """Keep the shapes ``keep`` (in that order) with their moments and ages, put ``added`` in front.

@@ -208,9 +208,10 @@ class Renderer:
         samples = int(self.needed_samples.numpy()[0])
         slots = int(self.needed_slots.numpy()[0])
         if samples > SAMPLE_LIMIT or slots > SLOT_LIMIT:
+            need = f"{_counted(samples)} samples and {_counted(slots)} tile slots"
             raise CapacityError(
-                f"the scene needs {samples} samples and {slots} tile slots, more than the limits of "
-                f"{SAMPLE_LIMIT} and {SLOT_LIMIT}: fewer shapes or a smaller image are needed"
+                f"the scene needs {need}, more than the limits of {SAMPLE_LIMIT} and {SLOT_LIMIT}: "
+                "fewer shapes or a smaller image are needed"
             )
         now = self.capacity
         if samples <= now.samples and slots <= now.slots:
@@ -240,6 +241,11 @@ class Renderer:
             grown = True
             self.forward()
         return grown
+
+
+def _counted(need: int) -> str:
+    """A need as ``kernels.ranges`` leaves it."""
+    return "over 2 billion" if need == constants.INT_MAX else str(need)
 
 
 def render(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpsplat.scene.attributes import Basis, Kind
-from warpsplat.scene.scene import FloatArray, Scene
+from warpsplat.scene.scene import Canvas, FloatArray, Scene
 
 PIECES = 8
 """Straight pieces a Bézier that measures are taken on."""
@@ -72,3 +74,14 @@ def bounds(scene: Scene) -> FloatArray:
         np.maximum.at(high, shapes, vertices.max(axis=1))
     pad = 0.5 * scene.widths[:, None]
     return np.concatenate([low - pad, high + pad], axis=1)
+
+
+def enlarged(scene: Scene, factor: int, width: int, height: int) -> Scene:
+    """A scene ``factor`` times as large, on a canvas of ``width`` x ``height`` units."""
+    return replace(
+        scene,
+        canvas=Canvas(width, height, scene.canvas.background),
+        points=scene.points * factor,
+        widths=scene.widths * factor,
+        frames=scene.frames * factor,
+    )

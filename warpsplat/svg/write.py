@@ -20,6 +20,7 @@ from warpsplat.svg.nest import Path, nested, painted
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
+from warpsplat.svg.valid import check_finite
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
@@ -267,7 +268,11 @@ def write_svg(
             shape is.
         title: of the picture; empty: none.
         ids: whether paths have identifiers, by their colours, and neighbours of one colour a group with one.
+
+    Raises:
+        UsageError: a number of the scene is not finite.
     """
+    check_finite(scene)
     scene = in_parts(scene)
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
@@ -298,10 +303,10 @@ def titled(title: str) -> str:
     return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
 
 
-OUR_HEAD = re.compile(
-    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" '
-    rf'viewBox="0 0 ([\d.]+) ([\d.]+)">{MARK}'
+HEAD = re.compile(
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)">'
 )
+OUR_HEAD = re.compile(HEAD.pattern + MARK)
 """How a file written here begins: its size in pixels, and that in units of its view box."""
 
 
@@ -309,11 +314,12 @@ def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> s
     """A file written here, ``scale`` px large for each pixel of its own, cut to the ``width`` x ``height`` px
     from the left and from ``top`` on.
     """
-    found = OUR_HEAD.match(text)
+    text = _plain(text)
+    found = HEAD.match(text)
     assert found
     unit = float(found[3]) / float(found[1]) / scale
     view = f"0 {top * unit:.9g} {width * unit:.9g} {height * unit:.9g}"
-    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">{MARK}'
+    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">'
     return head + text[found.end() :]
 
 

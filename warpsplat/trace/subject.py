@@ -16,6 +16,9 @@ Subject = Literal["photo", "drawing", "line", "pixel"]
 LARGEST = 1024
 """Longer side of what is looked at [px]; of a larger picture the middle."""
 
+STRIP_ROWS = 64
+"""Rows that are looked at in one go, where that is all of an image."""
+
 STEP = 24
 """Step between neighbours from which on there is an edge [levels]."""
 
@@ -71,10 +74,9 @@ def guess_subject(image: FloatArray) -> Guess:
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
     """
-    levels = np.round(np.asarray(image) * 255).astype(np.int16)
-    part = _middle(levels)
+    part = _levels(_middle(image))
     colors, counts = _colors(part)
-    cell = _cell(levels, counts)
+    cell = _cell(image, counts)
     if cell is not None:
         return Guess("pixel", f"{len(counts)} colours in cells of {cell}x{cell} px")
     step = _step(part)
@@ -93,6 +95,15 @@ def guess_subject(image: FloatArray) -> Guess:
     return Guess("photo", f"{evenness:.0%} of what is no edge is even")
 
 
+def _levels(image: FloatArray) -> Ints:
+    """In 8 bits, by strips: of a large image no further one of floats is made."""
+    levels = np.empty(image.shape, np.int16)
+    for top in range(0, len(image), STRIP_ROWS):
+        rows = slice(top, top + STRIP_ROWS)
+        levels[rows] = np.round(np.asarray(image[rows]) * 255)
+    return levels
+
+
 def _colors(levels: Ints) -> tuple[Ints, Ints]:
     """The colours of a picture and how many pixels have each."""
     packed = np.zeros(levels.shape[:2], np.int64)
@@ -103,10 +114,10 @@ def _colors(levels: Ints) -> tuple[Ints, Ints]:
     return (keys[:, None] >> shifts) & 255, counts
 
 
-def _middle(levels: Ints) -> Ints:
-    height, width = levels.shape[:2]
+def _middle(image: FloatArray) -> FloatArray:
+    height, width = image.shape[:2]
     top, left = max(0, height - LARGEST) // 2, max(0, width - LARGEST) // 2
-    return levels[top : top + LARGEST, left : left + LARGEST]
+    return image[top : top + LARGEST, left : left + LARGEST]
 
 
 def _step(levels: Ints) -> Ints:
@@ -121,11 +132,12 @@ def _step(levels: Ints) -> Ints:
     return step
 
 
-def _cell(levels: Ints, counts: Ints) -> int | None:
+def _cell(image: FloatArray, counts: Ints) -> int | None:
     """Side of the cells that pixel art is made of [px]; None for other pictures."""
-    height, width = levels.shape[:2]
+    height, width = image.shape[:2]
     if len(counts) > PIXEL_COLORS or len(counts) < 2:
         return None
+    levels = _levels(image)
     columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
     rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
     cell = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))

@@ -1,0 +1,78 @@
+"""Prefix sums as ranges; what 32 bits do not hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import warp as wp
+
+from tests.helpers import renderer_for
+from tests.scenes import random_scene
+from warpsplat.errors import CapacityError
+from warpsplat.kernels import constants
+from warpsplat.kernels.ranges import bounded_product
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.ranges import record_ranges
+from warpsplat.scene import Kind
+
+CAPACITY = 100
+
+
+def ranges_of(counts: list[int], device: str, *, reverse: bool = False) -> tuple[np.ndarray, int]:
+    """Ranges, shape (count, 2), and the need."""
+    backend = Backend.on(device)
+    wanted = wp.array(np.array(counts, np.int32), dtype=wp.int32, device=device)
+    ends, first, last = (backend.array(wp.int32, len(wanted)) for _ in range(3))
+    needed = backend.array(wp.int32, 1)
+    program = backend.program()
+    record_ranges(program, wanted, ends, first, last, needed, capacity=CAPACITY, reverse=reverse)
+    program.run()
+    return np.stack([first.numpy(), last.numpy()], axis=1), int(needed.numpy()[0])
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_what_does_not_fit_is_left_out_whole_and_counted(device: str, reverse: bool) -> None:
+    ranges, needed = ranges_of([40, 0, 30, 31, 5], device, reverse=reverse)
+    sizes = (ranges[:, 1] - ranges[:, 0])[:: -1 if reverse else 1]
+    assert sizes.tolist() == [40, 0, 30, 0, 0]
+    assert needed == 106
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        [2**30, 2**30],
+        [10, 2**31 - 1, 5],
+        # Round to where they began: the last total is small, as is that of the fifth.
+        [2**30, 2**30, 2**30, 2**30, 7],
+        [2**30, 2**30, 2**30, 2**30, 7, 2**30, 2**30, 2**30, 2**30, 7],
+    ],
+)
+def test_a_sum_beyond_32_bits_is_noticed(device: str, counts: list[int]) -> None:
+    ranges, needed = ranges_of(counts, device)
+    assert needed == constants.INT_MAX
+    assert (ranges[:, 0] <= ranges[:, 1]).all()
+    used = ranges[ranges[:, 1] > ranges[:, 0]]
+    assert (used >= 0).all() and (used <= CAPACITY).all(), "nothing is written outside of the arrays"
+
+
+def test_such_a_scene_is_refused_in_a_line(device: str) -> None:
+    renderer = renderer_for(random_scene(Kind.FILL, 2), device)
+    renderer.needed_slots.fill_(constants.INT_MAX)
+    with pytest.raises(CapacityError, match=r"needs \d+ samples and over 2 billion tile slots") as caught:
+        renderer.make_room()
+    assert "\n" not in str(caught.value)
+
+
+@wp.kernel
+def products(a: wp.array[wp.int32], b: wp.array[wp.int32], out: wp.array[wp.int32]):  # type: ignore[no-untyped-def]
+    i = wp.tid()
+    out[i] = bounded_product(a[i], b[i])  # type: ignore[index]
+
+
+def test_counts_do_not_wrap(device: str) -> None:
+    pairs = [(3, 4), (2**20, 2**20), (2**31 - 1, 2**31 - 1), (-(2**31), 5), (0, 9)]
+    a, b = (wp.array(np.array(x, np.int32), dtype=wp.int32, device=device) for x in zip(*pairs, strict=True))
+    out = wp.zeros(len(pairs), dtype=wp.int32, device=device)
+    wp.launch(products, len(pairs), inputs=[a, b, out], device=device)
+    assert out.numpy().tolist() == [12, constants.COUNT_MAX, constants.COUNT_MAX, 0, 0]
