@@ -59,6 +59,8 @@ TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
 
 TILE_PIXELS = TILE * TILE
+QUAD = 4
+"""Pixels of a column that are copied to rows of pixels at a time."""
 
 GAUSSIAN_MIN = 1.0 / 255.0
 """A Gaussian weaker than this is cut: it changes no 8-bit colour."""

@@ -96,17 +96,17 @@ class Engine:
 
     def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
         film = self._renderer.film
-        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS)
+        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS // constants.QUAD)
         anything = backend.array(wp.vec4, 1, 1)
 
         def record(kernel: wp.Kernel, tiles: wp.array) -> Program:
             program = backend.program()
             program.launch(
                 kernel,
-                (viewport.tile_count, constants.TILE),
+                (viewport.tile_count, constants.TILE // constants.QUAD),
                 viewport,
                 pixels=anything,
-                image_pixels=view(tiles, wp.float32, shape),
+                image_quads=view(tiles, wp.vec4, shape),
                 split=True,
             )
             return program
