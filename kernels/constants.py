@@ -83,6 +83,12 @@ backward, and a clamped Gaussian has no gradient."""
 TRANSMITTANCE_MIN = 1.0e-4
 """A pixel that lets less light through than this is finished: what lies behind changes no 8-bit colour."""
 
+SEEN = 0.5 / 255.0
+"""Opacity from which on a shape hides the black that pictures that are not premultiplied begin with."""
+
+NOTHING = 1.0e-4
+"""Opacity of a pixel below which its colour is no longer divided by it."""
+
 SPREAD = 2.0 / 3.0
 """1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""
 

@@ -1,8 +1,8 @@
 """Images by tiles <-> rows of pixels, as the rest of the world has them.
 
-A thread has four rows of a tile and takes four pixels at a time, one below the other: in each plane these lie side
-by side. All 16 rows in one thread are slower, as those of a picture whose rows are a multiple of 4 KiB share a set
-of the cache; a row a thread is slower, as it takes number by number.
+A thread has four rows of a tile and takes four pixels at a time, one below the other: in each plane these
+lie side by side. All 16 rows in one thread are slower, as those of a picture whose rows are a multiple of
+4 KiB share a set of the cache; a row a thread is slower, as it takes number by number.
 """
 
 import warp as wp
@@ -24,7 +24,7 @@ def tiles_to_pixels(
     height: wp.int32,  # [px]
     tiles_x: wp.int32,
     # Out:
-    pixels: wp.array2d[wp.vec4],  # [height, width] sRGB premultiplied by opacity, and opacity
+    pixels: wp.array2d[wp.vec4],  # [height, width] sRGB and opacity
 ):
     """One thread four rows of pixels of a tile. Of three planes the opacity is 1."""
     i, part = wp.tid()
