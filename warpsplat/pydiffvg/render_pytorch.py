@@ -10,10 +10,11 @@ from typing import Any
 import torch
 
 from warpsplat.errors import UsageError
-from warpsplat.pydiffvg.arguments import SceneArguments, take_down
+from warpsplat.pydiffvg.arguments import SceneArguments
 from warpsplat.pydiffvg.assemble import LAYOUTS, assemble, outlines_only
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
+from warpsplat.pydiffvg.reading import read
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 from warpsplat.pydiffvg.straight import over
 from warpsplat.torch import SceneTensors, render
@@ -70,7 +71,7 @@ class RenderFunction:
         if output_type != OutputType.color or (eval_positions is not None and len(eval_positions)):
             raise UsageError("signed distances (OutputType.sdf, eval_positions) are not there, only colours")
         (filter or PixelFilter()).check()
-        return [take_down(canvas_width, canvas_height, shapes, shape_groups, get_device())]
+        return [read(canvas_width, canvas_height, shapes, shape_groups, get_device())]
 
     @staticmethod
     def apply(
