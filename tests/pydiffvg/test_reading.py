@@ -105,7 +105,7 @@ def test_gradients_can_be_zeroed_in_place_and_optimised() -> None:
     trained = [shapes[4].points, groups[0].fill_color, shapes[1].radius]  # type: ignore[union-attr]
     for value in trained:
         value.requires_grad_()  # type: ignore[union-attr]
-    optimizer = torch.optim.Adam(trained, lr=0.1)  # type: ignore[arg-type]
+    optimizer = torch.optim.Adam(trained, lr=0.1)
     losses = []
     for _ in range(4):
         optimizer.zero_grad(set_to_none=False)

@@ -36,14 +36,18 @@ class Flat(torch.autograd.Function):
         """Shape (number,)."""
         ctx.shapes = [tensor.shape for tensor in tensors]
         constants = torch.tensor([0.0, 1.0], device=tensors[0].device)
-        return torch.cat([constants, *(tensor.reshape(-1) for tensor in tensors)])
+        # A view takes microseconds, of hundreds of tensors; those of one dimension need none.
+        return torch.cat([constants, *(each if each.dim() == 1 else each.reshape(-1) for each in tensors)])
 
     @staticmethod
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
         """The part of each."""
         parts = grad[2:].split([shape.numel() for shape in ctx.shapes])
         each = zip(parts, ctx.shapes, ctx.needs_input_grad, strict=True)
-        return tuple(part.view(shape) if needed else None for part, shape, needed in each)
+        return tuple(
+            None if not needed else part if len(shape) == 1 else part.view(shape)
+            for part, shape, needed in each
+        )
 
 
 class PaintPlace(NamedTuple):
