@@ -59,6 +59,8 @@ TILE = 16
 """Tile edge [px]; the paper (and 3D Gaussian splatting) bins into 16x16 tiles."""
 
 TILE_PIXELS = TILE * TILE
+QUAD = 4
+"""Pixels of a column that are copied to rows of pixels at a time."""
 
 GAUSSIAN_MIN = 1.0 / 255.0
 """A Gaussian weaker than this is cut: it changes no 8-bit colour."""
@@ -80,6 +82,12 @@ backward, and a clamped Gaussian has no gradient."""
 
 TRANSMITTANCE_MIN = 1.0e-4
 """A pixel that lets less light through than this is finished: what lies behind changes no 8-bit colour."""
+
+SEEN = 0.5 / 255.0
+"""Opacity from which on a shape hides the black that pictures that are not premultiplied begin with."""
+
+NOTHING = 1.0e-4
+"""Opacity of a pixel below which its colour is no longer divided by it."""
 
 SPREAD = 2.0 / 3.0
 """1 / rho of the paper's eq. 6: standard deviation as a fraction of the distance between samples."""

@@ -78,7 +78,7 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
         np.testing.assert_array_equal(getattr(scenes[0], name), getattr(scenes[1], name))
 
 
-OF_TORCH = {"pixels", "composite_opaque"}
+OF_TORCH = {"pixels", "composite_opaque", "composite_straight"}
 """Kernels of passes that are no steps: those of ``warpsplat.torch``."""
 
 

@@ -6,6 +6,7 @@ import torch
 
 from tests.reference.curves import Tensors
 from tests.reference.paint import pixel_paint
+from warpsplat.kernels.constants import NOTHING, SEEN
 from warpsplat.scene import Scene
 
 
@@ -27,3 +28,11 @@ def composite(coverages: list[torch.Tensor], p: Tensors, scene: Scene, scale: fl
         opaque = torch.cat([color, torch.ones_like(color[..., :1])], dim=-1)
         image = alpha * opaque + (1 - alpha) * image
     return image if solid is None else image[..., :3]
+
+
+def straight(coverages: list[torch.Tensor], p: Tensors, scene: Scene) -> torch.Tensor:
+    """Means of colours that are not premultiplied, black where nothing is; of a scene on nothing."""
+    image = composite(coverages, p, scene)
+    seen = [cover for cover, opacity in zip(coverages, p["opacities"], strict=True) if opacity > SEEN]
+    hit = torch.stack(seen).sum(dim=0).clamp(max=1)[..., None]
+    return torch.cat([image[..., :3] / image[..., 3:].clamp(min=NOTHING) * hit, image[..., 3:]], dim=-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -31,7 +32,7 @@ class Form(NamedTuple):
     """Structure of a shape."""
 
     kind: str
-    """``path``, ``round`` or ``rect``."""
+    """``path``, ``circle``, ``ellipse`` or ``rect``."""
     counts: tuple[int, ...]
     """Control points of each segment."""
     closed: bool
@@ -54,23 +55,24 @@ class Plan(NamedTuple):
     one_width: bool
     """Whether all its shapes have one and the same tensor as width."""
     line: Line | None
+    is_mapped: bool
+    """Whether its map changes anything."""
 
 
-class Outline(NamedTuple):
-    """Tensors of a shape: the points of a path, centre and radius of an ellipse, corners of a rectangle."""
+@dataclass(frozen=True)
+class Structure:
+    """What of a scene is no tensor."""
 
-    values: tuple[Tensor, ...]
-    width: Tensor
-    """Shape () or (point,)."""
+    forms: tuple[Form, ...]
+    plans: tuple[Plan, ...]
 
+    @functools.cached_property
+    def _hash(self) -> int:
+        return hash((self.forms, self.plans))
 
-class Paints(NamedTuple):
-    """Tensors of a group."""
-
-    fill: Color
-    stroke: Color
-    matrix: Tensor | None
-    """Shape (3, 3); None: it changes nothing."""
+    def __hash__(self) -> int:
+        """Computed once: a scene that stays asks for it every step."""
+        return self._hash
 
 
 @dataclass(frozen=True)
@@ -79,10 +81,10 @@ class SceneArguments:
 
     width: int
     height: int
-    forms: tuple[Form, ...]
-    outlines: tuple[Outline, ...]
-    plans: tuple[Plan, ...]
-    paints: tuple[Paints, ...]
+    structure: Structure
+    tensors: tuple[Tensor, ...]
+    """Of each shape the points of a path, centre and radius of an ellipse or corners of a rectangle, and the
+    width; then of each group those of its fill, of its stroke, and its map: see ``flat.places_of``."""
 
 
 def take_down(
@@ -93,18 +95,17 @@ def take_down(
     Raises:
         UsageError: something of it cannot be rendered.
     """
-    forms, outlines = [], []
+    forms, plans, tensors = [], [], []
     for number, shape in enumerate(shapes):
-        form, outline = _shape(shape, f"shape {number}", device)
+        form, values = _shape(shape, f"shape {number}", device)
         forms.append(form)
-        outlines.append(outline)
-    plans, paints = [], []
+        tensors += values
     widths = [id(shape.stroke_width) for shape in shapes]
     for number, group in enumerate(groups):
-        plan, paint = _group(group, f"group {number}", widths, device)
+        plan, values = _group(group, f"group {number}", widths, device)
         plans.append(plan)
-        paints.append(paint)
-    return SceneArguments(int(width), int(height), tuple(forms), tuple(outlines), tuple(plans), tuple(paints))
+        tensors += values
+    return SceneArguments(int(width), int(height), Structure(tuple(forms), tuple(plans)), tuple(tensors))
 
 
 def _tensor(value: Tensor, shape: tuple[int, ...], name: str, device: torch.device) -> Tensor:
@@ -124,29 +125,41 @@ def _tensor(value: Tensor, shape: tuple[int, ...], name: str, device: torch.devi
     return value.to(device, torch.float32)
 
 
-def _shape(shape: Shape, name: str, device: torch.device) -> tuple[Form, Outline]:
-    values: tuple[Tensor, ...]
+def _shape(shape: Shape, name: str, device: torch.device) -> tuple[Form, list[Tensor]]:
     if isinstance(shape, (Path, Polygon)):
         points = _tensor(shape.points, (-1, 2), f"points of {name}", device)
         form = Form("path", _counts(shape, len(points), name), bool(shape.is_closed), len(points), False)
-        values = (points,)
+        values = [points]
     elif isinstance(shape, Rect):
         form = Form("rect", CORNERS, True, 4, False)
-        values = tuple(_tensor(p, (2,), f"corner of {name}", device) for p in (shape.p_min, shape.p_max))
+        values = [_tensor(p, (2,), f"corner of {name}", device) for p in (shape.p_min, shape.p_max)]
     elif isinstance(shape, (Circle, Ellipse)):
-        form = Form("round", RING, True, 12, False)
-        radius = shape.radius.reshape(()).expand(2) if isinstance(shape, Circle) else shape.radius
-        values = (
+        kind = "circle" if isinstance(shape, Circle) else "ellipse"
+        form = Form(kind, RING, True, 12, False)
+        values = [
             _tensor(shape.center, (2,), f"center of {name}", device),
-            _tensor(radius, (2,), f"radius of {name}", device),
-        )
+            _number(shape.radius, f"radius of {name}", device)
+            if isinstance(shape, Circle)
+            else _tensor(shape.radius, (2,), f"radius of {name}", device),
+        ]
     else:
         raise UsageError(f"{name} is a {type(shape).__name__}, no shape of pydiffvg")
     width = shape.stroke_width
-    if width.numel() == 1:
-        return form, Outline(values, _tensor(width.reshape(()), (), f"stroke_width of {name}", device))
-    form = form._replace(tapers=True)
-    return form, Outline(values, _tensor(width, (form.points,), f"stroke_width of {name}", device))
+    if isinstance(width, Tensor) and width.numel() != 1:
+        form = form._replace(tapers=True)
+        return form, [*values, _tensor(width, (form.points,), f"stroke_width of {name}", device)]
+    return form, [*values, _number(width, f"stroke_width of {name}", device)]
+
+
+def _number(value: Tensor, name: str, device: torch.device) -> Tensor:
+    """``value`` where it is rendered: one number, in whatever shape.
+
+    Raises:
+        UsageError: it is none.
+    """
+    if isinstance(value, Tensor) and value.numel() == 1:
+        return _tensor(value, tuple(value.shape), name, device)
+    return _tensor(value, (), name, device)
 
 
 def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
@@ -168,48 +181,51 @@ def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
     return counts
 
 
-def _group(group: ShapeGroup, name: str, widths: Sequence[int], device: torch.device) -> tuple[Plan, Paints]:
+def _group(
+    group: ShapeGroup, name: str, widths: Sequence[int], device: torch.device
+) -> tuple[Plan, list[Tensor]]:
     """``widths``: which tensor is each shape's width."""
     ids = tuple(map(int, group.shape_ids.tolist()))
     for i in ids:
         if not 0 <= i < len(widths):
             raise UsageError(f"{name} names shape {i}, there are {len(widths)}")
-    fill, fill_plan = _paint(group.fill_color, f"fill_color of {name}", device)
-    stroke, stroke_plan = _paint(group.stroke_color, f"stroke_color of {name}", device)
+    fill, fill_tensors = _paint(group.fill_color, f"fill_color of {name}", device)
+    stroke, stroke_tensors = _paint(group.stroke_color, f"stroke_color of {name}", device)
     matrix = _matrix(group.shape_to_canvas, name, device)
     plan = Plan(
         ids,
-        fill_plan,
-        stroke_plan,
+        fill,
+        stroke,
         bool(group.use_even_odd_rule),
         matrix is None or _is_uniform(matrix),
         len({widths[i] for i in ids}) <= 1,
         getattr(group, "line", None),
+        matrix is not None,
     )
-    return plan, Paints(fill, stroke, matrix)
+    return plan, [*fill_tensors, *stroke_tensors, *([] if matrix is None else [matrix])]
 
 
-def _paint(color: Color, name: str, device: torch.device) -> tuple[Color, tuple[str, int] | None]:
-    """A paint, its kind, and the number of its stops.
+def _paint(color: Color, name: str, device: torch.device) -> tuple[tuple[str, int] | None, list[Tensor]]:
+    """Kind of a paint and the number of its stops; its tensors.
 
     Raises:
         UsageError: it is none.
     """
     if color is None:
-        return None, None
+        return None, []
     if isinstance(color, Tensor):
-        return _tensor(color, (4,), name, device), ("flat", 0)
+        return ("flat", 0), [_tensor(color, (4,), name, device)]
     if not isinstance(color, (LinearGradient, RadialGradient)):
         raise UsageError(f"{name} is a {type(color).__name__}, neither a tensor nor a gradient")
     stops = len(color.offsets)
     offsets = _tensor(color.offsets, (-1,), f"offsets of {name}", device)
     colors = _tensor(color.stop_colors, (max(stops, 1), 4), f"stop_colors of {name}", device)
     if isinstance(color, LinearGradient):
-        begin, end = (_tensor(p, (2,), f"end of {name}", device) for p in (color.begin, color.end))
-        return LinearGradient(begin, end, offsets, colors), ("linear", stops)
+        ends = [_tensor(p, (2,), f"end of {name}", device) for p in (color.begin, color.end)]
+        return ("linear", stops), [*ends, offsets, colors]
     center = _tensor(color.center, (2,), f"center of {name}", device)
     radius = _tensor(color.radius, (2,), f"radius of {name}", device)
-    return RadialGradient(center, radius, offsets, colors), ("radial", stops)
+    return ("radial", stops), [center, radius, offsets, colors]
 
 
 def _matrix(matrix: Tensor, name: str, device: torch.device) -> Tensor | None:

@@ -10,13 +10,15 @@ from typing import Any
 import torch
 
 from warpsplat.errors import UsageError
-from warpsplat.pydiffvg.arguments import SceneArguments, take_down
+from warpsplat.pydiffvg.arguments import SceneArguments
 from warpsplat.pydiffvg.assemble import LAYOUTS, assemble, outlines_only
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
+from warpsplat.pydiffvg.reading import read
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
-from warpsplat.pydiffvg.straight import Straight, over
-from warpsplat.torch import render
+from warpsplat.pydiffvg.straight import over
+from warpsplat.torch import SceneTensors, render
+from warpsplat.torch.function import draw
 
 Tensor = torch.Tensor
 
@@ -69,7 +71,7 @@ class RenderFunction:
         if output_type != OutputType.color or (eval_positions is not None and len(eval_positions)):
             raise UsageError("signed distances (OutputType.sdf, eval_positions) are not there, only colours")
         (filter or PixelFilter()).check()
-        return [take_down(canvas_width, canvas_height, shapes, shape_groups, get_device())]
+        return [read(canvas_width, canvas_height, shapes, shape_groups, get_device())]
 
     @staticmethod
     def apply(
@@ -125,22 +127,24 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
             )
     size = width, height
     layout = LAYOUTS.get(scene, size, device)
-    if not layout.rows:
+    if not len(layout.scene):
         return torch.zeros(height, width, 4, device=device) if background is None else background
-    tensors = assemble(scene, layout, size, device)
-    if not bool(tensors.values["points"].isfinite().all()):
+    values = assemble(scene, layout, size, device)
+    if not bool(values["points"].isfinite().all()):
         raise UsageError(
             "a point of a shape is not finite: an optimiser has run away, or a shape has no size"
         )
     if _print_timing:
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
         began = time.perf_counter()
-    image = render(tensors, width, height)
-    if background is not None and bool((background[..., 3] >= 1).all()):
-        result = image + (1 - image[..., 3:]) * background
+    if background is None:
+        result = draw([layout.picture(torch.get_num_threads())], [values])[0]
     else:
-        faint = render(outlines_only(tensors, layout), width, height)
-        result = Straight.apply(image, faint) if background is None else over(image, faint, background)
+        image = render(SceneTensors(layout.scene, values), width, height)
+        if bool((background[..., 3] >= 1).all()):
+            result = image + (1 - image[..., 3:]) * background
+        else:
+            result = over(image, render(outlines_only(values, layout), width, height), background)
     if _print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result

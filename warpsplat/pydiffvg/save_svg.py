@@ -136,14 +136,16 @@ class _Group:
     def _area(self, shape: Shape) -> None:
         """A stroke whose width changes, as a fill."""
         scene = take_down(1, 1, [shape], [], torch.device("cpu"))
-        blend = segments_of(scene.forms[0], False)
+        form = scene.structure.forms[0]
+        points, width = scene.tensors
+        blend = segments_of(form, False)
         index, weight = torch.from_numpy(blend.which), torch.from_numpy(blend.weight)
-        segments = (weight[..., None] * scene.outlines[0].values[0][index]).sum(dim=-2)
-        radii = (weight * scene.outlines[0].width[index]).sum(dim=-1)
+        segments = (weight[..., None] * points[index]).sum(dim=-2)
+        radii = (weight * width[index]).sum(dim=-1)
         data = ""
-        for ring in ring_points(segments[None], radii[None], scene.forms[0].closed):
-            points = torch.cat([ring[:, 0], ring[:1, 0]]).tolist()
-            data += f"M{_text(points[0])}C{_text(x for point in points[1:] for x in point)}Z"
+        for ring in ring_points(segments[None], radii[None], form.closed):
+            first, *rest = torch.cat([ring[:, 0], ring[:1, 0]]).tolist()
+            data += f"M{_text(first)}C{_text(x for point in rest for x in point)}Z"
         self._add("path", {"d": data, **self._paint(self._group.stroke_color, "fill")})
 
     def _paint(self, color: Color, name: str) -> dict[str, str]:
@@ -214,12 +216,12 @@ def path_data(shape: Shape) -> str:
             data += f" {COMMANDS[count]} {_text(x for point in own for x in point)}"
             at += count + 1
         return data + (" Z" if shape.is_closed else "")
-    form = take_down(1, 1, [shape], [], torch.device("cpu"))
+    first, second, *_ = take_down(1, 1, [shape], [], torch.device("cpu")).tensors
     if isinstance(shape, Polygon):
         return f"M {_text(shape.points.flatten())}" + (" Z" if shape.is_closed else "")
     if isinstance(shape, Rect):
-        (x, y), (right, bottom) = (p.tolist() for p in form.outlines[0].values)
+        (x, y), (right, bottom) = first.tolist(), second.tolist()
         return f"M {_text([x, y])} H {_text([right])} V {_text([bottom])} H {_text([x])} Z"
-    (x, y), (across, down) = (p.tolist() for p in form.outlines[0].values)
+    (x, y), (across, down) = first.tolist(), second.expand(2).tolist()
     arc = f"A {_text([across, down])} 0 0 1"
     return f"M {_text([x + across, y])} {arc} {_text([x - across, y])} {arc} {_text([x + across, y])} Z"

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import composite, composite_opaque, composite_paint, constants, visibility
+from warpsplat.kernels import (
+    composite,
+    composite_opaque,
+    composite_paint,
+    composite_straight,
+    constants,
+    visibility,
+)
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -53,6 +60,10 @@ class Film:
         """Whether all is flat and opaque behind."""
         return self.planes == 3 and paint.is_flat
 
+    def _light(self, bins: Bins) -> wp.array:
+        """Where the adjoints of opaque shapes keep what light arrives at each slot."""
+        return self._backend.array(column, bins.buffers.list_slot.shape[0], self._backend.lanes)
+
     def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record lists and coverages -> ``image``."""
         plain = self._is_plain(paint)
@@ -75,11 +86,7 @@ class Film:
         more = {}
         if self._opaque:
             kernel = composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward
-            slots = bins.buffers.list_slot.shape[0]
-            more = {
-                "background": self._background,
-                "light": self._backend.array(column, slots, self._backend.lanes),
-            }
+            more = {"background": self._background, "light": self._light(bins)}
         program.launch(
             kernel,
             self._dim,
@@ -131,5 +138,44 @@ class Film:
             paint.buffers,
             lane_columns=self._backend.lane_size,
             seen=seen,
+            split=True,
+        )
+
+
+class StraightFilm(Film):
+    """A transparent one whose colours are not premultiplied (``kernels.composite_straight``)."""
+
+    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas) -> None:
+        super().__init__(backend, viewport, canvas, opaque=True)
+        self._hit = backend.array(column, viewport.tile_count, constants.TILE)
+
+    def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+        """See ``Film``."""
+        program.launch(
+            composite_straight.straight_forward,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            hit=self._hit,
+            split=True,
+        )
+
+    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+        """See ``Film``."""
+        program.launch(
+            composite_straight.straight_backward,
+            self._dim,
+            self.buffers,
+            bins.buffers,
+            coverage.buffers,
+            paint.buffers,
+            lane_columns=self._backend.lane_size,
+            law=coverage.law,
+            hit=self._hit,
+            light=self._light(bins),
+            sum_grad=coverage.buffers.coverage,
             split=True,
         )

@@ -13,7 +13,7 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins
-from warpsplat.rendering.film import Film
+from warpsplat.rendering.film import Film, StraightFilm
 from warpsplat.rendering.models import EXACT, Job, Model
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.parameters import Parameters
@@ -72,6 +72,7 @@ class Renderer:
         model: Model = EXACT,
         capacity: Capacity | None = None,
         opaque: bool = False,
+        straight: bool = False,
     ) -> None:
         """Record the stages.
 
@@ -81,11 +82,16 @@ class Renderer:
             model: of coverage.
             capacity: without, a guess that ``make_room`` mends.
             opaque: whether shapes may have opacities beyond OPACITY_RANGE, and gradients even so.
+            straight: whether colours are not premultiplied; on a transparent canvas, with any opacities.
         """
         self.parameters, self.viewport = parameters, viewport
         self.backend = parameters.backend
-        self.model, self._opaque = model, opaque
-        self.film = Film(self.backend, viewport, parameters.canvas, opaque=opaque)
+        self.model, self._opaque = model, opaque or straight
+        self.film = (
+            StraightFilm(self.backend, viewport, parameters.canvas)
+            if straight
+            else Film(self.backend, viewport, parameters.canvas, opaque=opaque)
+        )
         self.needed_samples = self.backend.array(wp.int32, 1)
         self.needed_slots = self.backend.array(wp.int32, 1)
         shapes = parameters.shape_count

@@ -8,7 +8,7 @@ import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 import warp as wp
@@ -46,11 +46,13 @@ class Picture:
     threads: int
     opaque: bool
     """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
+    straight: bool = False
+    """Whether colours are not premultiplied."""
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
         """Equal where the same engine serves."""
-        return layout_key(self.layout), self.viewport, self.model, self.device, self.threads, self.opaque
+        return layout_key(self.layout), *(getattr(self, each.name) for each in fields(self)[1:])
 
 
 STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait.name for trait in TRAITS))
@@ -77,7 +79,11 @@ class Engine:
         backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
         self._parameters = Parameters(picture.layout, backend)
         self._renderer = Renderer(
-            self._parameters, picture.viewport, model=picture.model, opaque=picture.opaque
+            self._parameters,
+            picture.viewport,
+            model=picture.model,
+            opaque=picture.opaque,
+            straight=picture.straight,
         )
         names = {attribute.name for attribute in attributes_of(picture.layout)}
         for name in self._parameters.groups.keys() - names:
@@ -96,17 +102,17 @@ class Engine:
 
     def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
         film = self._renderer.film
-        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS)
+        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS // constants.QUAD)
         anything = backend.array(wp.vec4, 1, 1)
 
         def record(kernel: wp.Kernel, tiles: wp.array) -> Program:
             program = backend.program()
             program.launch(
                 kernel,
-                (viewport.tile_count, constants.TILE),
+                (viewport.tile_count, constants.TILE // constants.QUAD),
                 viewport,
                 pixels=anything,
-                image_pixels=view(tiles, wp.float32, shape),
+                image_quads=view(tiles, wp.vec4, shape),
                 split=True,
             )
             return program

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import torch
@@ -63,9 +63,18 @@ def render(
     given = [[(a.name, one.value(a)) for a in attributes_of(one.layout)] for one in scenes]
     for each in given:
         check_finite(each)
-    names = tuple(tuple(name for name, _ in each) for each in given)
-    images: Tensor = _Render.apply(pictures, names, *(value for each in given for _, value in each))
+    images = draw(pictures, [dict(each) for each in given])
     return images.squeeze(0) if isinstance(scene, SceneTensors) else images
+
+
+def draw(pictures: Sequence[Picture], values: Sequence[Mapping[str, Tensor]]) -> Tensor:
+    """Pictures of one size and device from all attributes that their shapes have, unchecked.
+
+    Shape (picture, height, width, 4).
+    """
+    names = tuple(map(tuple, values))
+    images: Tensor = _Render.apply(pictures, names, *(value for each in values for value in each.values()))
+    return images
 
 
 def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
@@ -130,7 +139,7 @@ class _Render(torch.autograd.Function):
     """Pictures, names of the attributes of each, and these one after the other -> images."""
 
     @staticmethod
-    def forward(ctx: Any, pictures: list[Picture], names: Names, *values: Tensor) -> Tensor:
+    def forward(ctx: Any, pictures: Sequence[Picture], names: Names, *values: Tensor) -> Tensor:
         viewport, device = pictures[0].viewport, pictures[0].device
         shape = len(pictures), viewport.height, viewport.width, 4
         images = torch.empty(shape, dtype=torch.float32, device=device)
