@@ -181,7 +181,7 @@ def adjoint(stages: Stages) -> str:
         f'<g stroke="{INK}" stroke-width="4" marker-end="url(#head)">{arrows}</g>',
         dots(points, 5, INK),
     ]
-    return figure((0, -50, ZOOM * v.width, ZOOM * v.height), body)
+    return figure((0, -68, ZOOM * v.width, ZOOM * v.height), body)
 
 
 def gradients(stages: Stages, wanted: Array) -> tuple[Array, Array]:

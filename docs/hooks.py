@@ -52,6 +52,11 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     return re.sub(r"^<!-- (\S+): (\w+) -->$", lambda m: part(m[1], m[2]), markdown, flags=re.MULTILINE)
 
 
+def on_page_content(text: str, **_: Any) -> str:
+    """Mark code that is short enough for one line: ``--curves N`` is not to break at its hyphens."""
+    return re.sub(r"<code>(?=[^<]{1,24}</code>)", '<code class="short">', text)
+
+
 def part(file: str, name: str) -> str:
     """What lies between ``<!-- name -->`` and ``<!-- /name -->``.
 
@@ -66,10 +71,17 @@ def part(file: str, name: str) -> str:
 
 
 def linked(text: str) -> str:
-    """Markdown with links among the repository's files as links among the site's pages."""
+    """Markdown with links among the repository's files as links among the site's pages, with their titles."""
     for page, source in PAGES.items():
         text = re.sub(rf"\]\(({re.escape(REPOSITORY)})?{source}", f"]({page}", text)
+    text = re.sub(r"\[(docs/\w+\.md)\]", lambda m: f"[{title(m[1])}]", text)
     return re.sub(rf"\]\(({re.escape(REPOSITORY)})?docs/", "](", text)
+
+
+def title(page: str) -> str:
+    """The first heading of a page of the repository."""
+    found = re.search(r"^# (.*)$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
+    return found[1] if found else page
 
 
 def command_help(name: str) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """The pictures of the tutorial: draws what it starts from, then runs its commands.
 
-``python docs/pictures.py [NAME ...]`` writes ``docs/images/sources`` and ``tutorial``; or results of names.
+``python docs/pictures.py [NAME ...]`` writes ``docs/images/sources`` and the results of these names, or all.
 """
 
 from __future__ import annotations
@@ -95,8 +95,11 @@ COLORS = {"#": "#3b2a2a", "o": "#e2873b", "-": "#b9602a", "p": "#f2a7a0", "w": "
 
 CAT = "docs/images/cat.jpg"
 SOURCES = "docs/images/sources"
+FIRST = "docs/images"
 RESULTS = "docs/images/tutorial"
 COMMANDS = {
+    "cat": f"vectorize {CAT} --curves 512 --closed",
+    "cat-strokes": f"vectorize {CAT} --curves 512 --open",
     "16": f"vectorize {CAT} --curves 16",
     "64": f"vectorize {CAT} --curves 64",
     "256": f"vectorize {CAT} --curves 256",
@@ -108,7 +111,7 @@ COMMANDS = {
     "sketch": f"vectorize {SOURCES}/sketch.jpg --subject line",
     "sprite": f"vectorize {SOURCES}/sprite.png",
 }
-"""By the names of the results."""
+"""By the names of the results: the first two are the README's, the others the tutorial's."""
 
 
 def sprite() -> Image.Image:
@@ -167,7 +170,8 @@ def main(names: list[str]) -> None:
         if name == "own":
             own_loss()
             continue
-        line = f"{COMMANDS[name]} -o {RESULTS}/{name}.svg"
+        folder = FIRST if name.startswith("cat") else RESULTS
+        line = f"{COMMANDS[name]} -o {folder}/{name}.svg"
         print(line, flush=True)
         subprocess.run([sys.executable, "-m", "warpsplat", *shlex.split(line)], check=True)
 

@@ -47,5 +47,7 @@ def main(first: str, second: str, output: str, steps: int = 150, curves: int = 1
 
 
 if __name__ == "__main__":
+    if len(sys.argv) <= 3:
+        sys.exit(f"usage: {sys.argv[0]} FIRST SECOND OUTPUT.webp [STEPS]")
     found = main(*sys.argv[1:4], *map(int, sys.argv[4:]))
     print(f"mean squared errors of the ends: {found[0]:.5f}, {found[1]:.5f}")

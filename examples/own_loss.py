@@ -33,5 +33,7 @@ def main(source: str, output: str, steps: int = 200, curves: int = 200) -> list[
 
 
 if __name__ == "__main__":
+    if len(sys.argv) <= 2:
+        sys.exit(f"usage: {sys.argv[0]} IMAGE OUTPUT.svg [STEPS]")
     found = main(*sys.argv[1:3], *map(int, sys.argv[3:]))
     print(f"loss {found[0]:.4f} -> {found[-1]:.4f}")

@@ -69,5 +69,7 @@ def main(source: str, output: str, weights: str, steps: int = 60, curves: int = 
 
 
 if __name__ == "__main__":
+    if len(sys.argv) <= 3:
+        sys.exit(f"usage: {sys.argv[0]} IMAGE OUTPUT.svg WEIGHTS.pth [STEPS]")
     found = main(*sys.argv[1:4], *map(int, sys.argv[4:]))
     print(f"loss {found[0]:.4f} -> {found[-1]:.4f}")

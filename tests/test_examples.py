@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import runpy
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -107,6 +108,13 @@ def test_the_notebook_runs(cat: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(shown) == 4
     assert scope["losses"][-1] < scope["losses"][0]
     assert str(shown[-1]).startswith("<svg")
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))
+def test_a_script_without_files_says_which_it_takes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", [name])
+    with pytest.raises(SystemExit, match=rf"usage: .*{name} "):
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
 
 
 def test_all_examples_are_listed() -> None:

@@ -207,7 +207,7 @@ def test_what_is_not_there_says_so() -> None:
     with pytest.raises(UsageError, match="a point of a shape is not finite"):
         render([pydiffvg.Circle(tensor(float("nan")), tensor(9, 9))], [group])
     with pytest.raises(UsageError, match="background_image has shape"):
-        render([shape], [group], torch.zeros(SIZE, SIZE, 3))
+        render([shape], [group], torch.zeros(SIZE, 9, 4))
 
 
 def test_a_device_that_is_not_there() -> None:

@@ -15,6 +15,7 @@ import torch
 
 from warpsplat.errors import ImageError
 from warpsplat.pydiffvg.color import Color
+from warpsplat.pydiffvg.device import nearest
 from warpsplat.pydiffvg.motion import Motion
 from warpsplat.pydiffvg.render_pytorch import RenderFunction
 from warpsplat.pydiffvg.save_svg import path_data, rgb_text
@@ -247,12 +248,12 @@ class OptimizableSvg:
             settings: what is optimised.
             optimize_background: whether ``background``, for the caller to composite on, is as well.
             verbose: whether to print what is read.
-            device: of its tensors.
+            device: of its tensors, or the nearest that there is.
 
         Raises:
             ImageError: not an SVG, or with something that shapes cannot show.
         """
-        self.settings, self.device = settings or SvgOptimizationSettings(), torch.device(device)
+        self.settings, self.device = settings or SvgOptimizationSettings(), nearest(device)
         path = FilePath(filename)
         text = read_svg_text(path)
         try:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path as FilePath
+from xml.etree import ElementTree
 
 import numpy as np
 import torch
@@ -24,8 +25,11 @@ from warpsplat.svg.structure import read_shapes
 
 Tensor = torch.Tensor
 
+Scene = tuple[int, int, list[Shape], list[ShapeGroup]]
+"""Width and height of the canvas, shapes, and groups of them."""
 
-def svg_to_scene(filename: str | FilePath) -> tuple[int, int, list[Shape], list[ShapeGroup]]:
+
+def svg_to_scene(filename: str | FilePath) -> Scene:
     """Canvas width and height, shapes and groups of an SVG file; the canvas is the ``viewBox``.
 
     Raises:
@@ -34,16 +38,29 @@ def svg_to_scene(filename: str | FilePath) -> tuple[int, int, list[Shape], list[
     path = FilePath(filename)
     text = read_svg_text(path)
     try:
-        width, height, scale = _canvas(text)
-        drawn = read_shapes(text, width, height, scale, see_through=True)
-        shapes: list[Shape] = []
-        groups: list[ShapeGroup] = []
-        for one in _groups(drawn):
-            paths, group = _group(one, len(shapes))
-            shapes += paths
-            groups.append(group)
+        return _scene_of(text)
     except ImageError as error:
         raise ImageError(f"{path}: {error}") from error
+
+
+def parse_scene(node: ElementTree.Element) -> Scene:
+    """The same of the root element of a document, as ``ElementTree.fromstring`` gives it.
+
+    Raises:
+        ImageError: see ``svg_to_scene``.
+    """
+    return _scene_of(ElementTree.tostring(node, encoding="unicode"))
+
+
+def _scene_of(text: str) -> Scene:
+    width, height, scale = _canvas(text)
+    drawn = read_shapes(text, width, height, scale, see_through=True)
+    shapes: list[Shape] = []
+    groups: list[ShapeGroup] = []
+    for one in _groups(drawn):
+        paths, group = _group(one, len(shapes))
+        shapes += paths
+        groups.append(group)
     return width, height, shapes, groups
 
 

@@ -22,13 +22,13 @@ from warpsplat.torch.function import draw
 
 Tensor = torch.Tensor
 
-_print_timing = False
+print_timing = False
 
 
 def set_print_timing(val: bool) -> None:
     """Whether each forward pass prints how long it took."""
-    global _print_timing  # noqa: PLW0603 - DiffVG's interface
-    _print_timing = val
+    global print_timing  # noqa: PLW0603 - DiffVG's interface
+    print_timing = val
 
 
 class OutputType(IntEnum):
@@ -53,7 +53,7 @@ class RenderFunction:
         use_prefiltering: bool = False,
         eval_positions: Tensor | None = None,
     ) -> list[Any]:
-        """A scene as further arguments of ``apply``.
+        """A scene as further arguments of ``apply``; the first two are width and height of its canvas.
 
         Args:
             canvas_width: [canvas units]
@@ -71,7 +71,8 @@ class RenderFunction:
         if output_type != OutputType.color or (eval_positions is not None and len(eval_positions)):
             raise UsageError("signed distances (OutputType.sdf, eval_positions) are not there, only colours")
         (filter or PixelFilter()).check()
-        return [read(canvas_width, canvas_height, shapes, shape_groups, get_device())]
+        scene = read(canvas_width, canvas_height, shapes, shape_groups, get_device())
+        return [canvas_width, canvas_height, scene]
 
     @staticmethod
     def apply(
@@ -91,7 +92,7 @@ class RenderFunction:
             num_samples_x: not read: a pixel is the mean over its whole area.
             num_samples_y: the same.
             seed: not read: nothing is random.
-            background_image: sRGB and opacity, shape (height, width, 4).
+            background_image: sRGB and opacity, shape (height, width, 4); or sRGB, (height, width, 3).
             args: what ``serialize_scene`` gave.
 
         Returns:
@@ -101,9 +102,9 @@ class RenderFunction:
         Raises:
             UsageError: arguments that are none, a background of another shape, points that are not finite.
         """
-        if len(args) != 1 or not isinstance(args[0], SceneArguments):
+        if len(args) != 3 or not isinstance(args[2], SceneArguments):
             raise UsageError("RenderFunction.apply takes what RenderFunction.serialize_scene gave, unchanged")
-        return render_scene(args[0], int(width), int(height), background_image)
+        return render_scene(args[2], int(width), int(height), background_image)
 
     @staticmethod
     def render_grad(*_: Any) -> Tensor:
@@ -121,6 +122,8 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
     device = get_device()
     if background is not None:
         background = background.to(device, torch.float32)
+        if background.shape[2:] == (3,):
+            background = torch.nn.functional.pad(background, (0, 1), value=1.0)
         if tuple(background.shape) != (height, width, 4):
             raise UsageError(
                 f"background_image has shape {tuple(background.shape)}, not ({height}, {width}, 4)"
@@ -134,7 +137,7 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
         raise UsageError(
             "a point of a shape is not finite: an optimiser has run away, or a shape has no size"
         )
-    if _print_timing:
+    if print_timing:
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
         began = time.perf_counter()
     if background is None:
@@ -145,6 +148,6 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
             result = image + (1 - image[..., 3:]) * background
         else:
             result = over(image, render(outlines_only(values, layout), width, height), background)
-    if _print_timing:
+    if print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result

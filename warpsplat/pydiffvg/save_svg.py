@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Sequence
 from pathlib import Path as FilePath
 from xml.etree import ElementTree
@@ -29,6 +30,7 @@ def save_svg(
     shapes: Sequence[Shape],
     shape_groups: Sequence[ShapeGroup],
     use_gamma: bool = False,
+    background: str | None = None,
 ) -> None:
     """Write a scene as an SVG file.
 
@@ -39,11 +41,14 @@ def save_svg(
         shapes: see ``RenderFunction.serialize_scene``.
         shape_groups: the same.
         use_gamma: whether viewers raise all that is drawn to 1 / 2.2, as ``imwrite`` does.
+        background: style of the whole, as ``background: #fff``, for browsers, as in LIVE's copy of DiffVG.
     """
     root = ElementTree.Element(
         "svg",
         {"version": "1.1", "xmlns": "http://www.w3.org/2000/svg", "width": str(width), "height": str(height)},
     )
+    if background is not None:
+        root.set("style", background)
     definitions = ElementTree.SubElement(root, "defs")
     drawing = ElementTree.SubElement(root, "g")
     if use_gamma:
@@ -56,6 +61,13 @@ def save_svg(
     path = FilePath(filename)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+def prettify(elem: Element) -> str:
+    """An XML element as indented text."""
+    copied = copy.deepcopy(elem)
+    ElementTree.indent(copied)
+    return ElementTree.tostring(copied, encoding="unicode", xml_declaration=True)
 
 
 def _gamma(definitions: Element) -> None:
