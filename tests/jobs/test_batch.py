@@ -86,7 +86,7 @@ def test_whatever_an_image_throws_is_its_own_failure(
     error: BaseException,
     words: str,
 ) -> None:
-    def load(data: bytes, name: str, *, paper: object) -> np.ndarray:
+    def load(data: bytes, name: str, *, paper: object, factor: int) -> np.ndarray:
         if name.endswith("a.png"):
             raise error
         return np.full((24, 32, 3), 0.5, np.float32)
