@@ -102,14 +102,13 @@ def run_file(
     device: str,
     threads: int | None,
     importance: Path | None = None,
-    keyed: bool = False,
     verbose: int = 0,
     quiet: bool = False,
     **keeping: Any,
 ) -> Result:
     """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask. ``keyed``, and what says how to keep its state: see there.
+    ``importance``: file of a mask. ``keeping``: how its state is kept, see there.
     """
     pursued = settings.target_psnr or settings.max_bytes
     start_warp()
@@ -129,7 +128,6 @@ def run_file(
             threads=threads,
             name=input_name(source),
             importance=importance,
-            keyed=keyed,
             callback=report,
             stop=interrupt,
             **keeping,

@@ -43,6 +43,8 @@ class Task:
     """Whether the worker brings the result's bytes (``Outcome.data``) instead of writing ``output``."""
     measure: bool = False
     """Whether ``output`` is there already, and only its figures are wanted."""
+    result: bytes | None = None
+    """Its bytes, where it is to be measured and the worker does not see it."""
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
 
 
 def _measured(task: Task, key: str, image: bytes) -> Outcome:
-    data = read_input(Path(task.output), "an SVG")
+    data = read_input(Path(task.output), "an SVG") if task.result is None else task.result
     target = load_target(image, task.name, task.settings.background)
     score = score_svg(svg_text(data, task.output), target, eyes=False)
     return Outcome(task.number, "measured", key=key, digest=digest(data), figures=score.as_dict())
