@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import io
+import weakref
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,6 +22,9 @@ from warpsplat.files.whole import load_whole
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs import memory
 from warpsplat.jobs.memory import container_limits, factor_for, memory_limit, need
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import Kind
 
 HUGE = Facts(12_000, 9_000, 3, 4, drafts=True)
@@ -178,3 +184,27 @@ def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
     # As good as a run at full size, but for the luck of two steps.
     usual = warpsplat.vectorize(data, **QUICK)
     assert usual.reduced == "" and usual.score and own.psnr > usual.score.psnr - 2
+
+
+def test_nothing_of_a_run_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays go with the last reference to them, before the collector of cycles runs."""
+    made: list[weakref.ref[object]] = []
+    for kind in (Renderer, Program, Parameters):
+        create = kind.__init__
+
+        def noted(self: object, *given: object, _create: Any = create, **named: object) -> None:
+            made.append(weakref.ref(self))
+            _create(self, *given, **named)
+
+        monkeypatch.setattr(kind, "__init__", noted)
+    gc.collect()
+    gc.disable()
+    try:
+        for paint in ("flat", "auto"):
+            warpsplat.vectorize(
+                picture(), iterations=30, curves=6, subject="photo", paint=paint, device="cpu"
+            )
+        left = [type(each()).__name__ for each in made if each() is not None]
+    finally:
+        gc.enable()
+    assert len(made) > 10 and left == []

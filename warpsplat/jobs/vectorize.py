@@ -33,6 +33,7 @@ from warpsplat.jobs.memory import has_room_for_eyes
 from warpsplat.jobs.reduction import Memory, Reduction
 from warpsplat.jobs.subjects import decided, draw
 from warpsplat.metrics import Score, psnr, score_svg, ssim
+from warpsplat.native import release_memory
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
@@ -233,6 +234,7 @@ def vectorize(
         made = replace(made, scene=made.scene.take(by_color(made.scene)))
     if reduction:
         made, settings = reduction.enlarged(made), reduction.settings(settings)
+    release_memory()
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
@@ -376,11 +378,19 @@ def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tup
     return tuple(missed)
 
 
+RELEASE_INTERVAL = 10
+"""Reports of a run from one release of memory to the next: a release takes as long as a step does."""
+
+
 def noting(history: list[Progress], report: Callable[[Progress], None] | None) -> Callable[[Progress], None]:
-    """What notes in ``history`` all that it is told, and passes it on to ``report``."""
+    """What notes in ``history`` all that it is told, and passes it on to ``report``; and has memory that is
+    free handed back now and then.
+    """
 
     def note(progress: Progress) -> None:
         history.append(progress)
+        if len(history) % RELEASE_INTERVAL == 0:
+            release_memory()
         if report:
             report(progress)
 
@@ -451,6 +461,7 @@ def vectorize_image(
     target = load_target(source, name, settings.background, factor)
     chosen, why = decided(target, settings)
     target, factor = memory.smaller(target, name, chosen, factor)
+    release_memory()
     reduction = memory.reduction(factor, target, chosen)
     height, width = target.shape[:2]
     if reduction:
@@ -478,6 +489,7 @@ def vectorize_image(
     )
     if checkpoint and not result.stopped:
         checkpoint.remove()
+    release_memory()
     return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
 
 
