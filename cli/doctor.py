@@ -23,7 +23,7 @@ def command(device: str, as_json: bool) -> None:
     seconds, in which kernels are compiled where they are not yet. What is
     broken comes with a hint; the exit code is 7 then.
     """
-    from warpsplat.jobs.doctor import checks
+    from warpsplat.doctor import checks
 
     found = []
     for check in checks(device):

@@ -112,12 +112,13 @@ def run_file(
     """
     pursued = settings.target_psnr or settings.max_bytes
     start_warp()
+    chosen = choose_device(device)  # an unknown one is found before a bar is shown
     if verbose:
         number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
         if settings.simplify and pursued:
             number = "no more than needed"
         plural = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
-        say(f"{source}: {number} {plural} on {choose_device(device)}", err=True)
+        say(f"{source}: {number} {plural} on {chosen}", err=True)
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         result = vectorize(

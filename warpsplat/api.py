@@ -449,9 +449,9 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
         ImageError: either cannot be read, or their proportions differ.
     """
     name = _svg_name(svg)
-    target = image_of(image)
+    target, text = image_of(image), _text(svg, name)
     try:
-        return score_svg(_text(svg, name), target)
+        return score_svg(text, target)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
 

@@ -11,7 +11,7 @@ import pytest
 import warp as wp
 
 from tests.cli.helpers import run
-from warpsplat.jobs import doctor
+from warpsplat import doctor
 from warpsplat.rendering.renderer import Renderer
 
 

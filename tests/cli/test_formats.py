@@ -107,7 +107,7 @@ def test_other_endings_are_refused_before_any_work(
     inputs = {"vectorize": (image,), "refine": ("a.svg", image), "render": ("a.svg",)}[command]
     assert run(command, *inputs, "-o", image.parent / name) == 2
     known = ".png or .pdf" if command == "render" else ".svg, .svgz, .png or .pdf"
-    assert one_line(capsys.readouterr().err).endswith(f"its name ends with {known}")
+    assert one_line(capsys.readouterr().err).endswith(f"a result's name ends with {known}")
 
 
 def test_a_missing_package_is_named_before_any_work(

@@ -142,3 +142,24 @@ def test_completion_imports_nothing_heavy() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.decode().split() == ["plain,--quality", "plain,--quiet"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--size", "3"], "not a size: '3'"),
+        (["--page", "b5"], "page must be one of"),
+        (["--units", "ell"], "units must be one of"),
+        (["--size", "9x9mm", "--page", "a4"], "size and page do not go together"),
+    ],
+)
+def test_a_size_that_is_none_is_found_before_any_work(
+    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("vectorize", "missing.png", *options) == 2
+    assert words in one_line(capsys.readouterr().err)
+
+
+def test_names_are_said_once(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("eval", image, image) == 3
+    assert one_line(capsys.readouterr().err) == f"warpsplat: {image}: not an SVG"

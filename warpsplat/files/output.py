@@ -72,7 +72,7 @@ def check_output(path: Path, *sources: Path, endings: tuple[str, ...] = (), over
         _check_output(path, sources)
         if endings and path.suffix.lower() not in endings:
             known = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
-            raise UsageError(f"{path}: says no type that the result can have; its name ends with {known}")
+            raise UsageError(f"{path}: is no kind of result; a result's name ends with {known}")
         if not overwrite and not may_replace(path):
             raise UsageError(f"{path}: exists and was not written by warpsplat; --overwrite replaces it")
     except (OSError, ValueError) as error:

@@ -33,6 +33,9 @@ from warpsplat.svg.write import path_sizes
 
 Stop = Callable[[], bool]
 
+MEASURED = 4.0
+"""Looks at files that a run takes: most are for the choice of its grid."""
+
 LAST_STEPS = 0.2
 """Share of the run that is done again where shapes went or came."""
 
@@ -90,7 +93,7 @@ class Pursuit:
         height, width = self.image.shape[:2]
         begin = (1 - share) * settings.iterations
         measured = score_cost(width, height, self.backend, eyes=False)
-        return run_cost(settings, width, height, begin) + measured
+        return run_cost(settings, width, height, begin) + MEASURED * measured
 
     def seconds(self, share: float) -> float | None:
         """A share of the time that is left."""

@@ -444,6 +444,10 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
     if settings.renderer == "gaussian" and settings.paint != "flat":
         raise UsageError("renderer gaussian needs the paint flat")
+    if settings.size or settings.page or settings.units:
+        from warpsplat.svg.page import check_placing  # brings what writes files
+
+        check_placing(settings.size, settings.page, settings.units)
     return settings
 
 

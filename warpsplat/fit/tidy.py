@@ -28,8 +28,8 @@ from warpsplat.svg.write import GRIDS, rounded, write_svg
 ROUNDS = 16
 """In which candidates are tried, at the most."""
 
-USUAL_ROUNDS = 8
-"""How many there are in most drawings, as progress is shown."""
+POINTS_A_ROUND = 110
+"""Of a traced drawing: how many rounds there will be, as progress is shown."""
 
 ROUND_REFITS, GRID_REFITS = 2.5, 5.0
 """What a round, and choosing the grid, take, in times that a drawing is fitted anew."""
@@ -105,7 +105,8 @@ def finish_drawing(
     refit = REFIT.steps * step_cost(Settings(), Phase(*target.shape[1::-1]), len(drawing.scene))
     rounds, last = ROUND_REFITS * refit, (3 + GRID_REFITS) * refit
     first = how.steps / REFIT.steps * refit
-    drawing = refined(drawing, how, meter.stage(first, USUAL_ROUNDS * rounds + last))
+    usual = min(len(drawing.joints) / POINTS_A_ROUND, ROUNDS)
+    drawing = refined(drawing, how, meter.stage(first, usual * rounds + last))
 
     def told(later: float) -> Report | None:
         return meter.stage(rounds, later * rounds + last)

@@ -52,7 +52,7 @@ SHAPE_COST = 0.01
 STROKE_COST, SPLAT_COST = 2.5, 4.0
 """Factors of strokes, and of splats."""
 
-EYES_COST, SCORE_COST = 80.0, 20.0
+EYES_COST, SCORE_COST = 95.0, 20.0
 """Of measuring a file of that size: with SSIMULACRA2 and without."""
 
 GPU_THREADS = 30

@@ -29,8 +29,10 @@ POINT_RATE = 0.12
 WIDTH_RATE = 0.06
 """Of widths [px]."""
 
-TOUR_WORK = 0.3
-"""What comes after the refinement, over what that takes."""
+THIN_WORK, TOUR_WORK = 0.25, 0.7
+"""What the refinement takes, over that of strokes as wide as a photograph's, and what their order takes over
+that (``fit.work``).
+"""
 
 FINE_PIXELS = 1_000_000
 """Largest size of the image that the refinement sees [pixels]."""
@@ -101,7 +103,7 @@ def _fitted(
         importance = 1 - traced.areas.cover
         ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
     fitted = line_settings(settings, len(lines))
-    cost = run_cost(fitted, lines.canvas.width, lines.canvas.height)
+    cost = THIN_WORK * run_cost(fitted, lines.canvas.width, lines.canvas.height)
     made = fit(
         inked(ink, lines),
         fitted,

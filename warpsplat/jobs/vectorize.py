@@ -179,6 +179,7 @@ def vectorize(
     traced = scene is None and settings.subject not in {"auto", "photo"}
     height, width = target.shape[:2]
     after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
+    after += len(settings.levels) * score_cost(width, height, backend, eyes=False)
     pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(

@@ -104,6 +104,22 @@ def _checked(sheet: Sheet, name: str) -> Sheet:
     return sheet
 
 
+def check_placing(size: str, page: str, unit: str) -> None:
+    """Whether ``placed`` will understand these.
+
+    Raises:
+        UsageError: as there.
+    """
+    if size and page:
+        raise UsageError("size and page do not go together")
+    if size:
+        parse_size(size, unit or "mm")
+    elif page:
+        parse_page(page, 1, 1, unit=unit or "mm")
+    elif unit:
+        check_unit(unit)
+
+
 def placed(text: str, size: str, page: str, unit: str) -> str:
     """A file written here as large as options ask for.
 
@@ -116,8 +132,7 @@ def placed(text: str, size: str, page: str, unit: str) -> str:
     Raises:
         UsageError: one of them is not understood, or both a size and a page are given.
     """
-    if size and page:
-        raise UsageError("size and page do not go together")
+    check_placing(size, page, unit)
     if not (size or page or unit):
         return text
     found = HEAD.match(text)
