@@ -12,6 +12,12 @@ import warpsplat
 from warpsplat.torch import Module, SceneTensors, render
 
 
+def opaque(path: str) -> Image.Image:
+    """A picture on white: all shapes are seen then, and none hides in black where nothing is."""
+    image = Image.open(path).convert("RGBA")
+    return Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
+
+
 def fitted(scene: warpsplat.Scene, wanted: torch.Tensor, steps: int) -> tuple[Module, float]:
     """The shapes of ``scene`` as they show ``wanted``, and the mean squared error that is left."""
     module = Module(scene)
@@ -33,10 +39,9 @@ def between(a: SceneTensors, b: SceneTensors, share: float) -> SceneTensors:
 
 def main(first: str, second: str, output: str, steps: int = 150, curves: int = 120) -> list[float]:
     """Mean squared errors of both ends."""
-    a = warpsplat.load_image(first)[..., :3]
-    size = (a.shape[1], a.shape[0])
-    b = warpsplat.load_image(Image.open(second).convert("RGB").resize(size))
-    start, start_error = fitted(warpsplat.starting_scene(first, curves), torch.tensor(a), steps)
+    image = opaque(first)
+    a, b = warpsplat.load_image(image), warpsplat.load_image(opaque(second).resize(image.size))
+    start, start_error = fitted(warpsplat.starting_scene(image, curves), torch.tensor(a), steps)
     end, end_error = fitted(start.scene(), torch.tensor(b), 2 * steps)
     with torch.no_grad():
         shares = [i / 12 for i in (*range(13), *range(11, 0, -1))]
