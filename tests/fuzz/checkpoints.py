@@ -74,11 +74,11 @@ def arguments(name: str) -> tuple[str, ...]:
 
 def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:
     """Bytes of the file changed; or of a part of it, with checksums that are right: it gets past the door."""
-    if rng.random() < 0.25:
+    if rng.random() < 0.2:
         return mutate.mutate_bytes(rng, data, other)
     parts, others = _parts(data), _parts(other)
-    for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        place = rng.randrange(len(parts)) if rng.random() < 0.6 else 0
+    for _ in range(rng.choice((1, 1, 1, 1, 3))):
+        place = rng.randrange(len(parts)) if rng.random() < 0.8 else 0
         name, part = parts[place]
         action = rng.randrange(10)
         if place == 0:
@@ -114,6 +114,8 @@ def _other_numbers(rng: random.Random, part: bytes) -> bytes:
     whole = array.dtype == np.int32
     for _ in range(rng.choice((1, 1, 2, 8)) if len(flat) else 0):
         other = rng.choice(mutate.INTERESTING) if whole else rng.choice(FLOATS)
+        if rng.random() < 0.7:  # another one's, which is one that there may be
+            other = rng.choice(flat)
         flat[rng.randrange(len(flat))] = np.int64(other).astype(np.int32) if whole else other
     if rng.random() < 0.15:
         array = array[: rng.randrange(len(array) + 1)]
