@@ -28,6 +28,9 @@ PROGRAM = 280 << 20
 STRIPS = 96 << 20
 """Of what is done strip by strip."""
 
+DRAWN = 96 << 20
+"""Of the strips of a file that are drawn side by side."""
+
 TRAINED = 160
 """Of a pixel of the finest size: target, render, gradient, weights, maps of the error, a look at the file."""
 
@@ -44,9 +47,6 @@ SHAPE = 24 << 10
 
 TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 """Of a pixel, by subject."""
-
-GUESSED = 20
-"""Of a pixel of a picture with few colours, to tell what it shows."""
 
 SHOWN, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
 """Of a pixel, to measure a file: its picture, both images at half the size, the same where a side is odd, and
@@ -87,8 +87,6 @@ def need(facts: Facts, settings: Settings, factor: int = 1) -> Need:
     image = 4 * facts.channels * worked
     drafted = min(factor, 8) ** 2 if facts.drafts else 1
     reading = image + facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
-    if settings.subject == "auto":
-        reading = max(reading, image + GUESSED * worked)
     working = image + (
         TRACED[settings.subject] * worked if settings.subject in TRACED else _fitting(facts, settings, factor)
     )
@@ -115,7 +113,8 @@ def _scoring(facts: Facts, settings: Settings, pixels: float) -> float:
     else:
         odd = facts.width % 2 or facts.height % 2
         per_pixel = SHOWN + (HALVES_ODD if odd else HALVES) + (UNCUT if settings.minify else 0)
-    return STRIPS + per_pixel * pixels
+    strips = STRIPS if pixels <= WHOLE_PIXELS else STRIPS + DRAWN
+    return strips + per_pixel * pixels
 
 
 def has_room_for_eyes(settings: Settings, pixels: int) -> bool:

@@ -101,8 +101,7 @@ OPTIONS = (
         "max-memory",
         str,
         "Memory to stay below, as 4GB: a larger image is worked on at a smaller size.",
-        "the machine's",
-        "SIZE",
+        metavar="SIZE",
     ),
     Option("seed", int, "Random seed.", str(_defaults.seed), "N"),
     Option(

@@ -96,12 +96,8 @@ def guess_subject(image: FloatArray) -> Guess:
 
 
 def _levels(image: FloatArray) -> Ints:
-    """In 8 bits, by strips: of a large image no further one of floats is made."""
-    levels = np.empty(image.shape, np.int16)
-    for top in range(0, len(image), STRIP_ROWS):
-        rows = slice(top, top + STRIP_ROWS)
-        levels[rows] = np.round(np.asarray(image[rows]) * 255)
-    return levels
+    """In 8 bits."""
+    return np.round(np.asarray(image) * 255).astype(np.int16)
 
 
 def _colors(levels: Ints) -> tuple[Ints, Ints]:
@@ -137,9 +133,7 @@ def _cell(image: FloatArray, counts: Ints) -> int | None:
     height, width = image.shape[:2]
     if len(counts) > PIXEL_COLORS or len(counts) < 2:
         return None
-    levels = _levels(image)
-    columns = np.flatnonzero((np.diff(levels, axis=1) != 0).any(axis=(0, 2))) + 1
-    rows = np.flatnonzero((np.diff(levels, axis=0) != 0).any(axis=(1, 2))) + 1
+    columns, rows = _borders(image)
     cell = int(np.gcd.reduce(np.concatenate([columns, rows, [width, height]])))
     across, down = width // cell, height // cell
     if cell > 1:
@@ -148,7 +142,17 @@ def _cell(image: FloatArray, counts: Ints) -> int | None:
     frequent = counts[counts >= max(3, 0.002 * width * height)].sum()
     if max(width, height) > SMALL or frequent < 0.97 * width * height:
         return None
-    return None if _antialiased(levels) else 1
+    return None if _antialiased(_levels(image)) else 1
+
+
+def _borders(image: FloatArray) -> tuple[Ints, Ints]:
+    """Columns and rows where some pixel differs from the one before, by strips."""
+    across, down = np.zeros(image.shape[1] - 1, np.bool_), np.zeros(image.shape[0] - 1, np.bool_)
+    for top in range(0, len(down), STRIP_ROWS):
+        levels = _levels(image[top : top + STRIP_ROWS + 1])
+        across |= (np.diff(levels, axis=1) != 0).any(axis=(0, 2))
+        down[top : top + STRIP_ROWS] = (np.diff(levels, axis=0) != 0).any(axis=(1, 2))
+    return np.flatnonzero(across) + 1, np.flatnonzero(down) + 1
 
 
 def _antialiased(levels: Ints) -> bool:
