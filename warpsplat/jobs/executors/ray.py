@@ -1,9 +1,9 @@
 """Tasks on a Ray cluster; an extra, ``pip install "warpsplat[ray]"``.
 
-Workers are actors: processes that the cluster starts where it has room, and that are kept, so that each starts
-Warp and loads kernels once; while they work they say how far they are, and hear that they should stop. They
-write no files: results are brought, and written here. So a worker that the cluster has given up, but that
-lives on somewhere, can replace nothing.
+Workers are actors: processes that the cluster starts where it has room, and that are kept, so that each
+starts Warp and loads kernels once; while they work they say how far they are, and hear that they should stop.
+They write no files: all results are brought. So a worker that the cluster has given up, but that lives on
+somewhere, can replace nothing.
 """
 
 from __future__ import annotations
@@ -15,17 +15,14 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from pathlib import Path
 from types import ModuleType, TracebackType
 
 from warpsplat._version import __version__
-from warpsplat.errors import ImageError, OutputError, ResourceError, UsageError, printable
-from warpsplat.files.output import write_result
+from warpsplat.errors import ImageError, ResourceError, UsageError, printable
 from warpsplat.jobs.executors.ray_connection import cause_of, connected
 from warpsplat.jobs.executors.ray_worker import Need, Worker
 from warpsplat.jobs.executors.tasks import Advance, Outcome, Stop, Task
-from warpsplat.jobs.executors.work import failure, make_folder
+from warpsplat.jobs.executors.work import failure
 
 log = logging.getLogger("warpsplat")
 
@@ -49,7 +46,7 @@ STILLBORN = 3
 
 
 class RayCluster:
-    """An ``Executor``, see there."""
+    """An ``Executor``, see there; every result is brought, whatever its task says."""
 
     def __init__(self, address: str = "", *, workers: int | None = None, gpus: float = 1.0) -> None:
         """Nothing is connected to before there is a task.
@@ -221,7 +218,7 @@ class RayCluster:
         if task is None:
             self._greeted(worker, said)
         elif isinstance(said, Outcome):
-            return self._written(task, said)
+            return said
         else:
             self._unseen |= {(worker.node, os.path.dirname(path)) for path in said}
             self._again.append(task)
@@ -256,18 +253,6 @@ class RayCluster:
         log.warning("%s: its worker on %s was lost (%d so far); it is done again", name, node, self.lost)
         self._again.append(task)
         return None
-
-    def _written(self, task: Task, outcome: Outcome) -> Outcome:
-        """Write what a worker brought, where it was to be written."""
-        if task.bring or outcome.data is None:
-            return outcome
-        try:
-            make_folder(Path(task.output).parent)
-            write_result(Path(task.output), outcome.data)
-        except OutputError as error:
-            text = failure(error, task.name, task.output)
-            return Outcome(task.number, "failed", key=outcome.key, error=text)
-        return replace(outcome, data=None)
 
     def _end_tasks(self, advance: Advance) -> Iterator[Outcome]:
         """End the tasks that are in work: with the best so far, where that comes soon."""

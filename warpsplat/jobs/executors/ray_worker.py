@@ -84,6 +84,7 @@ class Worker:
             if self.need.gpus
             else "cpu",  # Ray shows a process the GPUs that it may use, no more
             threads=self.need.cpus,
+            result=sent(task.output) if task.measure else None,
             bring=True,
         )
         self.answer = self._actor.do.remote(whole, tuple(sights))

@@ -43,6 +43,8 @@ class Task:
     """Whether the worker brings the result's bytes (``Outcome.data``) instead of writing ``output``."""
     measure: bool = False
     """Whether ``output`` is there already, and only its figures are wanted."""
+    result: Source | None = None
+    """What is to be measured, where the worker does not see ``output``."""
 
 
 @dataclass(frozen=True)

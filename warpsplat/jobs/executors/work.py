@@ -53,13 +53,13 @@ def failure(error: BaseException, *names: str) -> str:
     return message if any(name in message for name in shown) else f"{shown[0]}: {message}"
 
 
-def read(source: Source) -> bytes:
-    """The bytes of an image.
+def read(source: Source, what: str = "an image") -> bytes:
+    """The bytes of an image, or of ``what`` it should be.
 
     Raises:
         ImageError: it cannot be read.
     """
-    return source if isinstance(source, bytes) else read_input(Path(source))
+    return source if isinstance(source, bytes) else read_input(Path(source), what)
 
 
 def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report | None) -> Outcome:
@@ -92,7 +92,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
 
 
 def _measured(task: Task, key: str, image: bytes) -> Outcome:
-    data = read_input(Path(task.output), "an SVG")
+    data = read(task.result or task.output, "an SVG")
     target = load_target(image, task.name, task.settings.background)
     score = score_svg(svg_text(data, task.output), target, eyes=False)
     return Outcome(task.number, "measured", key=key, digest=digest(data), figures=score.as_dict())
