@@ -2,76 +2,120 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
+import re
 import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.cli.options import FILE, overwrite_option, threads_option, voice_options
+from warpsplat.cli.options import (
+    FILE,
+    importance_option,
+    overwrite_option,
+    quality_options,
+    threads_option,
+    voice_options,
+)
 from warpsplat.cli.say import say
 from warpsplat.errors import ExitCode, UsageError
+from warpsplat.jobs.options import KINDS
 
 if TYPE_CHECKING:
-    from warpsplat.jobs.execute import Outcome
-    from warpsplat.jobs.plan import Job
-    from warpsplat.jobs.vectorize import Result
-
-NAMED = 20
-"""Most files that one message names."""
+    from warpsplat.cli.signals import Interrupt
+    from warpsplat.jobs.batch.manifest import Manifest
+    from warpsplat.jobs.batch.plan import Job
+    from warpsplat.jobs.executors.tasks import Executor
 
 
-def check_ours(jobs: list[Job], path: Path) -> None:
-    """Refuse to replace files of others.
+@dataclass(frozen=True)
+class Manner:
+    """How a batch is done: what does not change its results."""
 
-    Raises:
-        UsageError: there are some; the message names them.
-    """
-    from warpsplat.jobs.plan import not_ours
-
-    found = not_ours(jobs)
-    if found:
-        names = ", ".join(map(str, found[:NAMED])) + (", ..." if len(found) > NAMED else "")
-        raise UsageError(
-            f"{path}: {len(found)} results exist and were not written by warpsplat, "
-            f"--overwrite replaces them: {names}"
-        )
+    overwrite: bool = False
+    retry_failed: bool = False
+    dry_run: bool = False
+    workers: int | None = None
+    threads: int | None = None
+    shard: tuple[int, int] = (1, 1)
+    manifest: Path | None = None
+    quiet: bool = False
+    as_json: bool = False
 
 
-def tell(outcome: Outcome, count: str, *, talk: bool) -> None:
-    """Say what became of a job; ``count`` is its number among all."""
-    from warpsplat.cli.vectorize import summary
+class Shard(click.ParamType):
+    """``i/n``."""
 
-    output, result = outcome.job.output, outcome.result
-    if outcome.status == "failed":
-        say(f"{count} failed: {outcome.error}", err=True)
-    elif talk and outcome.status == "skipped":
-        say(f"{count} {output}: already made with these settings")
-    elif result:
-        if talk:
-            say(f"{count} {summary(output, outcome.as_dict())}")
-        for goal in result.missed:
-            say(f"{count} goal missed: {goal}", err=True)
+    name = "I/N"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Two numbers, the first from 1 to the second."""
+        if isinstance(value, tuple):
+            return value
+        found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", value)
+        if not found or not 1 <= int(found[1]) <= int(found[2]):
+            self.fail(f"{value!r} is no I/N, as 1/4 for the first of four parts", param, ctx)
+        return int(found[1]), int(found[2])
 
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("jobs", type=FILE)
-@click.option("--device", help="Overrides the file's device.")
+@click.argument("inputs", nargs=-1, required=True, metavar="INPUT...")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    help="Folder for the results, or their names: out/{stem}-{curves}.svg.  [default: beside each image]",
+)
 @overwrite_option
+@click.option("--set", "sets", multiple=True, metavar="KEY=VALUE", help="Any key of batch files.")
+@click.option("-n", "--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+@click.option("--retry-failed", is_flag=True, help="Try again what failed in an earlier run.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1, max=1024),
+    metavar="N",
+    help="Images at the same time, each in a process.  [default: one a core, if that pays]",
+)
+@click.option("--shard", type=Shard(), default=(1, 1), help="Do the I-th of N parts of the images.")
+@click.option(
+    "--manifest",
+    type=FILE,
+    metavar="FILE",
+    help="What was made, as JSON lines.  [default: warpsplat-manifest.jsonl in the folder of the results]",
+)
+@quality_options
+@importance_option
+@click.option("--device", help="auto (a GPU if there is one), cpu, or cuda:N.")
 @threads_option
 @voice_options
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object at the end.")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print a JSON object for each image, and one at the end."
+)
 def command(
-    jobs: Path,
+    inputs: tuple[str, ...],
+    output: str | None,
+    sets: tuple[str, ...],
     device: str | None,
+    importance: Path | None,
     overwrite: bool,
+    dry_run: bool,
+    retry_failed: bool,
+    workers: int | None,
+    shard: tuple[int, int],
+    manifest: Path | None,
     threads: int | None,
     verbose: int,
     quiet: bool,
     as_json: bool,
+    **given: Any,
 ) -> None:
-    """Vectorize the images that the YAML file JOBS lists.
+    """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
 
     \b
     defaults:
@@ -82,65 +126,97 @@ def command(
       - images: [logo.png, icons/*.png]
         curves: 64
 
-    Paths are relative to the file. An image that fails is reported and the
-    rest are done (exit 5). A result that is there already, made by the same
-    settings from the same image, is not made again.
+    Paths are relative to the file. What the command line says is stronger than
+    the file. An image that fails is reported and the rest are done (exit 5). A
+    result that is there already, made by the same settings from the same
+    image, is not made again.
     """  # noqa: D301
+    flags = {
+        **flags_of(given),
+        "output": output,
+        "device": device,
+        "importance": None if importance is None else str(importance),
+    }
+    manner = Manner(overwrite, retry_failed, dry_run, workers, threads, shard, manifest, quiet, as_json)
+    perform(inputs, flags, sets, manner)
+
+
+def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The flags of settings, as keys of batch files."""
+    flags = {key.replace("_", "-"): value for key, value in given.items() if key != "kind"}
+    return flags | {name: True for name, kind in KINDS.items() if given.get("kind") == kind}
+
+
+def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str], manner: Manner) -> None:
+    """Do a batch, and end the program with the code for it, if there is one to give.
+
+    Raises:
+        WarpsplatError: what concerns the batch as a whole.
+    """
     from warpsplat.cli import signals
-    from warpsplat.cli.run import run_file
-    from warpsplat.jobs.execute import Outcome, execute
-    from warpsplat.jobs.plan import load_jobs
+    from warpsplat.cli.batch_show import Show
+    from warpsplat.jobs.batch.layers import command_layer
+    from warpsplat.jobs.batch.manifest import NAME, Manifest
+    from warpsplat.jobs.batch.plan import common_root, in_shard, plan_jobs
+    from warpsplat.jobs.batch.run import Batch
+
+    jobs = plan_jobs(inputs, command_layer(flags, sets))
+    root = common_root(jobs)
+    jobs = [job for job in jobs if in_shard(job, root, *manner.shard)]
+    show = Show(len(jobs), quiet=manner.quiet, as_json=manner.as_json)
+    interrupt, begun = signals.Interrupt(), time.monotonic()
+    with contextlib.closing(Manifest(manner.manifest or root / NAME)) as notes:
+        notes.open(write=False)
+        if notes.damaged:
+            say(f"warpsplat: {notes.path}: damaged lines are ignored: {notes.damaged}", err=True)
+        if not manner.overwrite:
+            check_ours(jobs, notes)
+        executor, threads = executor_for(jobs, manner, interrupt)
+        batch = Batch(jobs, notes, hear=show.hear, retry=manner.retry_failed, threads=threads)
+        with interrupt.watching():
+            if manner.dry_run:
+                batch.look(interrupt)
+            else:
+                notes.open()
+                with contextlib.suppress(KeyboardInterrupt), executor:
+                    batch.run(executor, interrupt, show.advance)
+    show.finish(time.monotonic() - begun, executor.workers, notes.path)
+    if manner.dry_run:
+        return
+    if show.totals.failures:
+        sys.exit(ExitCode.SOME_FAILED)
+    if show.totals.missed:
+        sys.exit(ExitCode.GOAL_MISSED)
+
+
+def executor_for(jobs: Sequence[Job], manner: Manner, interrupt: Interrupt) -> tuple[Executor, int | None]:
+    """Who does the jobs, and the threads of each.
+
+    Raises:
+        UsageError: a device that is not here; that is found before the first image.
+    """
+    from warpsplat.jobs.executors.pool import Pool
+    from warpsplat.jobs.executors.serial import Serial
+    from warpsplat.jobs.executors.split import divided
     from warpsplat.rendering.device import choose_device, start_warp
 
-    todo = load_jobs(jobs)
-    if not overwrite:
-        check_ours(todo, jobs)
     start_warp()
-    for name in {device or job.device for job in todo}:
-        choose_device(name)  # an unknown one is found before the first image
-    outcomes: list[Outcome] = []
-    talk = not quiet and not as_json
-
-    def run(job: Job, data: bytes) -> Result:
-        return run_file(
-            job.image,
-            job.output,
-            job.settings,
-            data=data,
-            device=device or job.device,
-            threads=threads,
-            importance=job.importance,
-            keyed=True,
-            quiet=quiet,
-            verbose=verbose,
-        )
-
-    for i, job in enumerate(todo):
-        try:
-            outcomes.append(execute(job, run))
-        except KeyboardInterrupt:
-            outcomes.append(Outcome(job, "stopped"))
-        tell(outcomes[-1], f"[{i + 1}/{len(todo)}]", talk=talk)
-        if signals.received():
-            break
-    finish(outcomes, len(todo), quiet=quiet, talk=talk, as_json=as_json)
+    on_cpu = all(choose_device(name).is_cpu for name in {job.device for job in jobs})
+    workers, threads = divided([job.settings for job in jobs], manner.workers, manner.threads, on_cpu=on_cpu)
+    return Serial(interrupt.watching) if workers == 1 else Pool(workers), threads
 
 
-def finish(outcomes: list[Outcome], total: int, *, quiet: bool, talk: bool, as_json: bool) -> None:
-    """Sum up, and end the program with the code for it, if there is one to give."""
-    from warpsplat.jobs.execute import counts
+def check_ours(jobs: list[Job], manifest: Manifest) -> None:
+    """Refuse to replace files of others.
 
-    numbers = counts(outcomes)
-    if as_json:
-        say(json.dumps({**numbers, "results": [outcome.as_dict() for outcome in outcomes]}))
-    if talk:
-        say(f"{total} images: " + ", ".join(f"{n} {name}" for name, n in numbers.items()))
-    failed = [outcome.error for outcome in outcomes if outcome.status == "failed"]
-    if failed and not quiet:
-        say("failed:", err=True)
-        for error in failed:
-            say(f"  {error}", err=True)
-    if failed:
-        sys.exit(ExitCode.SOME_FAILED)
-    if any(outcome.result and outcome.result.missed for outcome in outcomes):
-        sys.exit(ExitCode.GOAL_MISSED)
+    Raises:
+        UsageError: there are some; the message names them.
+    """
+    from warpsplat.cli.batch_show import NAMED
+    from warpsplat.jobs.batch.run import not_ours
+
+    found = not_ours(jobs, manifest)
+    if found:
+        names = ", ".join(map(str, found[:NAMED])) + (", ..." if len(found) > NAMED else "")
+        count = "a result exists and was" if len(found) == 1 else f"{len(found)} results exist and were"
+        raise UsageError(f"{count} not written by warpsplat, --overwrite replaces them: {names}")

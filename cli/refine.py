@@ -63,7 +63,7 @@ def command(
     from warpsplat.api import refine
     from warpsplat.cli.run import leave, progress_bar
     from warpsplat.cli.signals import Interrupt
-    from warpsplat.cli.vectorize import summary
+    from warpsplat.cli.summary import summary
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)

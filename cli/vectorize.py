@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.batch import Manner, flags_of, perform
 from warpsplat.cli.options import (
     FILE,
     importance_option,
@@ -16,44 +17,18 @@ from warpsplat.cli.options import (
     run_options,
 )
 from warpsplat.cli.say import say
+from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
 
 
-def summary(output: Path, values: dict[str, Any]) -> str:
-    """One line on the result, for people."""
-    name = "standard output" if str(output) == "-" else output
-    note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
-    if values["paths"] is None:
-        size = f"{values['bytes'] / 1000:.1f} kB"
-        return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
-    ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
-    ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
-    ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
-    psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
-    if values["renderer"] == "gaussian":
-        psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
-    levels = ", ".join(_level(level) for level in values["levels"][:-1])
-    note += f"; the first {levels}" if levels else ""
-    return (
-        f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
-        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
-        f"{values['seconds']:.1f} s{note}"
-    )
-
-
-def _level(level: dict[str, Any]) -> str:
-    """What a layered file shows up to the end of a level."""
-    return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")
-
-
 @click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("image", type=FILE)
+@click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
     "--output",
     type=FILE,
-    help="SVG to write; - is the standard output.  [default: IMAGE with .svg, here]",
+    help="SVG to write, or of several images a folder; - is stdout.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
 @quality_options
@@ -64,7 +39,7 @@ def _level(level: dict[str, Any]) -> str:
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
-    image: Path,
+    images: tuple[Path, ...],
     output: Path | None,
     overwrite: bool,
     importance: Path | None,
@@ -80,8 +55,19 @@ def command(
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
     against the image, number of paths, size. They go to stderr where the SVG
-    goes to stdout.
+    goes to stdout. Several images are made as batch makes them.
     """
+    if len(images) > 1:
+        device_given = None if device == "auto" else device
+        several(
+            images,
+            output,
+            {**given, "device": device_given, "importance": importance},
+            Manner(overwrite=overwrite, threads=threads, quiet=quiet, as_json=as_json),
+            as_uri=as_uri,
+        )
+        return
+    image = images[0]
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import SVG_ENDINGS, check_output
@@ -120,3 +106,25 @@ def command(
     elif not quiet:
         say(summary(output, values), err=aside)
     leave(result)
+
+
+def several(
+    images: tuple[Path, ...], output: Path | None, given: dict[str, Any], manner: Manner, *, as_uri: bool
+) -> None:
+    """Make an SVG of each image, in the folder ``output``, or here.
+
+    Raises:
+        UsageError: what can be said of one image only.
+    """
+    from warpsplat.files.inputs import STANDARD
+    from warpsplat.jobs.batch.names import is_pattern
+
+    if as_uri:
+        raise UsageError("--data-uri takes one image")
+    if STANDARD in images or STANDARD in (output, given["importance"]):
+        raise UsageError(
+            "of several images none can come from the standard input, or go to the standard output"
+        )
+    if output is not None and is_pattern(str(output)) and "{stem}" not in str(output):
+        raise UsageError(f"{output}: is not a folder, and of {len(images)} images each has a result")
+    perform(list(map(str, images)), {**flags_of(given), "output": str(output or ".")}, (), manner)

@@ -21,6 +21,7 @@ from tests import ROOT
 from tests.cli.helpers import run
 from tests.fuzz.corpus import own_svg
 from warpsplat.errors import ExitCode
+from warpsplat.jobs.batch.manifest import NAME
 
 CPU = "--device cpu"
 QUICK = f"{CPU} --curves 4 --iterations 4"
@@ -198,7 +199,7 @@ def test_exit_code(
     if code not in (ExitCode.DONE, ExitCode.SOME_FAILED) and not line.startswith("batch"):
         assert re.fullmatch(r"\n?warpsplat: .*\n", said), "one line on stderr"
     assert {n: (tmp_path / n).read_bytes() for n in inputs} == inputs, "inputs are as they were"
-    written = set(os.listdir(tmp_path)) - set(inputs) - {"folder.svg"}
+    written = set(os.listdir(tmp_path)) - set(inputs) - {"folder.svg", NAME}
     whole = code in (ExitCode.DONE, ExitCode.GOAL_MISSED, ExitCode.SOME_FAILED)
     assert all(whole and Path(name).suffix in (".svg", ".png") for name in written), "nothing is half written"
 

@@ -16,6 +16,7 @@ import pytest
 
 from tests import ROOT
 from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
+from warpsplat.jobs.batch.manifest import NAME
 from warpsplat.svg.viewer import render_svg
 
 pytestmark = pytest.mark.slow
@@ -68,7 +69,7 @@ def assert_whole(folder: Path) -> None:
     for data in results(folder).values():
         assert data.rstrip().endswith(b"</svg>")
         assert render_svg(data.decode(), width=32, height=24).size == (32, 24)
-    stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml"))]
+    stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml", NAME))]
     assert not stray
 
 

@@ -25,7 +25,8 @@ from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.texts import parse_bytes, parse_duration
-from warpsplat.jobs.plan import KEYS, load_jobs
+from warpsplat.jobs.batch.layers import KEYS
+from warpsplat.jobs.batch.plan import load_jobs
 from warpsplat.metrics import psnr
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own

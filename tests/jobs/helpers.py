@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 
 def write(folder: Path, text: str) -> Path:
     path = folder / "jobs.yaml"
     path.write_text(text)
     return path
+
+
+def answers(out: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """What ``batch --json`` said of each image, and of all."""
+    values = [json.loads(line) for line in out.splitlines()]
+    return values[:-1], values[-1]

@@ -10,8 +10,8 @@ import pytest
 from tests import ROOT
 from warpsplat.cli.vectorize import command
 from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.jobs.batch.layers import KEYS
 from warpsplat.jobs.options import OPTIONS, Option
-from warpsplat.jobs.plan import KEYS
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ROWS = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -14,8 +15,10 @@ from tests.jobs.helpers import write
 from tests.scenes import random_scene
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.jobs.batch_file import MAX_FILE
-from warpsplat.jobs.plan import KEYS, load_jobs
+from warpsplat.jobs.batch.file import MAX_FILE
+from warpsplat.jobs.batch.layers import KEYS
+from warpsplat.jobs.batch.plan import load_jobs
+from warpsplat.jobs.batch.run import marked
 from warpsplat.jobs.research import UNSET
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.scene import Basis, Kind
@@ -104,7 +107,7 @@ BAD = [
     ("jobs:\n  - images: nothing/*.png\n", 2, "nothing/*.png"),
     ("jobs:\n  - images: 7\n", 2, "images"),
     ("jobs:\n  - images: in/a.png\n    curves: 1\n    curves: 2\n", 4, "twice"),
-    ("jobs:\n  - images: in/a.png\n  - images: in/a.png\n", 1, "a.svg"),
+    ("jobs:\n  - images: in/a.png\n  - images: in/a.png\n", 2, "a.svg"),
     ("jobs:\n  - images: [in/a.png\n", 3, "YAML"),
     ("jobs:\n\t- images: x\n", 2, "YAML"),
     ("jobs:\n  - images: !foo x\n", 2, "plain value"),
@@ -112,11 +115,11 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    curves: !!int abc\n", 3, "plain value"),
     ("jobs:\n  - images: 'in/**a/[.png'\n", 2, "[.png"),
     ("jobs:\n  - images: ~nosuchuser/a.png\n", 2, "nosuchuser"),
-    ("jobs:\n  - images: in/a.png\n    output: ~nosuchuser\n", 2, "nosuchuser"),
+    ("jobs:\n  - images: in/a.png\n    output: ~nosuchuser\n", 3, "nosuchuser"),
     ("jobs:\n  - images: in/a.png\n    output: in/b.png\n", 3, "not a folder"),
     ("jobs:\n  - images: in/a.png\n    target-psnr: true\n", 3, "target-psnr"),
     ("jobs:\n  - images: in/a.png\n    time-budget: soon\n", 3, "time-budget"),
-    ("jobs:\n  - images: in/deep/../pic.svg\n", 1, "overwritten"),
+    ("jobs:\n  - images: in/deep/../pic.svg\n", 2, "overwritten"),
     ("jobs: " + "[" * 2000, 1, "nested"),
     ("\n".join(" " * i + "- " for i in range(900)), 17, "nested"),
     ('jobs:\n  - images: "\\U00110000"\n', 2, "YAML"),
@@ -252,8 +255,8 @@ def test_a_result_that_was_cut_short_is_not_done(folder: Path, size: int) -> Non
     data = job.image.read_bytes()
     key = job_key(job.settings, data)
     whole = write_svg(random_scene(Kind.FILL, count=9, width=32, height=24), metadata=key).encode()
-    job.output.write_bytes(whole)
-    assert job.done(data)
-    assert not job.done(data + b" "), "another image"
-    job.output.write_bytes(whole[:size])
-    assert not job.done(data)
+    assert marked(whole) == key
+    assert job_key(job.settings, data + b" ") != key, "another image"
+    assert marked(gzip.compress(whole)) == key
+    assert not marked(whole[:size])
+    assert not marked(gzip.compress(whole)[:size])

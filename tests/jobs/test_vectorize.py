@@ -13,7 +13,7 @@ import pytest
 
 from tests import ROOT
 from tests.fit.pictures import picture
-from warpsplat.cli.vectorize import summary
+from warpsplat.cli.summary import summary
 from warpsplat.files.image import load_image
 from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings

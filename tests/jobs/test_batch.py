@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
@@ -11,8 +10,9 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import run
-from tests.jobs.helpers import write
-from warpsplat.jobs.plan import load_jobs
+from tests.jobs.helpers import answers, write
+from warpsplat.jobs.batch.manifest import NAME, entry_of
+from warpsplat.jobs.batch.plan import load_jobs
 
 
 def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -22,19 +22,22 @@ def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixt
     captured = capsys.readouterr()
     assert "3 images: 2 made, 0 skipped, 1 failed" in captured.out
     assert "broken.png: not an image" in captured.err
-    assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg"]
+    assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg", NAME]
+    made = [entry_of(line) for line in (folder / "out" / NAME).read_bytes().splitlines()]
+    psnr = [entry.figures["psnr"] for entry in made if entry and entry.event == "made"]
     times = {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
 
     assert run("batch", path, "--json") == 5
-    values = json.loads(capsys.readouterr().out)
+    images, values = answers(capsys.readouterr().out)
     assert (values["made"], values["skipped"], values["failed"]) == (0, 2, 1)
+    assert [r["psnr"] for r in images if r["status"] == "skipped"] == psnr, "figures of what was made before"
     assert times == {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
 
     noise = np.random.default_rng(9).integers(0, 255, (24, 32, 3), dtype=np.uint8)
     Image.fromarray(noise).save(folder / "in" / "a.png")  # another image under the old name
     (folder / "in" / "broken.png").unlink()
     assert run("batch", path, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["made"] == 1
+    assert answers(capsys.readouterr().out)[1]["made"] == 1
 
     write(folder, text.replace("curves: 4", "curves: 5"))
     assert run("batch", path, "-q") == 0
@@ -42,14 +45,16 @@ def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixt
     assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
 
 
-def test_a_stopped_result_is_made_again(folder: Path) -> None:
-    path = write(folder, "jobs: [{images: in/a.png, curves: 4, iterations: 5, device: cpu}]")
+def test_a_stopped_result_is_made_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, "jobs: [{images: in/a.png, curves: 30, iterations: 5, device: cpu}]")
     assert run("batch", path, "-q") == 0
-    job = load_jobs(path)[0]
-    assert job.done(job.image.read_bytes())
-    svg = job.output.read_text()
-    job.output.write_text(svg[: svg.index("<!--")] + "<!--warpsplat stopped" + svg[svg.index("-->") :])
-    assert not job.done(job.image.read_bytes())
+    output = load_jobs(path)[0].output
+    svg = output.read_text()
+    for made in (0, 1):
+        assert run("batch", path, "--json") == 0
+        assert answers(capsys.readouterr().out)[1]["made"] == made
+        assert output.read_text() == svg
+        output.write_text(svg[: svg.index("<!--")] + "<!--warpsplat stopped" + svg[svg.index("-->") :])
 
 
 def test_missed_goals_have_their_exit_code(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -89,10 +94,10 @@ def test_whatever_an_image_throws_is_its_own_failure(
     text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
     assert run("batch", write(folder, text), "--json") == 5
     captured = capsys.readouterr()
-    values = json.loads(captured.out)
-    assert [r["status"] for r in values["results"]] == ["failed", "made"]
-    assert words in values["results"][0]["error"]
-    assert "a.png" in values["results"][0]["error"]
+    images, _ = answers(captured.out)
+    assert [r["status"] for r in images] == ["failed", "made"]
+    assert words in images[0]["error"]
+    assert "a.png" in images[0]["error"]
     assert words in captured.err
 
 
@@ -115,16 +120,16 @@ def test_another_mask_makes_another_result(folder: Path, capsys: pytest.CaptureF
     path = write(folder, text)
     for made in (1, 0):
         assert run("batch", path, "--json") == 0
-        assert json.loads(capsys.readouterr().out)["made"] == made
+        assert answers(capsys.readouterr().out)[1]["made"] == made
     assert load_jobs(write(folder, text.replace(", importance: masks/face.png", "")))[0].output.exists()
     assert run("batch", folder / "jobs.yaml", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["made"] == 1, "without it"
+    assert answers(capsys.readouterr().out)[1]["made"] == 1, "without it"
     write(folder, text)
     half = Image.new("L", (64, 48), "white")
     half.paste("black", (0, 0, 32, 48))
     half.save(mask)
     assert run("batch", path, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["made"] == 1
+    assert answers(capsys.readouterr().out)[1]["made"] == 1
     for break_it, cause in (
         (lambda: half.resize((48, 48)).save(mask), "48x48 pixels"),
         (mask.unlink, "no such file"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,10 @@ class BatchFile:
     def error(self, line: int, message: str) -> UsageError:
         """An error that names the file and the line."""
         return UsageError(f"{self.path}:{line}: {message}")
+
+    def place(self, line: int) -> Callable[[str], UsageError]:
+        """``error`` of a line."""
+        return partial(self.error, line)
 
     def mapping(
         self, node: yaml.Node | None, where: str, allowed: tuple[str, ...]

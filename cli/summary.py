@@ -1,0 +1,33 @@
+"""A result in one line, for people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+
+def summary(output: Path, values: dict[str, Any]) -> str:
+    """One line on the result, for people."""
+    name = "standard output" if str(output) == "-" else output
+    note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
+    if values["paths"] is None:
+        size = f"{values['bytes'] / 1000:.1f} kB"
+        return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
+    ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
+    ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
+    ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
+    psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
+    if values["renderer"] == "gaussian":
+        psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
+    levels = ", ".join(_level(level) for level in values["levels"][:-1])
+    note += f"; the first {levels}" if levels else ""
+    return (
+        f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
+        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped), "
+        f"{values['seconds']:.1f} s{note}"
+    )
+
+
+def _level(level: dict[str, Any]) -> str:
+    """What a layered file shows up to the end of a level."""
+    return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")

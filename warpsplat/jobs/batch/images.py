@@ -1,0 +1,70 @@
+"""Which images a name means: a file, those in a folder, or those that match a pattern."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from warpsplat.errors import UsageError
+
+WILD = "*?["
+"""Characters that make a name a pattern."""
+
+ENDINGS = (
+    *(".png", ".jpg", ".jpeg", ".jfif", ".webp", ".avif", ".gif", ".bmp", ".tif", ".tiff"),
+    *(".ppm", ".pgm", ".pbm", ".pnm", ".tga", ".jp2", ".ico"),
+)
+"""Of names that are taken for images in a folder that is given as a whole."""
+
+
+class Found(NamedTuple):
+    """An image, and the folder under which it was looked for."""
+
+    path: Path
+    root: Path
+
+
+def find_images(name: str, base: Path) -> list[Found]:
+    """What ``name`` means, relative to ``base``, sorted. A file that is named and missing is found all the
+    same: that is the failure of one image.
+
+    Raises:
+        UsageError: nothing is found, or ``name`` is no usable pattern.
+    """
+    try:
+        found = list(_found(name, base))
+    except (ValueError, RuntimeError, OSError, NotImplementedError) as error:
+        raise UsageError(f"{name!r} is no usable pattern: {error}") from error
+    if not found:
+        raise UsageError(f"nothing matches {name!r}")
+    return found
+
+
+def _found(name: str, base: Path) -> Iterator[Found]:
+    path = Path(name).expanduser()
+    whole = base / path
+    if whole.is_dir():
+        inside = [p for p in whole.iterdir() if p.suffix.lower() in ENDINGS and _is_image(p)]
+        if not inside:
+            raise UsageError(f"{name}: no images in this folder")
+        yield from (_normal(p, whole) for p in sorted(inside))
+    elif any(c in name for c in WILD) and not os.path.lexists(whole):
+        root, parts = (Path(path.anchor), path.parts[1:]) if path.is_absolute() else (base, path.parts)
+        fixed = 0
+        while not any(c in parts[fixed] for c in WILD):
+            fixed += 1
+        matches = sorted(p for p in root.glob(str(Path(*parts))) if _is_image(p))
+        yield from (_normal(p, root.joinpath(*parts[:fixed])) for p in matches)
+    else:
+        yield _normal(whole, whole.parent)
+
+
+def _is_image(path: Path) -> bool:
+    """Whether a file may be meant: not one that is hidden, nor a result."""
+    return path.is_file() and not path.name.startswith(".") and path.suffix not in (".svg", ".svgz")
+
+
+def _normal(path: Path, root: Path) -> Found:
+    return Found(Path(os.path.normpath(path)), Path(os.path.normpath(root)))

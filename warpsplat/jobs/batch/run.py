@@ -1,0 +1,278 @@
+"""Doing the jobs of a batch: each once, whoever else is at the same list, whatever was interrupted before."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from warpsplat.errors import ImageError, OutputError
+from warpsplat.files.inputs import MAX_INPUT, read_input
+from warpsplat.files.output import GZIP, HEAD, may_replace, write_result
+from warpsplat.jobs.batch.manifest import Entry, Manifest
+from warpsplat.jobs.batch.plan import Job
+from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Stop, Task
+from warpsplat.jobs.executors.work import digest, failure, make_folder
+from warpsplat.jobs.vectorize import job_key
+from warpsplat.svg.inspect import svg_text
+from warpsplat.svg.write import read_metadata
+
+Status = Literal["made", "skipped", "failed", "stopped", "planned"]
+
+PAUSE = 0.3
+"""Seconds between two looks at what other processes have in work."""
+
+TAIL = b"</svg>\n"
+"""How every SVG that was written here ends; one that was cut short does not."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What became of a job."""
+
+    job: Job
+    status: Status
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    """See ``vectorize.Result.as_dict``; of a skipped one those that are known."""
+    error: str = ""
+    """One line, of a job that failed."""
+    before: bool = False
+    """Whether it failed in an earlier run, and was not tried again."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        values: dict[str, Any] = {"image": str(self.job.image), "output": str(self.job.output)}
+        values |= {"status": self.status, **self.figures}
+        return values | ({"error": self.error, "before": self.before} if self.error else {})
+
+
+class Prepared(NamedTuple):
+    """What is known of a job before it is done."""
+
+    key: str
+    image: bytes
+    mask: bytes | None
+
+
+class Standing(NamedTuple):
+    """Whether a result is there."""
+
+    made: bool
+    entry: Entry | None
+    """What the manifest says of it: of a result that is there, how it was made; of one that is not, that it
+    failed."""
+
+
+def prepare(job: Job) -> Prepared:
+    """Read a job's inputs.
+
+    Raises:
+        ImageError: they cannot be read.
+    """
+    image = read_input(job.image)
+    mask = read_input(job.importance) if job.importance else None
+    return Prepared(job_key(job.settings, image, mask), image, mask)
+
+
+def standing(job: Job, key: str, manifest: Manifest) -> Standing:
+    """Whether the result of ``key`` is there, whole: its mark says so, or the manifest knows its bytes."""
+    entries = [entry for entry in manifest.entries(job.output) if entry.key == key]
+    data = read_result(job.output)
+    if data is not None:
+        sum_ = digest(data)
+        known = [entry for entry in entries if entry.digest == sum_ and entry.event == "made"]
+        if known:
+            return Standing(True, known[-1])
+        if marked(data) == key or any(entry.digest == sum_ for entry in entries):
+            return Standing(True, None)
+    failed = entries[-1] if entries and entries[-1].event == "failed" else None
+    return Standing(False, failed)
+
+
+def read_result(path: Path) -> bytes | None:
+    """The bytes of a result; None if there is none, or no file."""
+    with contextlib.suppress(OSError):
+        found = os.stat(path)
+        if (
+            stat.S_ISREG(found.st_mode) and found.st_size <= MAX_INPUT
+        ):  # a pipe would wait for whoever fills it
+            return path.read_bytes()
+    return None
+
+
+def marked(data: bytes) -> str:
+    """The key that a whole result bears; empty if it has none, or was cut short."""
+    if data[:2] == GZIP:
+        try:
+            data = svg_text(data, "").encode()
+        except ImageError:
+            return ""
+    return read_metadata(data[:HEAD].decode("utf-8", "replace")) if data.endswith(TAIL) else ""
+
+
+def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
+    """The results that are there already and that warpsplat did not write."""
+    found = []
+    for job in jobs:
+        try:
+            free = may_replace(job.output)
+        except OSError:
+            free = False
+        if not free:
+            data = read_result(job.output)
+            entries = manifest.entries(job.output) if data is not None else []
+            free = data is not None and any(entry.digest == digest(data) for entry in entries)
+        if not free:
+            found.append(job.output)
+    return found
+
+
+class Batch:
+    """Jobs, who does them, and what is known of them."""
+
+    def __init__(
+        self,
+        jobs: list[Job],
+        manifest: Manifest,
+        *,
+        hear: Callable[[Report], None],
+        retry: bool = False,
+        threads: int | None = None,
+        carry: bool = False,
+    ) -> None:
+        """Args:
+        jobs: what to do.
+        manifest: open.
+        hear: told what becomes of each job, as soon as that is known.
+        retry: whether what failed is tried again.
+        threads: of each task, on a CPU.
+        carry: whether workers do not see the files: images go out, and results come back, as bytes.
+        """
+        self.jobs, self.manifest = jobs, manifest
+        self._hear, self._retry, self._threads, self._carry = hear, retry, threads, carry
+        self._keys: dict[int, str] = {}
+        """Of the tasks in work."""
+
+    def run(self, executor: Executor, stop: Stop, advance: Advance) -> None:
+        """Do the jobs. What another process has in work is waited for, and done if that process dies.
+
+        Raises:
+            OutputError: the manifest cannot be written.
+            ResourceError: there are no workers.
+        """
+        todo = list(range(len(self.jobs)))
+        while todo and not stop():
+            later: list[int] = []
+            for outcome in executor.run(self._tasks(todo, later, stop), stop, advance):
+                advance(outcome.number, 1.0)
+                self._settle(outcome)
+            if len(later) == len(todo):
+                time.sleep(PAUSE)
+            todo = later
+
+    def look(self, stop: Stop) -> None:
+        """Say what a run would do, and do nothing."""
+        for number, job in enumerate(self.jobs):
+            if stop():
+                return
+            if self._prepared(number) is not None:
+                self._hear(Report(job, "planned"))
+
+    def _tasks(self, todo: list[int], later: list[int], stop: Stop) -> Iterator[Task]:
+        """The tasks among the jobs ``todo``, each claimed; those that others have go to ``later``."""
+        for number in todo:
+            if stop():
+                return
+            job = self.jobs[number]
+            found = self._prepared(number)
+            if stop():
+                self._hear(Report(job, "stopped"))
+                return
+            if found is None:
+                continue
+            if not self.manifest.claim(job.output, found.key):
+                later.append(number)
+                continue
+            # Who had the claim until now may have made it.
+            self.manifest.refresh()
+            state = self._known(job, found.key)
+            if state is None:
+                self.manifest.release(job.output, found.key)
+                continue
+            self._keys[number] = found.key
+            yield self._task(number, found, measure=state.made)
+
+    def _prepared(self, number: int) -> Prepared | None:
+        """A job's inputs; None if nothing is to be done, which was reported."""
+        job = self.jobs[number]
+        try:
+            found = prepare(job)
+        except Exception as error:
+            self._hear(Report(job, "failed", error=failure(error, str(job.image), str(job.output))))
+            return None
+        return found if self._known(job, found.key) else None
+
+    def _known(self, job: Job, key: str) -> Standing | None:
+        """How a result stands; None if nothing is to be done, which was reported."""
+        state = standing(job, key, self.manifest)
+        if state.made and state.entry:
+            self._hear(Report(job, "skipped", state.entry.figures))
+            return None
+        if not state.made and state.entry and not self._retry:
+            self._hear(Report(job, "failed", error=state.entry.error, before=True))
+            return None
+        return state
+
+    def _task(self, number: int, found: Prepared, *, measure: bool) -> Task:
+        job = self.jobs[number]
+        return Task(
+            number,
+            found.image if self._carry else str(job.image),
+            str(job.image),
+            str(job.output),
+            job.settings,
+            job.device,
+            self._threads,
+            None if job.importance is None else found.mask if self._carry else str(job.importance),
+            # What bears no mark is known by its digest, which must be noted before it is written.
+            bring=self._carry or job.settings.minify,
+            measure=measure,
+        )
+
+    def _settle(self, outcome: Outcome) -> None:
+        """Write what is to be written, note it, and report it."""
+        job, key = self.jobs[outcome.number], self._keys.pop(outcome.number)
+        status: Status = "skipped" if outcome.status == "measured" else outcome.status
+        error = outcome.error
+        try:
+            if outcome.data is not None:
+                self._note(job, outcome, "writing")
+                make_folder(job.output.parent)
+                write_result(job.output, outcome.data)
+            if outcome.status in ("made", "measured"):
+                self._note(job, outcome, "made")
+        except OutputError as failed:
+            status, error = "failed", failure(failed, str(job.image), str(job.output))
+        if status == "failed" and outcome.key:
+            with contextlib.suppress(OutputError):  # said once is enough
+                self.manifest.append(
+                    Entry(
+                        self.manifest.name(job.output),
+                        outcome.key,
+                        "failed",
+                        image=str(job.image),
+                        error=error,
+                    )
+                )
+        self.manifest.release(job.output, key)
+        self._hear(Report(job, status, outcome.figures, error))
+
+    def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
+        figures = outcome.figures if event == "made" else {}
+        name = self.manifest.name(job.output)
+        self.manifest.append(Entry(name, outcome.key, event, outcome.digest, str(job.image), figures=figures))
