@@ -75,14 +75,16 @@ class RayCluster:
         self._stillborn = 0
         self._unseen: set[tuple[str, str]] = set()
         self._tries: Counter[int] = Counter()
+        self._waiting: Iterator[Task] | None = None
         self._again: list[Task] = []
+        self._met = 0
         self.lost = 0
         """Workers that were lost with a task."""
 
     @property
     def workers(self) -> int:
-        """See ``Executor``; before there are any, as many as were asked for."""
-        return sum(bool(worker.node) for worker in self._workers) or self._most or 1
+        """See ``Executor``: the most there were; before there are any, as many as were asked for."""
+        return self._met or self._most or 1
 
     def __enter__(self) -> RayCluster:
         """The cluster is connected to with the first task."""
@@ -101,13 +103,13 @@ class RayCluster:
 
     def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
         """See ``Executor``."""
-        waiting = iter(tasks)
+        self._waiting = iter(tasks)
         self._again.clear()
         self._tries.clear()
         begun = looked = time.monotonic()
         while not stop():
-            yield from self._give(waiting)
-            if not self._again and not self._busy():
+            yield from self._give()
+            if not self._waiting and not self._again and not self._busy():
                 return
             now = time.monotonic()
             if now - looked > PAUSE:
@@ -124,14 +126,23 @@ class RayCluster:
     def _busy(self) -> list[Worker]:
         return [worker for worker in self._workers if worker.task]
 
-    def _give(self, waiting: Iterator[Task]) -> Iterator[Outcome]:
+    def _next(self) -> Task | None:
+        """A task that nobody has; None if there is none left."""
+        if self._again:
+            return self._again.pop()
+        task = next(self._waiting, None) if self._waiting else None
+        if task is None:
+            self._waiting = None
+        return task
+
+    def _give(self) -> Iterator[Outcome]:
         """Hand tasks to those who have none; one task is waiting at most, for whoever is starting.
 
         Yields:
             failures of images that cannot be read.
         """
         while self._again or not self._workers or any(worker.idle for worker in self._workers):
-            task = self._again.pop() if self._again else next(waiting, None)
+            task = self._next()
             if task is None:
                 return
             self._connect()
@@ -226,6 +237,7 @@ class RayCluster:
 
     def _greeted(self, worker: Worker, said: tuple[str, str]) -> None:
         version, worker.node = said
+        self._met = max(self._met, sum(bool(other.node) for other in self._workers))
         if version != __version__:
             raise UsageError(
                 f"node {printable(worker.node)} of the Ray cluster has warpsplat {printable(version)}, "
