@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import hashlib
 import json
 import os
 import random
@@ -12,20 +14,26 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests import ROOT
 from tests.forks import make_image
 from warpsplat.errors import WarpsplatError
+from warpsplat.jobs.batch.manifest import NAME, entry_of
 from warpsplat.svg.viewer import render_svg
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
-SETTINGS = {"curves": "24", "iterations": "400", "device": "cpu"}
-INPUTS = {"vectorize": ("a.png",), "batch": ("a.png", "b.png", "c.png")}
+SETTINGS = {"curves": "24", "iterations": "150", "device": "cpu"}
+MANY = ("a.png", "b.png", "c.png", "d.png")
+INPUTS = {"vectorize": MANY[:1], "batch": MANY[:3], "workers": MANY, "minified": MANY}
+FLAGS = tuple(f"--{k}={v}" for k, v in SETTINGS.items())
 ARGUMENTS = {
-    "vectorize": ("vectorize", "a.png", *(f"--{k}={v}" for k, v in SETTINGS.items())),
-    "batch": ("batch", "jobs.yaml"),
+    "vectorize": ("vectorize", "a.png", *FLAGS),
+    "batch": ("batch", "jobs.yaml", "--workers=1"),
+    "workers": ("batch", ".", "--workers=2", "--threads=1", *FLAGS),
+    "minified": ("batch", ".", "--workers=2", "--threads=1", "--minify", *FLAGS),
 }
 
 
@@ -43,11 +51,46 @@ def start(folder: Path, command: str, cache: Path | None = None) -> subprocess.P
     return subprocess.Popen(
         [sys.executable, "-m", "warpsplat", *ARGUMENTS[command]],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **({"WARP_CACHE_PATH": str(cache)} if cache else {})},
+        env={
+            **os.environ,
+            "PYTHONPATH": str(ROOT),
+            TOKEN: str(folder),
+            **({"WARP_CACHE_PATH": str(cache)} if cache else {}),
+        },
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
     )
+
+
+TOKEN = "WARPSPLAT_KILLS"
+"""Environment variable by which all processes of a run are known."""
+
+
+def orphans(folder: Path) -> list[int]:
+    """Processes of a run in ``folder`` that outlived it, a second later; Linux only."""
+    found: list[int] = []
+    for _ in range(10):
+        found = []
+        for entry in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                if f"{TOKEN}={folder}\0".encode() in (entry / "environ").read_bytes():
+                    found.append(int(entry.name))
+        if not found:
+            break
+        time.sleep(0.1)
+    return found
+
+
+def noted(folder: Path) -> list[str]:
+    """What is wrong with the manifest of a batch that is done: each result is in it once, with its bytes."""
+    entries = [entry_of(line) for line in (folder / NAME).read_bytes().splitlines() if line]
+    made = [entry for entry in entries if entry and entry.event == "made"]
+    latest = {entry.output: entry.digest for entry in made}
+    digests = {name: hashlib.sha256(data).hexdigest() for name, data in results(folder).items()}
+    faults = [] if latest == digests else ["the manifest says something else"]
+    keys = Counter((entry.output, entry.key) for entry in made)
+    return faults + [f"{output} was made {count} times" for (output, _), count in keys.items() if count > 1]
 
 
 def results(folder: Path) -> dict[str, bytes]:
@@ -113,17 +156,21 @@ def _state(before: dict[str, bytes], after: dict[str, bytes], count: int) -> str
 
 
 def kill_once(
-    rng: random.Random, scratch: Path, whole: dict[str, dict[str, bytes]], span: dict[str, float]
+    rng: random.Random,
+    scratch: Path,
+    whole: dict[str, dict[str, bytes]],
+    span: dict[str, float],
+    signals: Sequence[signal.Signals],
 ) -> Kill | None:
     """End a run at a random moment, then run again; half of the runs find old results, some no kernels.
 
     None where the run was done before that moment.
     """
-    command, number, cold = rng.choice(list(ARGUMENTS)), rng.choice(SIGNALS), rng.random() < 0.1
+    command, number, cold = rng.choice(list(whole)), rng.choice(signals), rng.random() < 0.1
     folder, cache = scratch / "folder", scratch / "cache" if cold else None
     folder.mkdir()
     lay_out(folder, command)
-    if rng.random() < 0.5:
+    if rng.random() < 0.5 and command != "minified":  # which would not be known as ours
         for name, data in whole[command].items():
             # An older version's, so that a batch makes it anew.
             (folder / name).write_bytes(data.replace(b"<!--warpsplat ", b"<!--warpsplat 0"))
@@ -142,8 +189,9 @@ def kill_once(
         process.kill()
         said = process.communicate()[1]
     wait, code = time.monotonic() - sent, process.returncode
+    faults = [f"process {number} lives on" for number in orphans(folder)]
     after = results(folder)
-    faults = [f"{name} is not whole" for name in broken(folder)]
+    faults += [f"{name} is not whole" for name in broken(folder)]
     faults += [f"{name} is gone" for name in before if name not in after]
     # Python's own start can be interrupted before a line of this program runs, and says so its own way.
     begun = "warpsplat" in said or "Traceback" not in said
@@ -162,7 +210,9 @@ def kill_once(
         faults.append(f"next run: exit code {again.returncode}")
     if results(folder) != whole[command]:
         faults.append("next run: other results")
-    known = {*INPUTS[command], *whole[command], "jobs.yaml"}
+    if command != "vectorize":
+        faults += [f"next run: {fault}" for fault in noted(folder)]
+    known = {*INPUTS[command], *whole[command], "jobs.yaml", NAME}
     faults += [f"next run: left {name}" for name in os.listdir(folder) if name not in known]
     left = _state(before, after, len(whole[command]))
     return Kill(command, cold, number, moment, code, wait, left, tuple(faults))
@@ -173,11 +223,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz.kills", description=__doc__)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--commands", nargs="+", choices=ARGUMENTS, default=list(ARGUMENTS))
+    parser.add_argument("--signals", nargs="+", choices=[s.name for s in SIGNALS], default=None)
     given = parser.parse_args()
+    signals = [s for s in SIGNALS if not given.signals or s.name in given.signals]
     rng = random.Random(given.seed)
     whole: dict[str, dict[str, bytes]] = {}
     span: dict[str, float] = {}
-    for command in ARGUMENTS:
+    for command in given.commands:
         for _ in range(2):  # the first one may compile
             with tempfile.TemporaryDirectory() as scratch:
                 lay_out(Path(scratch), command)
@@ -189,7 +242,7 @@ def main() -> None:
     kills: list[Kill] = []
     while len(kills) < given.count:
         with tempfile.TemporaryDirectory() as scratch:
-            kill = kill_once(rng, Path(scratch), whole, span)
+            kill = kill_once(rng, Path(scratch), whole, span, signals)
         if kill:
             kills.append(kill)
             print(kill.line(), flush=True)
