@@ -9,6 +9,7 @@ from pathlib import Path
 from warpsplat.errors import OutputError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import svg_bytes
+from warpsplat.files.remote import is_remote
 from warpsplat.fit.loop import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.jobs.vectorize import job_key, load_target, vectorize_image
@@ -109,6 +110,8 @@ def make_folder(folder: Path) -> None:
     Raises:
         OutputError: it cannot be made.
     """
+    if is_remote(folder):
+        return  # comes with its files
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
