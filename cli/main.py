@@ -18,7 +18,7 @@ from warpsplat.errors import ExitCode, OutputError, explain, printable
 
 COMMANDS = {
     "vectorize": "Turn an image into an SVG.",
-    "batch": "Vectorize many images by a YAML file.",
+    "batch": "Vectorize many images: files, folders, patterns, lists.",
     "refine": "Improve an SVG against an image.",
     "eval": "Measure any SVG against an image.",
     "render": "Render an SVG to a PNG.",

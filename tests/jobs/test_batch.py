@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from PIL import Image
 
 from tests.cli.helpers import run
 from tests.jobs.helpers import answers, write
-from warpsplat.jobs.batch.manifest import NAME, entry_of
+from warpsplat.jobs.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.jobs.batch.plan import load_jobs
 
 
@@ -144,3 +145,158 @@ def test_a_mask_is_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
     path = write(folder, "jobs:\n  - images: in/a.png\n    importance: 3\n")
     assert run("batch", path) == 2
     assert f"{path}:3: importance: must be text, not 3" in capsys.readouterr().err
+
+
+SMALL = ("--curves", "3", "--iterations", "3", "--device", "cpu")
+
+
+def test_what_bears_no_mark_is_known_by_the_manifest(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where a run was killed after the file was there and before that was noted."""
+    arguments = ("batch", folder / "in" / "a.png", folder / "in" / "b.png", "-o", folder / "out", *SMALL)
+    assert run(*arguments, "--minify", "--curves", "40") == 0
+    svgs = {path: path.read_bytes() for path in (folder / "out").glob("*.svg")}
+    assert len(svgs) == 2
+    assert not any(b"warpsplat" in data for data in svgs.values())
+    notes = folder / "out" / NAME
+    lines = notes.read_bytes().splitlines(keepends=True)
+    assert [json.loads(line)["event"] for line in lines] == ["writing", "made"] * 2
+    notes.write_bytes(b"".join(lines[:3]))
+    capsys.readouterr()
+    assert run(*arguments, "--minify", "--curves", "40", "--json") == 0
+    images, totals = answers(capsys.readouterr().out)
+    assert (totals["skipped"], totals["made"]) == (2, 0)
+    assert all(image["psnr"] > 5 for image in images)
+    assert svgs == {path: path.read_bytes() for path in (folder / "out").glob("*.svg")}
+    notes.unlink()
+    assert run(*arguments, "--minify", "--curves", "40") == 2, "without it, they may be anybody's"
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_without_a_manifest_figures_are_those_of_the_files(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("batch", folder / "in" / "a.png", "-o", folder / "out", *SMALL, "--json")
+    assert run(*arguments, "--curves", "30") == 0
+    (made,), _ = answers(capsys.readouterr().out)
+    (folder / "out" / NAME).unlink()
+    for _ in range(2):  # then they are noted
+        assert run(*arguments, "--curves", "30") == 0
+        (found,), _ = answers(capsys.readouterr().out)
+        assert found["status"] == "skipped"
+        assert (found["psnr"], found["bytes"]) == (made["psnr"], made["bytes"])
+
+
+def test_failures_are_tried_again_when_asked_or_changed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = folder / "in" / "broken.png"
+    arguments = ("batch", broken, "-o", folder / "out", *SMALL, "--json")
+
+    def tried(*more: str, code: int = 5) -> bool:
+        assert run(*arguments, *more) == code
+        (image,), _ = answers(capsys.readouterr().out)
+        return not image.get("before", False)
+
+    assert tried()
+    assert not tried()
+    assert tried("--retry-failed")
+    assert not tried()
+    assert tried("--seed", "7"), "other settings"
+    broken.write_bytes(b"something else")
+    assert tried()
+    broken.write_bytes((folder / "in" / "a.png").read_bytes())
+    assert tried(code=0)
+
+
+def test_a_dry_run_writes_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, "jobs: [{images: 'in/*.png', output: out, curves: 3, iterations: 3, device: cpu}]")
+    assert run("batch", path, "--dry-run") == 0
+    said = capsys.readouterr().out
+    assert f"{folder / 'out' / 'a.svg'}: would be made of {folder / 'in' / 'a.png'}" in said
+    assert not (folder / "out").exists()
+    assert run("batch", path, "-q") == 5
+    before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
+    capsys.readouterr()
+    assert run("batch", path, "--dry-run", "--set", "seed=0") == 0
+    captured = capsys.readouterr()
+    assert "already made with these settings" in captured.out
+    assert "broken.png: not an image" in captured.err
+    assert {p: p.read_bytes() for p in (folder / "out").iterdir()} == before
+
+
+def test_several_images_of_vectorize(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    assert run("vectorize", "in/a.png", "in/b.png", "-o", "out/", *SMALL) == 0
+    assert sorted(os.listdir("out")) == ["a.svg", "b.svg", NAME]
+    for more, words in (
+        (("-o", "x.svg"), "x.svg: is not a folder"),
+        (("-o", "-"), "standard output"),
+        (("-",), "standard input"),
+        (("--data-uri",), "one image"),
+    ):
+        capsys.readouterr()
+        assert run("vectorize", "in/a.png", "in/b.png", *more) == 2
+        said = capsys.readouterr().err
+        assert words in said
+        assert said.count("\n") == 1
+    assert run("vectorize", "in/a.png", "in/broken.png", *SMALL) == 5
+    assert Path("a.svg").exists()
+
+
+def test_what_another_process_has_in_work_is_waited_for(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is done elsewhere in the end, or, if that process dies, here; other images need not wait."""
+    asked: list[str] = []
+    claim = Manifest.claim
+
+    def reluctant(notes: Manifest, output: Path, key: str) -> bool:
+        asked.append(output.name)
+        return claim(notes, output, key) if asked.count(output.name) > 2 or output.name == "b.svg" else False
+
+    monkeypatch.setattr(Manifest, "claim", reluctant)
+    assert run("batch", folder / "in" / "a.png", folder / "in" / "b.png", *SMALL, "--json") == 0
+    images, _ = answers(capsys.readouterr().out)
+    assert [(Path(image["output"]).name, image["status"]) for image in images] == [
+        ("b.svg", "made"),
+        ("a.svg", "made"),
+    ]
+    assert asked == ["a.svg", "b.svg", "a.svg", "a.svg"]
+
+
+def test_an_image_is_not_made_where_another_process_just_has(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ("batch", folder / "in" / "a.png", "-o", folder / "out", *SMALL, "--json")
+    assert run(*arguments) == 0
+    kept = {path: path.read_bytes() for path in (folder / "out").iterdir()}
+    for path in kept:
+        path.unlink()
+    claim = Manifest.claim
+
+    def late(notes: Manifest, output: Path, key: str) -> bool:
+        for path, data in kept.items():
+            with path.open("ab") as file:  # the same file, or the claim would be another one's
+                file.write(data)
+        return claim(notes, output, key)
+
+    monkeypatch.setattr(Manifest, "claim", late)
+    capsys.readouterr()
+    assert run(*arguments) == 0
+    assert [image["status"] for image in answers(capsys.readouterr().out)[0]] == ["skipped"]
+
+
+@pytest.mark.slow
+def test_processes_make_the_same_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    images = [str(folder / "in" / name) for name in ("a.png", "b.png", "broken.png", "b.jpg")]
+    for workers in ("1", "2"):
+        assert run("batch", *images, "-o", folder / workers, *SMALL, "--workers", workers, "--json") == 5
+        images_said, totals = answers(capsys.readouterr().out)
+        assert (totals["made"], totals["failed"], totals["workers"]) == (3, 1, int(workers))
+        assert len({image["image"] for image in images_said}) == 4
+    first, second = ({p.name: p.read_bytes() for p in (folder / w).glob("*.svg")} for w in ("1", "2"))
+    assert first == second

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
 from collections.abc import Iterable
+from pathlib import Path
 
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.backend import available_cores
@@ -40,8 +41,9 @@ def divided(
 
 
 def _free_memory() -> int:
-    """Memory that may be used [bytes]."""
-    try:
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):  # Windows, macOS
-        return MEMORY * available_cores()
+    """Memory that can be had without swapping [bytes]."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) << 10
+    return MEMORY * available_cores()  # not Linux: as much as is asked for
