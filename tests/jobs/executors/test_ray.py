@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import signal
+import socket
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -18,7 +19,7 @@ from tests.jobs.executors.fake_ray import FakeRay
 from warpsplat.errors import ResourceError, UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.executors import ray as module
-from warpsplat.jobs.executors import ray_actor, work
+from warpsplat.jobs.executors import ray_actor, ray_connection, work
 from warpsplat.jobs.executors.ray import TRIES, RayCluster
 from warpsplat.jobs.executors.ray_worker import Need
 from warpsplat.jobs.executors.serial import Serial
@@ -31,6 +32,7 @@ SETTINGS = make_settings("draft", curves=4, iterations=4)
 def ray(monkeypatch: pytest.MonkeyPatch) -> FakeRay:
     """Two nodes of one core."""
     fake = FakeRay({"CPU": 1}, {"CPU": 1})
+    monkeypatch.setattr(ray_connection, "_answers", lambda address: address in {"auto", "local", *fake.known})
     monkeypatch.setitem(sys.modules, "ray", fake)
     return fake
 
@@ -372,6 +374,16 @@ def test_nobody_answers(
     ray.known = set()
     with pytest.raises(UsageError, match=f"no Ray cluster answers at {address or variable}"):
         run(RayCluster(address), tasks)
+
+
+def test_asks_whether_anybody_listens() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert ray_connection._answers(f"127.0.0.1:{port}")
+        assert ray_connection._answers(f"ray://127.0.0.1:{port}")
+    assert not ray_connection._answers(f"127.0.0.1:{port}")
+    assert not ray_connection._answers("127.0.0.1:99999")
+    assert ray_connection._answers("auto")
 
 
 @pytest.mark.usefixtures("quick")

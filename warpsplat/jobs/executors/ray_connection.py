@@ -7,6 +7,7 @@ import importlib
 import logging
 import os
 import signal
+import socket
 from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
@@ -15,6 +16,9 @@ from warpsplat.errors import UsageError, printable
 
 STORE = 200_000_000
 """Memory for what is on its way between processes, in a cluster of this machine alone [bytes]."""
+
+WAIT = 5.0
+"""Seconds for a cluster to answer."""
 
 
 @contextlib.contextmanager
@@ -42,13 +46,38 @@ def connected(ray: ModuleType, address: str) -> Iterator[None]:
 
 
 def _connect(ray: ModuleType, address: str) -> None:
-    place = address or os.environ.get("RAY_ADDRESS", "") or "auto"
+    named = address or os.environ.get("RAY_ADDRESS", "")
+    place = _here() if named in ("", "auto") else named
     try:
+        if not _answers(place):  # Ray itself would try for minutes
+            raise ConnectionError
         _init(ray, place)
     except ConnectionError as error:
-        if place != "auto" or address:
-            raise UsageError(f"--executor ray: no Ray cluster answers at {printable(place)}") from error
+        if named:
+            raise UsageError(f"--executor ray: no Ray cluster answers at {printable(named)}") from error
         _init(ray, "local")
+
+
+def _here() -> str:
+    """The address of the cluster that this machine belongs to, or did; ``auto``: Ray shall look for one."""
+    try:
+        services: Any = importlib.import_module("ray._private.services")
+        found: str = services.get_ray_address_from_environment("auto", None)
+        return found
+    except (ImportError, AttributeError, TypeError, ConnectionError):
+        return "auto"
+
+
+def _answers(address: str) -> bool:
+    """Whether somebody listens at ``host:port``; True for an address of another form."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return True
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=WAIT).close()
+    except (OSError, OverflowError):
+        return False
+    return True
 
 
 def _init(ray: ModuleType, address: str) -> None:
@@ -62,9 +91,9 @@ def _init(ray: ModuleType, address: str) -> None:
 
 
 def cause_of(error: BaseException) -> str:
-    """What Ray says, in one line: the error that its text holds, or its first line."""
+    """What Ray says, in one line: the last error that its text holds, or its first line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
-    return printable(next((line for line in lines if "Error: " in line), lines[0]))
+    return printable(next((line for line in reversed(lines) if "Error: " in line), lines[0]))
 
 
 @contextlib.contextmanager
