@@ -91,7 +91,7 @@ class Shard(click.ParamType):
     "--manifest",
     type=FILE,
     metavar="FILE",
-    help="What was made, as JSON lines.  [default: warpsplat-manifest.jsonl in the folder of the results]",
+    help="What was made, as JSON lines.  [default: warpsplat-manifest.jsonl, with the results]",
 )
 @quality_options
 @importance_option
@@ -166,15 +166,15 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
     from warpsplat.cli.batch_show import Show
     from warpsplat.jobs.batch.layers import command_layer
     from warpsplat.jobs.batch.manifest import NAME, Manifest
-    from warpsplat.jobs.batch.plan import common_root, in_shard, plan_jobs
+    from warpsplat.jobs.batch.plan import home_of, in_shard, plan_jobs
     from warpsplat.jobs.batch.run import Batch
 
     jobs = plan_jobs(inputs, command_layer(flags, sets))
-    root = common_root(jobs)
-    jobs = [job for job in jobs if in_shard(job, root, *manner.shard)]
+    home = home_of(jobs, inputs)
+    jobs = [job for job in jobs if in_shard(job, home, *manner.shard)]
     show = Show(len(jobs), quiet=manner.quiet, as_json=manner.as_json)
     interrupt, begun = signals.Interrupt(), time.monotonic()
-    with contextlib.closing(Manifest(manner.manifest or root / NAME)) as notes:
+    with contextlib.closing(Manifest(manner.manifest or home / NAME)) as notes:
         notes.open(write=False)
         if notes.damaged:
             say(f"warpsplat: {notes.path}: damaged lines are ignored: {notes.damaged}", err=True)

@@ -90,13 +90,12 @@ def run_file(
     device: str,
     threads: int | None,
     importance: Path | None = None,
-    keyed: bool = False,
     verbose: int = 0,
     quiet: bool = False,
 ) -> Result:
     """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask. ``keyed``: see there.
+    ``importance``: file of a mask.
     """
     pursued = settings.target_psnr or settings.max_bytes
     start_warp()
@@ -116,7 +115,6 @@ def run_file(
             threads=threads,
             name=input_name(source),
             importance=importance,
-            keyed=keyed,
             callback=report,
             stop=interrupt,
         )

@@ -57,7 +57,7 @@ def _reference() -> bytes:
     return buffer.getvalue()
 
 
-GOOD_IMAGE, GOOD_SVG = "good.png", "good.svg"
+GOOD_IMAGE, GOOD_SVG = "good.picture", "good.svg"  # not found in a folder that is given as a whole
 FILES: dict[str, bytes] = {
     GOOD_IMAGE: _reference(),
     GOOD_SVG: corpus.own_svg("fill"),

@@ -161,12 +161,14 @@ def kill_once(
     whole: dict[str, dict[str, bytes]],
     span: dict[str, float],
     signals: Sequence[signal.Signals],
+    chance: float,
 ) -> Kill | None:
-    """End a run at a random moment, then run again; half of the runs find old results, some no kernels.
+    """End a run at a random moment, then run again; half of the runs find old results, some no kernels
+    (with a probability of ``chance``).
 
     None where the run was done before that moment.
     """
-    command, number, cold = rng.choice(list(whole)), rng.choice(signals), rng.random() < 0.1
+    command, number, cold = rng.choice(list(whole)), rng.choice(signals), rng.random() < chance
     folder, cache = scratch / "folder", scratch / "cache" if cold else None
     folder.mkdir()
     lay_out(folder, command)
@@ -205,7 +207,7 @@ def kill_once(
     if code == 0 and wait > ENDING:
         faults.append("went on")
     again = start(folder, command, cache)
-    said = again.communicate(timeout=120)[1]
+    said = again.communicate(timeout=600)[1]
     if again.returncode:
         faults.append(f"next run: exit code {again.returncode}")
     if results(folder) != whole[command]:
@@ -225,6 +227,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--commands", nargs="+", choices=ARGUMENTS, default=list(ARGUMENTS))
     parser.add_argument("--signals", nargs="+", choices=[s.name for s in SIGNALS], default=None)
+    parser.add_argument("--cold", type=float, default=0.1, help="share of runs without compiled kernels")
     given = parser.parse_args()
     signals = [s for s in SIGNALS if not given.signals or s.name in given.signals]
     rng = random.Random(given.seed)
@@ -242,7 +245,7 @@ def main() -> None:
     kills: list[Kill] = []
     while len(kills) < given.count:
         with tempfile.TemporaryDirectory() as scratch:
-            kill = kill_once(rng, Path(scratch), whole, span, signals)
+            kill = kill_once(rng, Path(scratch), whole, span, signals, given.cold)
         if kill:
             kills.append(kill)
             print(kill.line(), flush=True)

@@ -91,13 +91,15 @@ YAMLS = (
     "defaults: {curves: 3, iterations: 1, seed: 7, device: cpu, precision: 2, renderer: exact}\n"
     "jobs: [{images: in/a.png, output: out, time-budget: 2s, max-bytes: 10KB, target-psnr: 30.5}]\n",
     "# comment\ndefaults: &d\n  open: true\n  output: 'out/deep'\njobs:\n- images:\n  - in/a.png\n  - \"in/\\u00e9.png\"\n  iterations: 2\n",
+    "presets:\n  fine: {curves: 3, rates: {points: 1}}\ndefaults: {iterations: 1, device: cpu}\njobs:\n  - images: in\n    preset: fine\n"
+    "    matrix: {seed: [1, 2], quality: [draft, high]}\n    output: 'out/{quality}/{stem}-{seed}.svg'\n",
     "%YAML 1.2\n---\njobs:\n  - images: !!str in/a.png\n    output: >-\n      folded\n      name\n    quality: high\n...\n",
 )
 
 YAML_WORDS = (
     "defaults", "jobs", "images", "curves", "quality", "iterations", "seed", "precision", "renderer", "target-psnr",
     "time-budget", "max-bytes", "closed", "open", "output", "device", "draft", "balanced", "high", "exact", "splat", "true", "false", "null", "yes", "~",
-    "cpu", "cuda", "in", "a.png", "b.jpg", "out", "60s", "10GB", "1e3",
+    "cpu", "cuda", "in", "a.png", "b.jpg", "out", "60s", "10GB", "1e3", "presets", "preset", "matrix", "rates", "{stem}", "{folder}", "{curves}",
 )  # fmt: skip
 
 YAML_SNIPPETS = (
@@ -105,7 +107,7 @@ YAML_SNIPPETS = (
     "!!float .nan ", "!!timestamp 2001-99-99 ", '"\\U00110000"', '"\\ud800"', '"a\\0b"', "'in/a\x00.png'", "in/" + "x" * 300, "../" * 40, "~nobody/", "~/",
     "in/[", "**", "***", "?", "\t", "\r", "\u2028", "\ufeff", "\x07", "  ", "\n", "\n---\n", "\n...\n", "%TAG ! x\n", "|\n", ">2\n", "# ", ": ", "- ", ", ",
     "jobs:\n", "  - images: in/a.png\n", "    output: loop/x\n", "    output: in/a.png\n", "    output: fifo\n", "    images: fifo\n", "    images: .\n",
-    ".inf", "-.inf", ".nan", "0o777", "0x7f", "1_000", "190:20:30", "9" * 5000, "1e999",
+    "{", "}", "{{", "{}", "{x}", "'{stem}/../..'", "    matrix: {curves: [1, 2]}\n", "    preset: x\n", ".inf", "-.inf", ".nan", "0o777", "0x7f", "1_000", "190:20:30", "9" * 5000, "1e999",
 )  # fmt: skip
 
 NUMBERS = ("0", "-0", "1", "-1", "0.5", "1e-9", "1e9", "1e30", "-1e30", "3.5e38", "1e308", "-1e309", "1e-320", "nan", "inf",
@@ -118,7 +120,7 @@ TEXT_OPTIONS = ("--time-budget", "--max-bytes", "--target-psnr", "--curves", "--
 
 TOKENS = (*NUMBERS, "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
           "draft", "exact", "x.svg", "/", ".", "..", "a/b.svg", "é.svg", "\udcff.svg", "\n.svg", "\x1b[2J.svg", "x" * 300, "-", "--", "٣s", "x.SVG",
-          "good.png", "in", "in/a.png/x.svg", "/dev/null", "/dev/full", "/proc/x.svg")  # fmt: skip
+          "good.picture", "in", "in/a.png/x.svg", "/dev/null", "/dev/full", "/proc/x.svg")  # fmt: skip
 
 PAINTS = ("red", "#123", "#4080c0", "rgb(10%,50%,90%)", "hsl(90,50%,50%)", "teal")
 

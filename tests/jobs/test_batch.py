@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,10 @@ from tests.cli.helpers import run
 from tests.jobs.helpers import answers, write
 from warpsplat.jobs.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.jobs.batch.plan import load_jobs
+from warpsplat.jobs.batch.run import Batch, Report
+from warpsplat.jobs.executors.serial import Serial
+from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Stop, Task
+from warpsplat.jobs.executors.work import do
 
 
 def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -300,3 +306,36 @@ def test_processes_make_the_same_files(folder: Path, capsys: pytest.CaptureFixtu
         assert len({image["image"] for image in images_said}) == 4
     first, second = ({p.name: p.read_bytes() for p in (folder / w).glob("*.svg")} for w in ("1", "2"))
     assert first == second
+
+
+def test_workers_that_do_not_see_files(folder: Path) -> None:
+    """Images go out, and results and figures come back, as bytes."""
+    path = write(folder, "jobs: [{images: in/a.png, output: out, curves: 30, iterations: 3, device: cpu}]")
+    jobs = load_jobs(path)
+    seen: list[Task] = []
+
+    class Far(Serial):
+        def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
+            for task in tasks:
+                seen.append(task)
+                yield do(replace(task, output="/nowhere/a.svg"))
+
+    def reports(executor: Executor, carry: bool, name: str) -> list[Report]:
+        found: list[Report] = []
+        notes = Manifest(folder / name)
+        notes.open()
+        batch = Batch(jobs, notes, hear=found.append, carry=carry)
+        batch.run(executor, lambda: False, lambda number, part: None)
+        notes.close()
+        return found
+
+    (made,) = reports(Far(), True, "far.jsonl")
+    svg = jobs[0].output.read_bytes()
+    assert made.status == "made"
+    (found,) = reports(Far(), True, "other.jsonl")
+    assert (found.status, found.figures["psnr"]) == ("skipped", made.figures["psnr"])
+    assert [(task.measure, task.bring) for task in seen] == [(False, True), (True, True)]
+    jobs[0].output.unlink()
+    (near,) = reports(Serial(), False, "near.jsonl")
+    assert near.status == "made"
+    assert jobs[0].output.read_bytes() == svg

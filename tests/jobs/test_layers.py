@@ -12,7 +12,7 @@ from tests.jobs.helpers import write
 from warpsplat.cli.batch import flags_of
 from warpsplat.errors import UsageError
 from warpsplat.jobs.batch.layers import assigned, command_layer
-from warpsplat.jobs.batch.plan import Job, common_root, in_shard, load_jobs, plan_jobs
+from warpsplat.jobs.batch.plan import Job, home_of, in_shard, load_jobs, plan_jobs
 from warpsplat.scene import Kind
 
 
@@ -65,7 +65,7 @@ jobs:
         (3, 200),
         (3, 4000),
     }
-    assert common_root(jobs) == folder / "out"
+    assert home_of(jobs, ["jobs.yaml"]) == folder / "out"
     jobs = load_jobs(folder / "jobs.yaml", command_layer({"curves": 9}, ()))
     assert len(jobs) == 4, "what the command line says is no axis"
     assert {job.settings.curves for job in jobs} == {9}
@@ -174,6 +174,21 @@ def test_inputs_of_the_command_line(folder: Path, monkeypatch: pytest.MonkeyPatc
     for name, words in (("empty", "no images"), ("in/*.gif", "nothing matches")):
         with pytest.raises(UsageError, match=words):
             plan_jobs([name])
+
+
+def test_where_the_manifest_is(folder: Path) -> None:
+    """With the results; of several folders of them, in the one that holds all, or with the batch file."""
+    path = str(folder / "jobs.yaml")
+    for outputs, home in (
+        (("out", "out"), folder / "out"),
+        (("out", "out/{curves}/{stem}.svg"), folder / "out"),
+        (("out/x", "out/y"), folder),
+        (("out/x", "/elsewhere/{stem}.svg"), folder),
+    ):
+        jobs = [f"{{images: in/{n}.png, output: '{out}'}}" for n, out in zip("ab", outputs, strict=True)]
+        write(folder, f"jobs: [{', '.join(jobs)}]")
+        assert home_of(load_jobs(Path(path)), [path]) == home
+        assert home_of(load_jobs(Path(path)), [path, "x.png"]) == (Path() if home == folder else home)
 
 
 def test_shards_are_parts_whatever_the_list(folder: Path) -> None:

@@ -12,7 +12,7 @@ import warp as wp
 
 from warpsplat.errors import ResourceError
 from warpsplat.rendering import kernel_cache
-from warpsplat.rendering.kernel_cache import CHECKSUMS, load
+from warpsplat.rendering.kernel_cache import CHECKSUMS, alone_in, load
 
 
 @wp.kernel
@@ -118,3 +118,25 @@ def test_without_any_place_the_message_names_the_cache(cache: Path, monkeypatch:
     with pytest.raises(ResourceError, match=r"kernel cache .*file: .*WARP_CACHE_PATH") as caught:
         doubles()
     assert caught.value.exit_code == 7
+
+
+def test_one_process_compiles_at_a_time(tmp_path: Path) -> None:
+    """By a lock that leaves nothing behind, and that is no obstacle where there is no cache."""
+    fcntl = pytest.importorskip("fcntl")
+
+    def is_free() -> bool:
+        handle = os.open(tmp_path, os.O_RDONLY)  # as another process would
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        finally:
+            os.close(handle)
+        return True
+
+    with alone_in(tmp_path):
+        assert not is_free()
+    assert is_free()
+    assert not list(tmp_path.iterdir())
+    with alone_in(tmp_path / "none"):
+        pass

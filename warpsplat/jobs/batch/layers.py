@@ -83,9 +83,9 @@ def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[Value]]:
     for key, (line, inner) in file.mapping(node, MATRIX, (*BY_NAME, *RESEARCH_KEYS)).items():
         if not isinstance(inner, yaml.SequenceNode) or not inner.value:
             raise file.error(line, f"{MATRIX}: {key}: must be a list of values")
-        axes[key] = [_single(file, key, item.start_mark.line + 1, item) for item in inner.value]
-        if math.prod(len(values) for values in axes.values()) > MOST_COMBINATIONS:
+        if math.prod(map(len, axes.values())) * len(inner.value) > MOST_COMBINATIONS:
             raise file.error(line, f"{MATRIX}: more than {MOST_COMBINATIONS} combinations")
+        axes[key] = [_single(file, key, item.start_mark.line + 1, item) for item in inner.value]
     return axes
 
 

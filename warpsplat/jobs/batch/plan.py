@@ -19,6 +19,7 @@ Paths are relative to the YAML file. Later is stronger: defaults, preset, job, c
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 from collections.abc import Iterator, Sequence
@@ -210,15 +211,18 @@ def _jobs(planned: list[_Planned]) -> list[Job]:
     ]
 
 
-def common_root(jobs: Sequence[Job]) -> Path:
-    """The deepest folder that holds all results; the present one where some lie behind URLs."""
-    if any(is_remote(job.root) for job in jobs):
-        return Path()
-    roots = {os.path.abspath(job.root) for job in jobs}
-    try:
-        return Path(os.path.commonpath(roots))
-    except ValueError:  # several drives
-        return Path()
+def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
+    """Where a batch keeps its manifest: the folder of its results; of several that do not lie in one of them,
+    or lie behind URLs, the folder of the batch file, or, where there is not just one, the current folder.
+    """
+    away = any(is_remote(job.root) for job in jobs)
+    roots = set() if away else {os.path.abspath(job.root) for job in jobs}
+    with contextlib.suppress(ValueError):  # none, or on several drives
+        common = os.path.commonpath(roots)
+        if common in roots:
+            return Path(common)
+    is_file = len(inputs) == 1 and inputs[0].lower().endswith(BATCH_ENDINGS)
+    return Path(inputs[0]).parent if is_file else Path()
 
 
 def in_shard(job: Job, root: Path, index: int, count: int) -> bool:

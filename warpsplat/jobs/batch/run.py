@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import stat
 import time
@@ -22,6 +23,8 @@ from warpsplat.jobs.executors.work import digest, failure, make_folder
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.svg.inspect import svg_text
 from warpsplat.svg.write import read_metadata
+
+log = logging.getLogger(__name__)
 
 Status = Literal["made", "skipped", "failed", "stopped", "planned"]
 
@@ -175,12 +178,15 @@ class Batch:
             OutputError: the manifest cannot be written.
             ResourceError: there are no workers.
         """
-        todo = list(range(len(self.jobs)))
+        todo, waiting = list(range(len(self.jobs))), False
         while todo and not stop():
             later: list[int] = []
             for outcome in executor.run(self._tasks(todo, later, stop), stop, advance):
                 advance(outcome.number, 1.0)
                 self._settle(outcome)
+            if later and not waiting:
+                waiting = True
+                log.info("waiting for %d images that another process has in work", len(later))
             if len(later) == len(todo):
                 time.sleep(PAUSE)
             todo = later
@@ -253,7 +259,7 @@ class Batch:
             # What bears no mark is known by its digest, which must be noted before it is written.
             bring=self._carry or away or job.settings.minify,
             measure=measure,
-            result=read_result(job.output) if measure and away else None,
+            result=read_result(job.output) if measure and (away or self._carry) else None,
         )
 
     def _mask(self, job: Job, found: Prepared) -> Source | None:
