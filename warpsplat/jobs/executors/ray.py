@@ -216,7 +216,7 @@ class RayCluster:
     def _heard(self, worker: Worker) -> Outcome | None:
         """Take what a worker answered."""
         answer, task = worker.answer, worker.task
-        worker.answer = worker.task = None
+        worker.answer = worker.task = worker.part = None
         try:
             said = self._ray.get(answer)
         except self._ray.exceptions.RayError as error:
