@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from warpsplat.cli.cluster import Cluster, cluster_of, cluster_options
 from warpsplat.cli.options import (
     FILE,
     importance_option,
@@ -43,6 +44,8 @@ class Manner:
     threads: int | None = None
     shard: tuple[int, int] = (1, 1)
     manifest: Path | None = None
+    cluster: Cluster | None = None
+    """Other machines; None: this one."""
     quiet: bool = False
     as_json: bool = False
 
@@ -82,6 +85,7 @@ class Shard(click.ParamType):
     metavar="N",
     help="Images at the same time, each in a process.  [default: one a core, if that pays]",
 )
+@cluster_options
 @click.option("--shard", type=Shard(), default=(1, 1), help="Do the I-th of N parts of the images.")
 @click.option(
     "--manifest",
@@ -107,6 +111,8 @@ def command(
     dry_run: bool,
     retry_failed: bool,
     workers: int | None,
+    executor: str | None,
+    gpus: float | None,
     shard: tuple[int, int],
     manifest: Path | None,
     threads: int | None,
@@ -137,7 +143,10 @@ def command(
         "device": device,
         "importance": None if importance is None else str(importance),
     }
-    manner = Manner(overwrite, retry_failed, dry_run, workers, threads, shard, manifest, quiet, as_json)
+    cluster = cluster_of(executor, gpus)
+    manner = Manner(
+        overwrite, retry_failed, dry_run, workers, threads, shard, manifest, cluster, quiet, as_json
+    )
     perform(inputs, flags, sets, manner)
 
 
@@ -195,6 +204,8 @@ def executor_for(jobs: Sequence[Job], manner: Manner, interrupt: Interrupt) -> t
     Raises:
         UsageError: a device that is not here; that is found before the first image.
     """
+    if manner.cluster:
+        return manner.cluster.executor(manner.workers), manner.threads or 1
     from warpsplat.jobs.executors.pool import Pool
     from warpsplat.jobs.executors.serial import Serial
     from warpsplat.jobs.executors.split import divided

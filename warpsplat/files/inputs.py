@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from warpsplat.errors import ImageError
+from warpsplat.files.remote import is_remote, read_remote
 
 STANDARD = Path("-")
 """Stands for the standard input, and for the standard output."""
@@ -34,7 +35,9 @@ def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) ->
     """
     name = input_name(path)
     try:
-        if path == STANDARD:
+        if is_remote(path):
+            data = read_remote(path, limit)
+        elif path == STANDARD:
             data = sys.stdin.buffer.read(limit + 1)
         else:
             with path.open("rb") as file:

@@ -24,6 +24,7 @@ from pathlib import Path
 
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.inputs import STANDARD
+from warpsplat.files.remote import is_remote, read_remote, write_remote
 
 SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
 """In the head of every SVG written here (``svg.write_svg``), now and by earlier versions."""
@@ -147,14 +148,18 @@ def may_replace(path: Path) -> bool:
 
     Raises:
         OSError: it cannot be read.
+        ImageError: the same, behind a URL.
     """
     try:
-        with path.open("rb") as file:
-            head = file.read(HEAD)
-            if head.startswith(b"%PDF-"):
-                size = file.seek(0, os.SEEK_END)
-                file.seek(max(0, size - len(PDF_MARK)))
-                return file.read() == PDF_MARK
+        if is_remote(path):
+            head = read_remote(path, HEAD)
+        else:
+            with path.open("rb") as file:
+                head = file.read(HEAD)
+                if head.startswith(b"%PDF-"):
+                    size = file.seek(0, os.SEEK_END)
+                    file.seek(max(0, size - len(PDF_MARK)))
+                    return file.read() == PDF_MARK
     except FileNotFoundError:
         return True
     head = unpacked(head)
@@ -204,6 +209,9 @@ def write_result(path: Path, data: bytes) -> None:
     Raises:
         OutputError: it could not be written.
     """
+    if is_remote(path):
+        write_remote(path, data)
+        return
     if path != STANDARD:
         write_atomically(path, data)
         return

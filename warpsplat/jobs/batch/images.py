@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from warpsplat.errors import UsageError
-
-WILD = "*?["
-"""Characters that make a name a pattern."""
+from warpsplat.files.remote import WILD, find_remote, is_remote, is_url, remote
 
 ENDINGS = (
     *(".png", ".jpg", ".jpeg", ".jfif", ".webp", ".avif", ".gif", ".bmp", ".tif", ".tiff"),
@@ -43,6 +41,12 @@ def find_images(name: str, base: Path) -> list[Found]:
 
 
 def _found(name: str, base: Path) -> Iterator[Found]:
+    if is_url(name):
+        if is_remote(remote(name)):
+            images, root = find_remote(name, ENDINGS)
+            yield from (Found(image, root) for image in images)
+            return
+        name = str(remote(name))
     path = Path(name).expanduser()
     whole = base / path
     if whole.is_dir():

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from warpsplat.errors import OutputError, UsageError
+from warpsplat.files.remote import is_remote
 
 try:
     import fcntl
@@ -53,7 +54,7 @@ class Entry:
     """An event in the life of a result."""
 
     output: str
-    """The result, relative to the manifest's folder, with slashes."""
+    """The result, relative to the manifest's folder, with slashes; or its URL."""
     key: str
     event: Event
     digest: str = ""
@@ -189,6 +190,8 @@ class Manifest:
 
     def name(self, output: Path) -> str:
         """How entries call a result."""
+        if is_remote(output):
+            return str(output)
         relative = os.path.relpath(os.path.abspath(output), self._folder)
         return Path(relative).as_posix().encode("utf-8", "backslashreplace").decode()
 

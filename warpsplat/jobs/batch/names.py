@@ -13,6 +13,7 @@ from typing import Any
 
 from warpsplat.errors import UsageError
 from warpsplat.files.output import SVG_ENDINGS, check_folder, check_target
+from warpsplat.files.remote import check_remote, is_remote, is_url, remote
 from warpsplat.fit.settings import DEFAULT_QUALITY, Settings
 from warpsplat.jobs.batch.images import Found
 from warpsplat.jobs.batch.layers import Place
@@ -85,7 +86,7 @@ def name_results(wanted: Sequence[Wanted]) -> list[Path]:
             outputs.append(filled_in(item))
         else:
             outputs.append(folder / f"{path.stem if stems[folder, path.stem] == 1 else path.name}.svg")
-        if os.path.realpath(outputs[-1]) == os.path.realpath(path):
+        if _real(outputs[-1]) == _real(path):
             raise item.place(f"output: {path} would be overwritten by its own result; give another one")
     counts = Counter(outputs)
     for item, output in zip(wanted, outputs, strict=True):
@@ -102,7 +103,8 @@ def filled_in(item: Wanted) -> Path:
         UsageError: a field that there is not.
     """
     path, root = item.image
-    folder = os.path.relpath(path.parent, root)
+    away = is_remote(path)
+    folder = path.parent.relative_to(root).as_posix() if away else os.path.relpath(path.parent, root)
     fields = {**item.fields, "stem": path.stem, "name": path.name, "folder": folder}
 
     def value(found: re.Match[str]) -> str:
@@ -116,7 +118,12 @@ def filled_in(item: Wanted) -> Path:
     name = FIELD.sub(value, str(item.output))
     if not name.lower().endswith(SVG_ENDINGS):
         raise item.place(f"output: {name}: names of results end with {' or '.join(SVG_ENDINGS)}")
-    return Path(os.path.normpath(name))
+    return remote(name.replace("/./", "/")) if is_url(name) else Path(os.path.normpath(name))
+
+
+def _real(path: Path) -> str:
+    """The file itself, behind all links."""
+    return str(path) if is_remote(path) else os.path.realpath(path)
 
 
 def _text(value: Any) -> str:
@@ -136,6 +143,9 @@ def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
     for place, output in zip(places, outputs, strict=True):
         folder = output.parent
         try:
+            if is_remote(folder):
+                check_remote(folder)
+                continue
             if folder not in usable:
                 _check_folder(folder)
                 usable.add(folder)

@@ -31,6 +31,7 @@ import yaml
 
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD
+from warpsplat.files.remote import is_remote, is_url, remote
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.batch.file import BatchFile
 from warpsplat.jobs.batch.images import Found, find_images
@@ -188,7 +189,7 @@ def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Ite
 def _path(key: str, item: Value) -> Path:
     """A path that a key gives, relative to where it was given."""
     try:
-        return item.base / Path(item.value).expanduser()
+        return remote(item.value) if is_url(item.value) else item.base / Path(item.value).expanduser()
     except RuntimeError as error:
         raise item.place(f"{key}: {item.value!r}: {error}") from error
 
@@ -212,9 +213,10 @@ def _jobs(planned: list[_Planned]) -> list[Job]:
 
 def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
     """Where a batch keeps its manifest: the folder of its results; of several that do not lie in one of them,
-    the folder of the batch file, or, where there is not just one, the current folder.
+    or lie behind URLs, the folder of the batch file, or, where there is not just one, the current folder.
     """
-    roots = {os.path.abspath(job.root) for job in jobs}
+    away = any(is_remote(job.root) for job in jobs)
+    roots = set() if away else {os.path.abspath(job.root) for job in jobs}
     with contextlib.suppress(ValueError):  # none, or on several drives
         common = os.path.commonpath(roots)
         if common in roots:
@@ -227,5 +229,6 @@ def in_shard(job: Job, root: Path, index: int, count: int) -> bool:
     """Whether ``job`` belongs to part ``index`` (from 1) of ``count``: by its result's name below ``root``,
     whatever else is in the list, and whatever the image is changed to.
     """
-    name = Path(os.path.relpath(job.output, root)).as_posix()
+    away = is_remote(job.output)
+    name = str(job.output) if away else Path(os.path.relpath(job.output, root)).as_posix()
     return int.from_bytes(hashlib.sha256(os.fsencode(name)).digest()[:8], "big") % count == index - 1

@@ -15,9 +15,10 @@ from typing import Any, Literal, NamedTuple
 from warpsplat.errors import ImageError, OutputError
 from warpsplat.files.inputs import MAX_INPUT, read_input
 from warpsplat.files.output import GZIP, HEAD, may_replace, write_result
+from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.jobs.batch.manifest import Entry, Manifest
 from warpsplat.jobs.batch.plan import Job
-from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Stop, Task
+from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Source, Stop, Task
 from warpsplat.jobs.executors.work import digest, failure, make_folder
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.svg.inspect import svg_text
@@ -85,6 +86,11 @@ def prepare(job: Job) -> Prepared:
 def standing(job: Job, key: str, manifest: Manifest) -> Standing:
     """Whether the result of ``key`` is there, whole: its mark says so, or the manifest knows its bytes."""
     entries = [entry for entry in manifest.entries(job.output) if entry.key == key]
+    if is_remote(job.output):
+        # The manifest is believed: fetching each result would take longer than many take to make.
+        latest = entries[-1] if entries else None
+        if latest and latest.event == "made" and exists(job.output):
+            return Standing(True, latest)
     data = read_result(job.output)
     if data is not None:
         sum_ = digest(data)
@@ -99,6 +105,8 @@ def standing(job: Job, key: str, manifest: Manifest) -> Standing:
 
 def read_result(path: Path) -> bytes | None:
     """The bytes of a result; None if there is none, or no file."""
+    if is_remote(path):
+        return read_remote(path, MAX_INPUT) if listed(path) else None
     with contextlib.suppress(OSError):
         found = os.stat(path)
         if (
@@ -122,6 +130,8 @@ def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
     """The results that are there already and that warpsplat did not write."""
     found = []
     for job in jobs:
+        if is_remote(job.output) and (not listed(job.output) or manifest.entries(job.output)):
+            continue
         try:
             free = may_replace(job.output)
         except OSError:
@@ -236,20 +246,26 @@ class Batch:
 
     def _task(self, number: int, found: Prepared, *, measure: bool) -> Task:
         job = self.jobs[number]
+        away = is_remote(job.output)
         return Task(
             number,
-            found.image if self._carry else str(job.image),
+            found.image if self._carry or is_remote(job.image) else str(job.image),
             str(job.image),
             str(job.output),
             job.settings,
             job.device,
             self._threads,
-            None if job.importance is None else found.mask if self._carry else str(job.importance),
+            self._mask(job, found),
             # What bears no mark is known by its digest, which must be noted before it is written.
-            bring=self._carry or job.settings.minify,
+            bring=self._carry or away or job.settings.minify,
             measure=measure,
-            result=read_result(job.output) if measure and self._carry else None,
+            result=read_result(job.output) if measure and (away or self._carry) else None,
         )
+
+    def _mask(self, job: Job, found: Prepared) -> Source | None:
+        if job.importance is None:
+            return None
+        return found.mask if self._carry or is_remote(job.importance) else str(job.importance)
 
     def _settle(self, outcome: Outcome) -> None:
         """Write what is to be written, note it, and report it."""

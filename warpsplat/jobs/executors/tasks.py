@@ -43,8 +43,8 @@ class Task:
     """Whether the worker brings the result's bytes (``Outcome.data``) instead of writing ``output``."""
     measure: bool = False
     """Whether ``output`` is there already, and only its figures are wanted."""
-    result: bytes | None = None
-    """Its bytes, where it is to be measured and the worker does not see it."""
+    result: Source | None = None
+    """What is to be measured, where the worker does not see ``output``."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ class Executor(Protocol):
 
         * ``tasks`` is taken from only when a worker is free, or soon will be: taking a task claims it, and
           reads its image, so that no more are claimed than are in work (back-pressure).
-        * Whatever an image throws is its own outcome, ``failed``. A worker that is lost costs its task a
-          second try, and after that a ``failed`` outcome, never the batch.
+        * Whatever an image throws is its own outcome, ``failed``. A worker that is lost costs its task
+          another try, and after a few a ``failed`` outcome, never the batch.
         * Once ``stop`` says so, no further task is taken; those in work end soon, as ``stopped`` or as they
           would have.
         * ``advance`` is told how far tasks are, now and then, where that is known.

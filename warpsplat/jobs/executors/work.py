@@ -9,6 +9,7 @@ from pathlib import Path
 from warpsplat.errors import OutputError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import svg_bytes
+from warpsplat.files.remote import is_remote
 from warpsplat.fit.loop import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.jobs.vectorize import job_key, load_target, vectorize_image
@@ -53,13 +54,13 @@ def failure(error: BaseException, *names: str) -> str:
     return message if any(name in message for name in shown) else f"{shown[0]}: {message}"
 
 
-def read(source: Source) -> bytes:
-    """The bytes of an image.
+def read(source: Source, what: str = "an image") -> bytes:
+    """The bytes of an image, or of ``what`` it should be.
 
     Raises:
         ImageError: it cannot be read.
     """
-    return source if isinstance(source, bytes) else read_input(Path(source))
+    return source if isinstance(source, bytes) else read_input(Path(source), what)
 
 
 def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report | None) -> Outcome:
@@ -92,7 +93,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
 
 
 def _measured(task: Task, key: str, image: bytes) -> Outcome:
-    data = read_input(Path(task.output), "an SVG") if task.result is None else task.result
+    data = read(task.result or task.output, "an SVG")
     target = load_target(image, task.name, task.settings.background)
     score = score_svg(svg_text(data, task.output), target, eyes=False)
     return Outcome(task.number, "measured", key=key, digest=digest(data), figures=score.as_dict())
@@ -109,6 +110,8 @@ def make_folder(folder: Path) -> None:
     Raises:
         OutputError: it cannot be made.
     """
+    if is_remote(folder):
+        return  # comes with its files
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
