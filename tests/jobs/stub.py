@@ -12,7 +12,7 @@ from warpsplat.jobs.executors.tasks import Outcome, Task
 from warpsplat.jobs.executors.worker import Notice, Part
 
 
-def main(channel: Connection, parent: int, level: int) -> None:
+def main(channel: Connection, parent: int, level: int, workers: int) -> None:
     while isinstance(task := channel.recv(), Task):
         what = task.name
         if what == "stillborn":

@@ -90,6 +90,9 @@ def test_without_a_limit_it_is_the_machines(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(memory, "machine_memory", lambda: 10**9)
     assert memory_limit(Settings()) == 9 * 10**8
     assert factor_for(HUGE, Settings(), "huge.jpg") > 1
+    monkeypatch.setattr(memory._Process, "sharers", 1)
+    memory.share_machine(3)
+    assert memory_limit(Settings()) == 3 * 10**8
     monkeypatch.setattr(memory, "machine_memory", lambda: None)
     assert memory_limit(Settings()) is None
     assert factor_for(HUGE, Settings(), "huge.jpg") == 1

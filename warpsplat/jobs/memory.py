@@ -143,11 +143,25 @@ def facts_of(source: ImageSource) -> Facts | None:
 
 
 def memory_limit(settings: Settings) -> int | None:
-    """What a run may take [bytes]: the settings' limit, else ``SHARE`` of what the machine has."""
+    """What a run may take [bytes]: the settings' limit, else this process's part of ``SHARE`` of what the
+    machine has.
+    """
     if settings.max_memory:
         return settings.max_memory
     found = machine_memory()
-    return None if found is None else round(SHARE * found)
+    return None if found is None else round(SHARE * found / _Process.sharers)
+
+
+class _Process:
+    """What this process knows of the machine."""
+
+    sharers = 1
+    """Processes that do images here at the same time."""
+
+
+def share_machine(processes: int) -> None:
+    """Tell this process that it is one of so many that do images on this machine at the same time."""
+    _Process.sharers = processes
 
 
 def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1) -> int:

@@ -42,11 +42,14 @@ STILLBORN = 3
 class Worker:
     """A process, its channel, and the task that it has."""
 
-    def __init__(self) -> None:
+    def __init__(self, workers: int) -> None:
+        """``workers``: how many there are, this one counted."""
         context = multiprocessing.get_context("spawn")
         self.channel, other = context.Pipe()
         self.process: SpawnProcess = context.Process(
-            target=main, args=(other, os.getpid(), log.getEffectiveLevel()), name="warpsplat worker"
+            target=main,
+            args=(other, os.getpid(), log.getEffectiveLevel(), workers),
+            name="warpsplat worker",
         )
         with _signals_blocked():
             self.process.start()
@@ -192,7 +195,7 @@ class Pool:
         if self._stillborn >= STILLBORN:
             raise ResourceError("worker processes end as soon as they begin; --workers 1 does without them")
         try:
-            self._workers.append(Worker())
+            self._workers.append(Worker(self.workers))
         except OSError as error:
             raise ResourceError(f"a worker process cannot be started: {error.strerror}") from error
         return self._workers[-1]

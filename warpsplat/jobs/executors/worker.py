@@ -51,13 +51,14 @@ class _Notices(logging.Handler):
             self._channel.send(Notice(record.levelno, record.getMessage()))
 
 
-def main(channel: Connection, parent: int, level: int) -> None:
+def main(channel: Connection, parent: int, level: int, workers: int) -> None:
     """Do tasks until None comes, or nobody is left to send it.
 
     Args:
         channel: to the parent.
         parent: its process number.
         level: of the notices that it shows.
+        workers: how many share the machine, this one counted.
     """
     _end_with(parent)
     log = logging.getLogger("warpsplat")
@@ -69,13 +70,15 @@ def main(channel: Connection, parent: int, level: int) -> None:
         if task is None:
             return
         if isinstance(task, Task):  # a word to stop that came too late is none
-            _serve(channel, task)
+            _serve(channel, task, workers)
 
 
-def _serve(channel: Connection, task: Task) -> None:
+def _serve(channel: Connection, task: Task, workers: int) -> None:
     from warpsplat.fit.loop import Progress  # in here, as all that is heavy: the process must first be safe
     from warpsplat.jobs.executors.work import do
+    from warpsplat.jobs.memory import share_machine
 
+    share_machine(workers)
     stopped, begun, told = False, False, 0.0
 
     def stop() -> bool:
