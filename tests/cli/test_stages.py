@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 GENTLE = [signal.SIGINT, signal.SIGTERM]
-TRAINING = {"vectorize": 60, "batch": 170}
+TRAINING = {"vectorize": 60, "batch": 125}
 """Launches of kernels until the middle of the training, of a batch that of its second image."""
 BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {QUICK[-1]}}}\njobs: [{{images: '*.png'}}]\n"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from tests.fuzz import checkpoints, corpus, mutate
+from tests.fuzz import checkpoints, corpus, manifests, mutate
 from tests.fuzz.corpus import Seed
 from tests.fuzz.vocabulary import (
     FITS,
@@ -141,7 +141,15 @@ def _changed_yaml(rng: random.Random, data: bytes, other: bytes) -> bytes:
 
 
 def _checkpoint_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    return (Command(checkpoints.arguments(name), (USAGE, INPUT), "out.svg", consumes=True),)
+    return (Command(checkpoints.arguments(name, GOOD_IMAGE), (USAGE, INPUT), "out.svg", consumes=True),)
+
+
+def _manifest_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
+    return (Command(manifests.arguments(rng.random() < 0.5), (USAGE, int(ExitCode.SOME_FAILED))),)
+
+
+def _manifests() -> list[Seed]:
+    return manifests.manifests({name: data for name, data in FILES.items() if name.startswith("in/")})
 
 
 @dataclass(frozen=True)
@@ -162,6 +170,7 @@ TARGETS = {
     "svg": Target(corpus.svgs, (".svg", ".svgz"), _changed_svg, _svg_commands, 8),
     "yaml": Target(corpus.yamls, (".yaml", ".yml"), _changed_yaml, _yaml_commands, 2),
     "options": Target(lambda: [Seed("in.txt", b"-")], (), lambda rng, data, other: data, _option_commands, 1),
+    "manifest": Target(_manifests, (), manifests.changed, _manifest_commands, 1),
     "checkpoint": Target(checkpoints.checkpoints, (), checkpoints.changed, _checkpoint_commands, 2),
 }
 
@@ -225,10 +234,10 @@ def _judge_messages(command: Command, outcome: Outcome) -> str:
         return f"not one line on stderr: {outcome.stderr[:200]!r}"
     if outcome.code and not lines:
         return "failed without a word"
+    if "--json" in command.arguments:
+        return "" if _is_json(outcome.stdout) else f"no JSON on stdout: {outcome.stdout[:100]!r}"
     if outcome.code not in (0, ExitCode.GOAL_MISSED) and outcome.stdout:
         return "failed, and wrote to stdout"
-    if outcome.code == 0 and "--json" in command.arguments and not _is_json(outcome.stdout):
-        return f"no JSON on stdout: {outcome.stdout[:100]!r}"
     return ""
 
 

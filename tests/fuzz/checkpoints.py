@@ -66,10 +66,10 @@ def checkpoints() -> list[Seed]:
     return seeds
 
 
-def arguments(name: str) -> tuple[str, ...]:
-    """The command line that goes on from a checkpoint ``name`` of the picture ``good.png``."""
+def arguments(name: str, image: str) -> tuple[str, ...]:
+    """The command line that goes on from a checkpoint ``name`` of the picture ``image``."""
     flags = RUNS[Path(name).suffix]
-    return ("vectorize", "good.png", "-o", "out.svg", *COMMON, *flags, "--checkpoint", name, "--resume")
+    return ("vectorize", image, "-o", "out.svg", *COMMON, *flags, "--checkpoint", name, "--resume")
 
 
 def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:

@@ -14,7 +14,7 @@ from tests.fuzz.worker import Outcome, Worker
 pytestmark = pytest.mark.slow
 
 SEED = 21
-COUNTS = {"image": 120, "svg": 60, "yaml": 50, "options": 50, "checkpoint": 40}
+COUNTS = {"image": 120, "svg": 60, "yaml": 50, "options": 50, "checkpoint": 40, "manifest": 40}
 
 
 @pytest.mark.parametrize("target", TARGETS)

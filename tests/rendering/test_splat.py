@@ -158,7 +158,7 @@ def test_overflow_is_counted_and_mended(device: str) -> None:
 
 def test_a_scene_past_the_limits_is_refused(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpsplat.rendering.renderer.SLOT_LIMIT", 3)
-    with pytest.raises(CapacityError, match="fewer curves or a smaller image"):
+    with pytest.raises(CapacityError, match="fewer shapes or a smaller image"):
         renderer_for(random_scene(FILL), device, model=SPLAT)
 
 

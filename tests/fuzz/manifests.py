@@ -1,0 +1,56 @@
+"""Manifests to change: of what a batch finds in the folder ``in``, so that its entries are looked up."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from pathlib import Path
+
+from tests.fuzz import mutate
+from tests.fuzz.corpus import Seed
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.batch.manifest import Entry
+from warpsplat.jobs.vectorize import job_key
+
+NAME = "case.jsonl"
+FIGURES = {"psnr": 20.5, "bytes": 700, "seconds": 1.5, "paths": 4, "missed": [], "levels": []}
+
+WORDS = (
+    "v", "time", "output", "key", "event", "digest", "image", "error", "figures", "made", "failed", "writing",
+    "psnr", "bytes", "seconds", "true", "null", "NaN", "Infinity", "out/a.svg", "1e308", "\n",
+)  # fmt: skip
+
+SNIPPETS = (
+    "\n", "\r", "{", "}", "[", "]", ",", '"', "[" * 2000, "{}\n", "null\n", "9" * 5000, "1e999", '"\\ud800"',
+    '"\\u0000"', "\0", "-", '{"v": 1}\n', '"v": 2', "../../x.svg",
+)  # fmt: skip
+
+
+def arguments(json: bool) -> tuple[str, ...]:
+    """The command line of a batch that reads the manifest, and does nothing."""
+    fit = ("--curves", "4", "--iterations", "2", "--device", "cpu", "--dry-run", "--manifest", NAME)
+    return ("batch", "in", "-o", "out", *fit, *(("--json",) if json else ()))
+
+
+def manifests(images: Mapping[str, bytes]) -> list[Seed]:
+    """One of failures, one of results that are gone, one of both.
+
+    Args:
+        images: by their paths.
+    """
+    settings = make_settings(curves=4, iterations=2)
+    keys = {f"out/{Path(name).stem}.svg": job_key(settings, data) for name, data in images.items()}
+    failed = b"".join(
+        Entry(name, key, "failed", error=f"{name}: not an image").line() for name, key in keys.items()
+    )
+    made = b"".join(Entry(name, key, "made", "0" * 64, figures=FIGURES).line() for name, key in keys.items())
+    return [Seed("failed.jsonl", failed), Seed("made.jsonl", made), Seed("both.jsonl", made + failed)]
+
+
+def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:
+    """Words and numbers, or bytes; seldom nothing but a torn end."""
+    if rng.random() < 0.1:
+        return data[: rng.randrange(len(data) + 1)]
+    if rng.random() < 0.3:
+        return mutate.mutate_bytes(rng, data, other)
+    return mutate.mutate_text(rng, data, other, WORDS, SNIPPETS)
