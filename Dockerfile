@@ -1,10 +1,10 @@
 # syntax=docker/dockerfile:1
 #
 #   docker build -t warpsplat .
-#   docker run --rm -u "$(id -u):$(id -g)" -v "$PWD:/work" warpsplat vectorize photo.jpg
+#   docker run --rm -u "$(id -u):$(id -g)" -v "$PWD:/images" warpsplat vectorize photo.jpg
 #
 #   docker build -t warpsplat:cuda --target cuda .        # needs the NVIDIA container toolkit where it runs
-#   docker run --rm --gpus all -v warpsplat-kernels:/var/cache/warpsplat -v "$PWD:/work" warpsplat:cuda ...
+#   docker run --rm --gpus all -v warpsplat-kernels:/var/cache/warpsplat -v "$PWD:/images" warpsplat:cuda ...
 
 ARG PYTHON=3.12
 
@@ -21,7 +21,7 @@ ENV PATH=/opt/warpsplat/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     WARP_CACHE_PATH=/var/cache/warpsplat
 RUN useradd --uid 1000 --create-home warpsplat \
-    && install --directory --owner=warpsplat --mode=1777 /var/cache/warpsplat /work
+    && install --directory --owner=warpsplat --mode=1777 /var/cache/warpsplat /images
 USER warpsplat
 # Kernels for the CPU are compiled here, once, and whoever runs the image may add others. Those for a GPU are compiled
 # where there is one: Warp's wheel brings its compiler along, so that no image of CUDA is needed.
@@ -32,7 +32,7 @@ RUN --mount=type=bind,source=docs/images/cat.jpg,target=/tmp/cat.jpg \
            || exit 1; \
        done \
     && rm /tmp/cat.svg && chmod -R a+rwX /var/cache/warpsplat
-WORKDIR /work
+WORKDIR /images
 ENTRYPOINT ["warpsplat"]
 CMD ["--help"]
 
