@@ -80,6 +80,14 @@ def test_figures_that_are_no_numbers_are_left_out(value: bytes) -> None:
     assert entry.figures == {"bytes": 7}
 
 
+def test_an_error_is_one_line_that_commands_nothing() -> None:
+    line = GOOD.line().replace(b'"image"', b'"error": "one\\ntwo \\u001b[2J", "image"')
+    entry = entry_of(line)
+    assert entry
+    assert entry.error.isprintable()
+    assert entry.error.startswith("one")
+
+
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (

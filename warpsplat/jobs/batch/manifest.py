@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from warpsplat.errors import OutputError, UsageError
+from warpsplat.errors import OutputError, UsageError, printable
 from warpsplat.files.remote import is_remote
 
 try:
@@ -91,6 +91,7 @@ def entry_of(line: bytes) -> Entry | None:
             return None
         if not texts["output"] or not texts["key"]:
             return None
+        texts["error"] = printable(texts["error"])  # it is shown, whoever wrote it
         return Entry(event=values["event"], figures=sound(figures), **texts)
     except (ValueError, RecursionError):
         return None
