@@ -33,6 +33,8 @@ EXTRAS = {
     "pdf": ("typst", "outputs that end in .pdf"),
     "eyes": ("ssimulacra2", "SSIMULACRA2 in reports"),
     "compare": ("vtracer", "warpsplat compare"),
+    "ray": ("ray", "warpsplat batch --executor ray"),
+    "remote": ("upath", "images and results behind URLs"),
 }
 """Extra -> its package, and what it is for."""
 
@@ -178,6 +180,7 @@ def check_devices() -> Check:
 
 def check_machine() -> Check:
     """Cores and memory."""
+    from warpsplat.native import free_memory
     from warpsplat.rendering.backend import available_cores
 
     values: dict[str, Any] = {"cpu_threads": available_cores(), "free_memory": free_memory()}
@@ -188,16 +191,6 @@ def check_machine() -> Check:
     if free < 1e9 * LEAST_MEMORY:
         return Check("machine", "note", text, "large images need more; end other programs", values)
     return Check("machine", "ok", text, values=values)
-
-
-def free_memory() -> int | None:
-    """Bytes that can be had, swapping aside; None where the system does not say."""
-    try:
-        text = Path("/proc/meminfo").read_text()
-    except OSError:
-        return None
-    found = re.search(r"MemAvailable:\s+(\d+) kB", text)
-    return int(found[1]) * 1024 if found else None
 
 
 def check_cache() -> Check:

@@ -1,4 +1,4 @@
-"""Native code of libraries: what it prints behind Python's back, and the memory that it keeps."""
+"""Below Python: what native code prints behind its back, the memory it keeps, memory that is free."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import ctypes
 import os
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 _lock = threading.Lock()
 _hiding = 0
@@ -70,3 +71,12 @@ def release_memory() -> None:
     """
     with contextlib.suppress(AttributeError, OSError, TypeError):  # another C library, or Windows
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def free_memory() -> int | None:
+    """Memory that can be had without swapping [bytes]; None where the system does not say (not Linux)."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) << 10
+    return None

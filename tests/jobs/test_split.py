@@ -37,7 +37,7 @@ def test_cores_are_shared(
     made: tuple[int, int],
 ) -> None:
     monkeypatch.setattr(split, "available_cores", lambda: 8)
-    monkeypatch.setattr(split, "_free_memory", lambda: memory * MEMORY)
+    monkeypatch.setattr(split, "free_memory", lambda: memory * MEMORY)
     assert divided(settings, workers, threads, on_cpu=True) == made
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable
-from pathlib import Path
 
 from warpsplat.fit.settings import Settings
+from warpsplat.native import free_memory
 from warpsplat.rendering.backend import available_cores
 
 WORTH = 400_000
@@ -36,14 +35,7 @@ def divided(
         efforts = [one.curves * one.iterations for one in settings]
         workers = 1
         if on_cpu and sum(efforts) >= WORTH:
-            workers = max(1, min(cores // (threads or 1), len(efforts), _free_memory() // MEMORY))
+            free = free_memory()
+            room = cores if free is None else free // MEMORY
+            workers = max(1, min(cores // (threads or 1), len(efforts), room))
     return workers, threads if threads or not on_cpu else max(1, cores // workers)
-
-
-def _free_memory() -> int:
-    """Memory that can be had without swapping [bytes]."""
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) << 10
-    return MEMORY * available_cores()  # not Linux: as much as is asked for
