@@ -17,8 +17,8 @@ from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
-from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Settings
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.vectorize import Result
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.scene import Kind

@@ -112,14 +112,21 @@ def test_a_callback_sees_the_history_and_ends_the_run(tmp_path: Path, device: st
 
     def enough(progress: warpsplat.Progress) -> bool:
         seen.append(progress)
+        assert progress.snapshot
+        scene = progress.snapshot.scene()
+        assert len(scene) == progress.shapes
+        shown.append(np.abs(progress.snapshot.image() - warpsplat.render(scene)[..., :3]).mean())
         return len(seen) == 2
 
+    shown: list[float] = []
     path = tmp_path / "a.svg"
     result = warpsplat.vectorize(
         photograph(), 6, subject="photo", iterations=200, device=device, callback=enough, output=path
     )
     assert result.stopped
     assert tuple(seen) == result.history
+    assert all(progress.snapshot is None for progress in result.history)
+    assert max(shown) < 0.03
     assert result.iterations < 200
     assert path.read_text() == result.svg
     result.save(tmp_path / "b.svgz")
@@ -210,7 +217,7 @@ def test_what_is_public_is_there_and_light() -> None:
     public = {
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
         *("starting_scene", "load_image"),
-        *("Result", "Score", "Progress", "Settings", "Scene", "Canvas", "__version__"),
+        *("Result", "Score", "Progress", "Snapshot", "Settings", "Scene", "Canvas", "__version__"),
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }
     assert set(warpsplat.__all__) == public == set(dir(warpsplat))

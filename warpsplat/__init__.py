@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from warpsplat.errors import ResourceError as ResourceError
     from warpsplat.errors import UsageError as UsageError
     from warpsplat.errors import WarpsplatError as WarpsplatError
-    from warpsplat.fit.loop import Progress as Progress
     from warpsplat.fit.settings import Settings as Settings
     from warpsplat.fit.settings import make_settings as make_settings
+    from warpsplat.fit.work import Progress as Progress
+    from warpsplat.fit.work import Snapshot as Snapshot
     from warpsplat.jobs.render import to_pillow as to_pillow
     from warpsplat.jobs.vectorize import Result as Result
     from warpsplat.metrics import Score as Score
@@ -44,7 +45,7 @@ _HOMES = {
     ),
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
-    "Progress": "warpsplat.fit.loop",
+    **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
     "to_pillow": "warpsplat.jobs.render",
     "Result": "warpsplat.jobs.vectorize",
     "Score": "warpsplat.metrics",

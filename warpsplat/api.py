@@ -19,13 +19,13 @@ import numpy.typing as npt
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.export import export
-from warpsplat.fit.loop import Progress
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Painting, Quality, Renderer, Settings, Subject, make_settings
 from warpsplat.fit.stages import INTERVAL
 from warpsplat.fit.step import model_for
 from warpsplat.fit.texts import parse_duration
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.checkpoint import CheckpointFile
 from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.options import settings_from

@@ -17,8 +17,8 @@ import pytest
 
 from tests.cli.helpers import QUICK, one_line, run
 from warpsplat.cli.run import Bar
-from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import make_settings
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import THREADS_PER_CORE, Backend, available_cores
 from warpsplat.svg.viewer import render_svg

@@ -12,12 +12,13 @@ from tests.fit.pictures import picture
 from tests.scenes import mixed_scene
 from warpsplat.errors import UsageError
 from warpsplat.fit.layered import fit_layered
-from warpsplat.fit.loop import Progress, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import levels_of, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_levels
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend

@@ -10,13 +10,14 @@ import pytest
 from tests.fit.pictures import picture
 from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
-from warpsplat.fit.loop import Progress, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.mend import mend
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
+from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.program import Launch
 from warpsplat.scene import ATTRIBUTES, Kind, Scene

@@ -15,8 +15,8 @@ from tests import ROOT
 from tests.fit.pictures import picture
 from warpsplat.cli.summary import summary
 from warpsplat.files.image import load_image
-from warpsplat.fit.loop import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.vectorize import has_time_for_eyes, render_figures, vectorize
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind

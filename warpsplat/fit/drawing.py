@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.constraints import Constraints, Drawing, Ints, Keeper
-from warpsplat.fit.loop import Progress
 from warpsplat.fit.mend import mend
 from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
+from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Canvas, FloatArray, Scene
 
@@ -113,7 +113,8 @@ def refine_drawing(
             if error < least:
                 best, least = found, error
             if report:
-                report(Progress(done, how.steps, step.psnr(), 0.0, done / how.steps, True))
+                work, shapes = done / how.steps, step.state.shape_count
+                report(Progress(done, how.steps, step.psnr(), 0.0, work, True, shapes, step.snapshot()))
         if done - gained >= PATIENCE or (stop and stop()):
             break
     if how.colors == "fitted":

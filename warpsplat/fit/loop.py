@@ -32,8 +32,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
-from warpsplat.fit.work import Progress as Progress  # noqa: PLC0414 - it is offered here as well
-from warpsplat.fit.work import fit_cost
+from warpsplat.fit.work import Progress, fit_cost
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.arrays import from_arrays, to_arrays
@@ -226,7 +225,8 @@ class _Run:
         )
         work = min(spent / task.seconds, 1.0) if task.seconds else cost / whole
         fine = step.target.phase is task.plan[-1]
-        return Progress(done, settings.iterations, step.psnr(), spent, work, fine)
+        shapes, now = step.state.shape_count, step.snapshot()
+        return Progress(done, settings.iterations, step.psnr(), spent, work, fine, shapes, now)
 
     def turn(self) -> None:
         """What is due after the steps so far: rounding, a look at the file, surgery."""

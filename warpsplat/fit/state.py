@@ -49,6 +49,11 @@ class FitState:
         clock.fill_(step)
         return FitState(Parameters(scene, backend), clock, rng, step, base=base)
 
+    @property
+    def shape_count(self) -> int:
+        """Shapes that are drawn: pictures which a file keeps are none."""
+        return self.parameters.shape_count - len(self.parameters.pictures)
+
     def scene(self) -> Scene:
         """The current scene, on the host."""
         return self.parameters.scene()

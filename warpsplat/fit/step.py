@@ -18,6 +18,7 @@ from warpsplat.fit.schedule import Phase, fold_weight
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
+from warpsplat.fit.work import Snapshot
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import ExactModel, GaussianModel, Model, SplatModel
 from warpsplat.rendering.program import Program, capture
@@ -215,3 +216,7 @@ class Step:
         """Of the last render against the image, at its size [dB]. Reads the render back from the device."""
         error = squares(self.renderer.read_image() - self.target.image).mean(dtype="float64") / 3
         return -10 * math.log10(max(error, 1e-12))
+
+    def snapshot(self) -> Snapshot:
+        """What there is now, for people to look at."""
+        return Snapshot(self.state.scene, self.renderer.read_image)

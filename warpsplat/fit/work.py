@@ -10,12 +10,26 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from warpsplat.fit.schedule import Phase, phases, shapes_at
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.backend import Backend
-from warpsplat.scene import Kind
+from warpsplat.scene import FloatArray, Kind, Scene
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The shapes of a run between two steps, which is read from the device when it is asked for."""
+
+    scene: Callable[[], Scene]
+    """The shapes, on the canvas of the image that is worked on: smaller than the file's in a run that is
+    reduced to stay below a limit of memory.
+    """
+    image: Callable[[], FloatArray]
+    """The render of the step before, sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity,
+    shape (height, width, 4); of the size that the training has come to.
+    """
 
 
 @dataclass(frozen=True)
@@ -36,6 +50,10 @@ class Progress:
     """
     fine: bool
     """Whether the size is the finest: on a reduced image the same shapes have more decibels."""
+    shapes: int = 0
+    """That there are now."""
+    snapshot: Snapshot | None = field(default=None, repr=False, compare=False)
+    """What there is now: to be used while the report is heard, and None in a run's history."""
 
 
 Report = Callable[[Progress], None]

@@ -11,9 +11,9 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
-from warpsplat.fit.loop import Progress, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.fit.work import Meter, run_cost, score_cost
+from warpsplat.fit.work import Meter, Progress, run_cost, score_cost
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, noting, training_seconds
 from warpsplat.metrics import psnr, score_svg

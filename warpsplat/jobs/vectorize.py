@@ -21,12 +21,12 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.layered import fit_layered
-from warpsplat.fit.loop import Progress, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
-from warpsplat.fit.work import Meter, run_cost, score_cost
+from warpsplat.fit.work import Meter, Progress, run_cost, score_cost
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.memory import has_room_for_eyes
@@ -389,7 +389,7 @@ def noting(history: list[Progress], report: Callable[[Progress], None] | None) -
     """
 
     def note(progress: Progress) -> None:
-        history.append(progress)
+        history.append(replace(progress, snapshot=None))  # which keeps a run's arrays
         if len(history) % RELEASE_INTERVAL == 0:
             release_memory()
         if report:

@@ -53,7 +53,7 @@ class Actor:
         unseen = tuple(sight.path for sight in sights if Sight.of(sight.path) != sight)
         if unseen:
             return unseen
-        from warpsplat.fit.loop import Progress  # in here, as all that is heavy: hello is quick
+        from warpsplat.fit.work import Progress  # in here, as all that is heavy: hello is quick
         from warpsplat.jobs.executors.work import do
 
         self._stop.clear()

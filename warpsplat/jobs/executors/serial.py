@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 
-from warpsplat.fit.loop import Progress
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.executors.tasks import Advance, Outcome, Stop, Task
 from warpsplat.jobs.executors.work import do
 

@@ -10,7 +10,7 @@ from warpsplat.errors import OutputError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import svg_bytes
 from warpsplat.files.remote import is_remote
-from warpsplat.fit.loop import Progress
+from warpsplat.fit.work import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.jobs.vectorize import job_key, load_target, vectorize_image
 from warpsplat.metrics import score_svg

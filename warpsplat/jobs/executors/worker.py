@@ -74,7 +74,7 @@ def main(channel: Connection, parent: int, level: int, workers: int) -> None:
 
 
 def _serve(channel: Connection, task: Task, workers: int) -> None:
-    from warpsplat.fit.loop import Progress  # in here, as all that is heavy: the process must first be safe
+    from warpsplat.fit.work import Progress  # in here, as all that is heavy: the process must first be safe
     from warpsplat.jobs.executors.work import do
     from warpsplat.jobs.memory import share_machine
 
