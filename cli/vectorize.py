@@ -14,8 +14,8 @@ from warpsplat.cli.options import (
     checkpoint_options,
     importance_option,
     overwrite_option,
-    quality_options,
     run_options,
+    several_quality_options,
 )
 from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
@@ -29,11 +29,11 @@ from warpsplat.jobs.options import settings_from
     "-o",
     "--output",
     type=FILE,
-    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder."
-    "  [default: IMAGE with .svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder, of several numbers of"
+    " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@quality_options
+@several_quality_options
 @importance_option
 @checkpoint_options
 @run_options
@@ -61,9 +61,16 @@ def command(
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
     against the image, number of paths, size. They go to stderr where the SVG
-    goes to stdout. Several images are made as batch makes them.
+    goes to stdout. Several images are made as batch makes them. Several numbers
+    of shapes (--curves 50,200,1000) make a file each, and share work.
     """
+    numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
     if len(images) > 1:
+        if numbers:
+            raise UsageError(
+                "several images, each with several numbers of shapes: a batch file, with "
+                f"matrix: {{curves: {list(numbers)}}}"
+            )
         device_given = None if device == "auto" else device
         several(
             images,
@@ -74,6 +81,26 @@ def command(
         )
         return
     image = images[0]
+    if numbers:
+        if as_uri or checkpoint or resume:
+            flag = "--data-uri" if as_uri else "--checkpoint" if checkpoint else "--resume"
+            raise UsageError(f"several numbers of shapes and {flag} do not go together")
+        from warpsplat.cli.several import make_several
+
+        make_several(
+            image,
+            output,
+            numbers,
+            given,
+            importance=importance,
+            overwrite=overwrite,
+            device=device,
+            threads=threads,
+            verbose=verbose,
+            quiet=quiet,
+            as_json=as_json,
+        )
+        return
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import check_output

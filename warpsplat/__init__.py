@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from warpsplat.api import score as score
     from warpsplat.api import starting_scene as starting_scene
     from warpsplat.api import vectorize as vectorize
+    from warpsplat.api import vectorize_several as vectorize_several
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
     from warpsplat.errors import ResourceError as ResourceError
@@ -37,7 +38,17 @@ if TYPE_CHECKING:
 
 _HOMES = {
     **dict.fromkeys(
-        ("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "starting_scene"),
+        (
+            "vectorize",
+            "vectorize_several",
+            "refine",
+            "render",
+            "load_image",
+            "load_svg",
+            "save_svg",
+            "score",
+            "starting_scene",
+        ),
         "warpsplat.api",
     ),
     **dict.fromkeys(

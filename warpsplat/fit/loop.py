@@ -65,6 +65,7 @@ def fit(
     scene: Scene | None = None,
     below: Scene | None = None,
     begin: int = 0,
+    grows: bool | None = None,
     per_pixel: float | None = None,
     thrifty: bool = False,
     finish: bool = True,
@@ -80,10 +81,11 @@ def fit(
         image: sRGB in [0, 1], shape (height, width, 3).
         settings: all that decides the result.
         backend: where to compute.
-        scene: shapes to start from, whose number stays; without, new ones.
+        scene: shapes to start from, whose number stays unless it ``grows``; without, new ones.
         below: shapes of earlier levels, that the settings' number of new ones are put in front of.
         finish: whether a file is made of the result; else nothing is rounded for it.
         begin: step of the schedule to start at.
+        grows: whether the number of shapes follows the schedule; by default, where no ``scene`` is given.
         per_pixel: units of the view box a pixel; without, they are chosen.
         thrifty: whether to choose those that are worth their bytes, rather than some that lose little.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size.
@@ -108,7 +110,7 @@ def fit(
     plan = phases(settings, image.shape[1], image.shape[0])
     weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
     ends = (*level_ends(below), len(below)) if below else ()
-    grows = scene is None
+    grows = scene is None if grows is None else grows
     task = _Task(
         image,
         start,

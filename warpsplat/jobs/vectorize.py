@@ -147,6 +147,7 @@ def vectorize(
     *,
     metadata: str = "",
     scene: Scene | None = None,
+    begin: int = 0,
     importance: FloatArray | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -163,6 +164,8 @@ def vectorize(
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
         scene: shapes to start from; without, new ones.
+        begin: step of the schedule that ``scene`` has come to: from there on there are as many shapes as the
+            schedule says. 0: their number stays.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
             those of the whole image all the same.
         report: called every few steps.
@@ -217,9 +220,11 @@ def vectorize(
             settings,
             backend,
             scene=scene,
+            begin=begin,
+            grows=scene is None or begin > 0,
             importance=importance,
             seconds=seconds,
-            report=Meter(report, after).stage(run_cost(settings, width, height), 0),
+            report=Meter(report, after).stage(run_cost(settings, width, height, begin), 0),
             stop=stop,
             stages=fits,
         )
@@ -448,6 +453,52 @@ def vectorize_image(
         CheckpointError, UsageError: see ``CheckpointFile``.
         ResourceError: the limit of memory is too low for any size.
     """
+    work = prepare(source, settings, name=name, importance=importance, keyed=keyed)
+    stages = None
+    if checkpoint:
+        identified = identity("vectorize", settings, work.target, work.importance)
+        stages = checkpoint.stages(identified, backend)
+    result = make(work, backend, output=output, report=report, stop=stop, stages=stages)
+    if checkpoint and not result.stopped:
+        checkpoint.remove()
+    return result
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """An image that was read, and all that a run on it needs to know."""
+
+    target: FloatArray
+    """What shapes are fitted to, see ``vectorize``."""
+    settings: Settings
+    """With a subject."""
+    why: str
+    """The subject; empty where it was given."""
+    importance: FloatArray | None
+    reduction: Reduction | None
+    key: str = ""
+    """Of the job, where the file is to name it."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image [px]."""
+        if self.reduction:
+            return self.reduction.width, self.reduction.height
+        return self.target.shape[1], self.target.shape[0]
+
+
+def prepare(
+    source: ImageSource,
+    settings: Settings,
+    *,
+    name: str | None = None,
+    importance: ImageSource | None = None,
+    keyed: bool = False,
+) -> Prepared:
+    """Read an image and its mask, at a size that memory has room for, and see what it shows.
+
+    Arguments and errors are those of ``vectorize_image``.
+    """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
     key = ""
@@ -463,35 +514,49 @@ def vectorize_image(
     chosen, why = decided(target, settings)
     target, factor = memory.smaller(target, name, chosen, factor)
     release_memory()
-    reduction = memory.reduction(factor, target, chosen)
-    height, width = target.shape[:2]
-    if reduction:
-        height, width = reduction.height, reduction.width
-    mask = None if importance is None else load_importance(importance, width, height, mask_name)
-    stages = None
-    if checkpoint:
-        stages = checkpoint.stages(identity("vectorize", settings, target, mask), backend)
-    history: list[Progress] = []
+    work = Prepared(target, chosen, why, None, memory.reduction(factor, target, chosen), key)
+    if importance is None:
+        return work
+    return replace(work, importance=load_importance(importance, *work.size, mask_name))
+
+
+def make(
+    work: Prepared,
+    backend: Backend,
+    *,
+    scene: Scene | None = None,
+    begin: int = 0,
+    output: Path | None = None,
+    report: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    stages: Stages | None = None,
+) -> Result:
+    """A run on what was prepared, and its file; arguments are those of ``vectorize_image``, ``scene`` and
+    ``begin`` those of ``vectorize``.
+    """
+    settings, history = work.settings, list[Progress]()
 
     def on_paper(svg: str) -> str:
         return placed(svg, settings.size, settings.page, settings.units)
 
     result = vectorize(
-        target,
-        chosen,
+        work.target,
+        settings,
         backend,
-        metadata=key,
-        importance=mask,
+        metadata=work.key,
+        scene=scene,
+        begin=begin,
+        importance=work.importance,
         report=noting(history, report),
         stop=stop,
         write=None if output is None else lambda svg: write_named(output, on_paper(svg)),
         stages=stages,
-        reduction=reduction,
+        reduction=work.reduction,
     )
-    if checkpoint and not result.stopped:
-        checkpoint.remove()
     release_memory()
-    return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
+    return replace(
+        result, svg=on_paper(result.svg), subject=settings.subject, why=work.why, history=tuple(history)
+    )
 
 
 def _read(source: ImageSource) -> ImageSource:
