@@ -1,7 +1,7 @@
-"""Runs on one image with more and more shapes, each of which begins with what the one before had found.
+"""Fits of one image with more and more shapes, each of which goes on with what the one before had found.
 
-A run is a third of its way when as many shapes are there as a smaller run had when it was that far and
-further: from those it goes on. What was tried besides is in docs/experiments.md.
+A fit grows to a surplus, trains it, and thins it. Before it thins, its shapes and what the optimizer knows of
+them are kept: from there the next fit grows on, further, and leaves out the beginning of its own schedule.
 """
 
 from __future__ import annotations
@@ -10,91 +10,89 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import DENSITY_RANGES, Settings
+from warpsplat.fit.state import Past
 from warpsplat.fit.work import Progress, Report, run_cost, score_cost
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 
 BEGIN = 0.375
-"""Share of a run's steps that are left out where it begins with the shapes of a smaller one."""
+"""Share of its schedule that a fit leaves out where it goes on from another one (docs/experiments.md)."""
 
-EXTRA = 1.1
-"""Steps of such a run's schedule over those of another one: what it has left is 0.69 of these."""
+ROOM = 0.75
+"""Share of the time until all shapes are there of which ``BEGIN`` is at the most."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start:
-    """How a run begins."""
+    """What a fit goes on from."""
 
-    settings: Settings
-    scene: Scene | None = None
-    """Shapes to begin with; None: new ones."""
-    begin: int = 0
-    """Step of the schedule."""
-
-
-def _longer(settings: Settings) -> Settings:
-    """Of a run that begins with the shapes of a smaller one: what is missing comes at once, so that it is as
-    old as can be in the end.
-    """
-    density = replace(settings.density, start=1.0)
-    return replace(settings, iterations=round(EXTRA * settings.iterations), density=density)
-
-
-def _begin(settings: Settings) -> int:
-    """The step at which such a run begins: one of surgery."""
-    turn = max(settings.density.interval, 1)
-    return max(1, round(BEGIN * settings.iterations) // turn * turn)
+    scene: Scene
+    past: Past
+    begin: int
+    """Step of its schedule that it begins at."""
 
 
 class Series:
-    """Runs of ascending numbers of shapes, one after the other."""
+    """Fits of ascending numbers of shapes, one after the other."""
 
     def __init__(
         self, settings: Settings, numbers: Sequence[int], width: int, height: int, backend: Backend
     ) -> None:
-        """``numbers``: of shapes; the image is of ``width`` x ``height`` pixels."""
+        """``settings``: of all; the image has ``width`` x ``height`` pixels."""
         self._settings = settings
-        self._scene: Scene | None = None
-        self._size = width, height
-        self._measured = score_cost(width, height, backend, eyes=True)
-        self._costs: dict[int, float] = {}
-        for first, number in enumerate(sorted(numbers)):
-            self._costs[number] = self._cost(number, is_first=first == 0)
+        self._numbers = sorted(numbers)
+        self._kept: tuple[Scene, Past] | None = None
+        measured = score_cost(width, height, backend, eyes=True)
+        self._costs = {
+            number: measured
+            + run_cost(replace(settings, curves=number), width, height, begin_of(settings) if later else 0)
+            for later, number in enumerate(self._numbers)
+        }
         self._started = time.monotonic()
 
-    def _cost(self, number: int, *, is_first: bool) -> float:
-        chosen = replace(self._settings, curves=number)
-        if is_first:
-            return run_cost(chosen, *self._size) + self._measured
-        longer = _longer(chosen)
-        return run_cost(longer, *self._size, _begin(longer)) + self._measured
-
-    def start(self, number: int) -> Start:
-        """Of the run with ``number`` shapes, which has more than the ones before."""
+    def next(self, number: int) -> tuple[Settings, Start | None]:
+        """The settings of the fit with ``number`` shapes, which are more than those before, and its start."""
         settings = replace(self._settings, curves=number)
-        if self._scene is None:
-            return Start(settings)
-        longer = _longer(settings)
-        return Start(longer, self._scene, _begin(longer))
+        begin = begin_of(settings)
+        if self._kept is None or begin == 0:
+            return settings, None
+        scene, past = self._kept
+        return growing(settings, len(scene), begin), Start(scene, past, begin)
 
-    def watch(self, start: Start, report: Report | None) -> Report:
-        """What the run that begins so reports to: it keeps the shapes that the next one is to begin with, and
-        passes on to ``report`` how much of the whole work is done.
+    def watch(self, number: int, report: Report | None) -> Report:
+        """What the fit with ``number`` shapes reports to: it keeps what the next one begins with, and tells
+        ``report`` how much is done of the work of all.
         """
-        number = start.settings.curves
-        before = sum(cost for other, cost in self._costs.items() if other < number)
+        full = self._settings.density.thin * self._settings.iterations
+        before = sum(self._costs[other] for other in self._numbers if other < number)
         share, whole = self._costs[number], sum(self._costs.values())
-        is_last = number == max(self._costs)
-        taken = False
+        waits = number != self._numbers[-1]
 
         def told(now: Progress) -> None:
-            nonlocal taken
-            full = now.step >= start.settings.density.thin * start.settings.iterations
-            if full and not taken and not is_last and now.snapshot:
-                self._scene, taken = now.snapshot.scene(), True
+            nonlocal waits
+            if waits and now.step >= full and now.snapshot and now.snapshot.past:
+                self._kept, waits = (now.snapshot.scene(), now.snapshot.past()), False
             if report:
                 work = (before + share * now.work) / whole
                 report(replace(now, work=work, seconds=time.monotonic() - self._started))
 
         return told
+
+
+def begin_of(settings: Settings) -> int:
+    """The step at which a fit begins that goes on from another one: that of a turn; 0 where there is none."""
+    density = settings.density
+    if density.interval <= 0:
+        return 0
+    share = min(BEGIN, ROOM * density.grown)
+    return round(share * settings.iterations) // density.interval * density.interval
+
+
+def growing(settings: Settings, shapes: int, begin: int) -> Settings:
+    """``settings`` whose schedule has so many ``shapes`` at the step ``begin``, and then grows as before."""
+    density = settings.density
+    left = 1 - begin / (density.grown * settings.iterations)
+    start = density.surplus * (shapes / (density.surplus * settings.curves)) ** (1 / left)
+    low, high = DENSITY_RANGES["start"]
+    return replace(settings, density=replace(density, start=min(max(start, low), high)))

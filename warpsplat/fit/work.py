@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 from warpsplat.fit.schedule import Phase, phases, shapes_at
 from warpsplat.fit.settings import Settings
+from warpsplat.fit.state import Past
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Kind, Scene
 
@@ -30,6 +31,8 @@ class Snapshot:
     """The render of the step before, sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity,
     shape (height, width, 4); of the size that the training has come to.
     """
+    past: Callable[[], Past] | None = None
+    """What the optimizer knows of the shapes, for a fit that goes on from them."""
 
 
 @dataclass(frozen=True)

@@ -120,13 +120,12 @@ def _made(
             if output is not None:
                 write_named(output, last.svg)
             return last
-    start = series.start(number)
+    settings, start = series.next(number)
     return make(
-        replace(work, settings=start.settings),
+        replace(work, settings=settings),
         backend,
-        scene=start.scene,
-        begin=start.begin,
+        start=start,
         output=output,
-        report=series.watch(start, report),
+        report=series.watch(number, report),
         stop=stop,
     )

@@ -24,6 +24,7 @@ from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
+from warpsplat.fit.several import Start
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
 from warpsplat.fit.work import Meter, Progress, run_cost, score_cost
@@ -146,8 +147,7 @@ def vectorize(
     backend: Backend,
     *,
     metadata: str = "",
-    scene: Scene | None = None,
-    begin: int = 0,
+    start: Start | None = None,
     importance: FloatArray | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -163,9 +163,7 @@ def vectorize(
         settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
-        scene: shapes to start from; without, new ones.
-        begin: step of the schedule that ``scene`` has come to: from there on there are as many shapes as the
-            schedule says. 0: their number stays.
+        start: how to begin, in place of with new shapes.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
             those of the whole image all the same.
         report: called every few steps.
@@ -179,11 +177,11 @@ def vectorize(
     started = time.monotonic()
     fits = None if settings.time_budget else stages
     seconds = training_seconds(settings, target, started)
-    traced = scene is None and settings.subject not in {"auto", "photo"}
+    traced = start is None and settings.subject not in {"auto", "photo"}
     height, width = target.shape[:2]
     after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
     after += len(settings.levels) * score_cost(width, height, backend, eyes=False)
-    pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
+    pursued = start is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
             target,
@@ -201,7 +199,7 @@ def vectorize(
         made = draw(
             target, settings, backend, seconds=seconds, report=report, after=after, stop=stop, stages=fits
         )
-    elif scene is None and settings.levels:
+    elif start is None and settings.levels:
         made = fit_layered(
             target,
             settings,
@@ -213,18 +211,20 @@ def vectorize(
             stages=fits,
         )
     else:
-        if settings.simplify and scene is None:
+        if settings.simplify and start is None:
             settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
         made = fit(
             target,
             settings,
             backend,
-            scene=scene,
-            begin=begin,
-            grows=scene is None or begin > 0,
+            scene=start.scene if start else None,
+            past=start.past if start else None,
+            begin=start.begin if start else 0,
             importance=importance,
             seconds=seconds,
-            report=Meter(report, after).stage(run_cost(settings, width, height, begin), 0),
+            report=Meter(report, after).stage(
+                run_cost(settings, width, height, start.begin if start else 0), 0
+            ),
             stop=stop,
             stages=fits,
         )
@@ -524,15 +524,14 @@ def make(
     work: Prepared,
     backend: Backend,
     *,
-    scene: Scene | None = None,
-    begin: int = 0,
+    start: Start | None = None,
     output: Path | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
     stages: Stages | None = None,
 ) -> Result:
-    """A run on what was prepared, and its file; arguments are those of ``vectorize_image``, ``scene`` and
-    ``begin`` those of ``vectorize``.
+    """A run on what was prepared, and its file; arguments are those of ``vectorize_image``, ``start`` that of
+    ``vectorize``.
     """
     settings, history = work.settings, list[Progress]()
 
@@ -544,8 +543,7 @@ def make(
         settings,
         backend,
         metadata=work.key,
-        scene=scene,
-        begin=begin,
+        start=start,
         importance=work.importance,
         report=noting(history, report),
         stop=stop,
