@@ -19,8 +19,10 @@ from warpsplat.scene import Scene
 BEGIN = 0.375
 """Share of its schedule that a fit leaves out where it goes on from another one (docs/experiments.md)."""
 
-ROOM = 0.75
-"""Share of the time until all shapes are there of which ``BEGIN`` is at the most."""
+TURNS = 5
+"""In which the number of shapes grows from what it goes on from, at the least: many at a time find bad places.
+Runs of few steps have fewer, and begin anew.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +83,13 @@ class Series:
 
 
 def begin_of(settings: Settings) -> int:
-    """The step at which a fit begins that goes on from another one: that of a turn; 0 where there is none."""
+    """The step at which a fit begins that goes on from another one: that of a turn; 0 where it begins anew."""
     density = settings.density
     if density.interval <= 0:
         return 0
-    share = min(BEGIN, ROOM * density.grown)
-    return round(share * settings.iterations) // density.interval * density.interval
+    latest = density.grown * settings.iterations - TURNS * density.interval
+    share = min(BEGIN * settings.iterations, max(latest, 0.0))
+    return round(share) // density.interval * density.interval
 
 
 def growing(settings: Settings, shapes: int, begin: int) -> Settings:
