@@ -12,13 +12,14 @@ from typing import Any
 
 import click
 
-from warpsplat.api import vectorize, vectorize_several
+from warpsplat.api import suggest, vectorize, vectorize_several
 from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.work import Progress
+from warpsplat.jobs.suggest import Suggestion
 from warpsplat.jobs.vectorize import Result
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.scene import Kind
@@ -163,6 +164,34 @@ def run_several(
             numbers,
             settings=settings,
             outputs=outputs,
+            device=device,
+            threads=threads,
+            name=input_name(source),
+            importance=importance,
+            callback=report,
+            stop=interrupt,
+        )
+
+
+def suggest_file(
+    source: Path,
+    settings: Settings,
+    *,
+    data: bytes,
+    device: str,
+    threads: int | None,
+    importance: Path | None = None,
+    verbose: int = 0,
+    quiet: bool = False,
+) -> Suggestion | None:
+    """``warpsplat.suggest`` for the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
+    start_warp()
+    choose_device(device)
+    interrupt = Interrupt()
+    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
+        return suggest(
+            data,
+            settings=settings,
             device=device,
             threads=threads,
             name=input_name(source),

@@ -8,15 +8,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from warpsplat.cli.report import check_report
 from warpsplat.cli.run import run_several, say_about
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, read_input
-from warpsplat.files.output import check_output
+from warpsplat.files.output import check_output, write_result
+from warpsplat.fit.settings import Settings
 from warpsplat.jobs.batch.images import Found
 from warpsplat.jobs.batch.names import Wanted, fields_of, name_results
 from warpsplat.jobs.formats import ENDINGS, check_format
 from warpsplat.jobs.options import settings_from
+from warpsplat.jobs.reports.command import several_command
+from warpsplat.jobs.reports.several import Version, file_name, several_page
 from warpsplat.jobs.several import check_several
 from warpsplat.jobs.vectorize import Result
 
@@ -32,6 +36,7 @@ def make_several(
     *,
     importance: Path | None,
     overwrite: bool,
+    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -51,6 +56,7 @@ def make_several(
     for path in outputs:
         check_output(path, *inputs, endings=ENDINGS, overwrite=overwrite)
         check_format(path)
+        check_report(report, inputs, path, overwrite=overwrite)
     results = run_several(
         image,
         outputs,
@@ -74,9 +80,30 @@ def make_several(
         say(json.dumps(each))
     elif not quiet:
         say(table(made))
+    if report and made:
+        _write_report(report, made, image, data, settings, output, numbers, importance)
 
 
-def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Any) -> list[Path]:
+def _write_report(
+    report: Path,
+    made: Sequence[tuple[Path, Result]],
+    image: Path,
+    data: bytes,
+    settings: Settings,
+    output: Path | None,
+    numbers: Sequence[int],
+    importance: Path | None,
+) -> None:
+    """Write the page that compares what was made."""
+    further = () if importance is None else ("--importance", str(importance))
+    line = several_command(settings, numbers, str(image), output, *further)
+    versions = [Version(result, file_name(path)) for path, result in made]
+    versions.sort(key=lambda version: version.shapes)
+    name = "image" if image == STANDARD else image.name
+    write_result(report, several_page(versions, data, name=name, command=line).encode())
+
+
+def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Settings) -> list[Path]:
     """The file of each number: ``photo-50.svg`` here or in the folder that is given, or by its pattern.
 
     Raises:

@@ -17,7 +17,9 @@ from warpsplat.cli.options import (
     run_options,
     several_quality_options,
 )
+from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
+from warpsplat.cli.suggest import suggest_number, suggest_option
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
@@ -36,22 +38,26 @@ from warpsplat.jobs.options import settings_from
 @several_quality_options
 @importance_option
 @checkpoint_options
+@report_option
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@suggest_option
 def command(
     images: tuple[Path, ...],
     output: Path | None,
     overwrite: bool,
     importance: Path | None,
+    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
     quiet: bool,
     as_uri: bool,
     as_json: bool,
+    suggest: bool,
     checkpoint: Path | None,
     resume: bool,
     checkpoint_every: str,
@@ -64,6 +70,20 @@ def command(
     goes to stdout. Several images are made as batch makes them. Several numbers
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
+    if suggest:
+        if len(images) > 1 or output or report or as_uri or checkpoint or resume:
+            raise UsageError("--suggest takes one image, and writes nothing")
+        suggest_number(
+            images[0],
+            given,
+            importance=importance,
+            device=device,
+            threads=threads,
+            quiet=quiet,
+            verbose=verbose,
+            as_json=as_json,
+        )
+        return
     numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
     if len(images) > 1:
         if numbers:
@@ -76,7 +96,7 @@ def command(
             images,
             output,
             {**given, "device": device_given, "importance": importance},
-            Manner(overwrite=overwrite, threads=threads, quiet=quiet, as_json=as_json),
+            Manner(overwrite=overwrite, threads=threads, report=report, quiet=quiet, as_json=as_json),
             as_uri=as_uri,
         )
         return
@@ -94,6 +114,7 @@ def command(
             given,
             importance=importance,
             overwrite=overwrite,
+            report=report,
             device=device,
             threads=threads,
             verbose=verbose,
@@ -119,6 +140,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
+    check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(
@@ -141,11 +163,19 @@ def command(
 
         say(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
+    if report:
+        values["report"] = str(report)
     aside = as_uri or output == STANDARD
     if as_json:
         say(json.dumps(values), err=aside)
     elif not quiet:
         say(summary(output, values), err=aside)
+    if report:
+        from warpsplat.jobs.reports.command import vectorize_command
+
+        further = () if importance is None else ("--importance", str(importance))
+        line = vectorize_command(settings, str(image), str(output), *further)
+        write_report(report, result, image, data, output, line, device=device, threads=threads)
     leave(result)
 
 

@@ -20,7 +20,7 @@ BEGIN = 0.375
 """Share of its schedule that a fit leaves out where it goes on from another one (docs/experiments.md)."""
 
 TURNS = 5
-"""In which the number of shapes grows from what it goes on from, at the least: many at a time find bad places.
+"""In which the number of shapes grows from where it goes on, at the least: many at a time find bad places.
 Runs of few steps have fewer, and begin anew.
 """
 
@@ -83,7 +83,7 @@ class Series:
 
 
 def begin_of(settings: Settings) -> int:
-    """The step at which a fit begins that goes on from another one: that of a turn; 0 where it begins anew."""
+    """The step at which a fit goes on from another one: that of a turn; 0 where it begins anew."""
     density = settings.density
     if density.interval <= 0:
         return 0

@@ -1,4 +1,4 @@
-"""How good a picture gets with how many shapes, estimated by one short fit whose shapes grow from few to many."""
+"""How good a picture gets with how many shapes: by a short fit whose shapes grow from few to many."""
 
 from __future__ import annotations
 
@@ -92,9 +92,7 @@ def survey(
         if report:
             report(now)
 
-    made = fit(
-        image, chosen, backend, finish=False, importance=importance, report=told, stop=stop
-    )
+    made = fit(image, chosen, backend, finish=False, importance=importance, report=told, stop=stop)
     if made.interrupted:
         return None
     return curve_through(seen, FEWEST, most, detail_of(image, chosen))
