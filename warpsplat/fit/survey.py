@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -17,13 +16,14 @@ from warpsplat.fit.place import simple_curves
 from warpsplat.fit.rounding import USUAL_GRID, finest
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.work import Progress, Report
+from warpsplat.fit.state import Past
+from warpsplat.fit.work import Meter, Progress, Report, run_cost
 from warpsplat.rendering.backend import Backend
-from warpsplat.scene import FloatArray
+from warpsplat.scene import FloatArray, Scene
 
 FEWEST, MOST = 16, 1024
-"""Shapes between which the knee is looked for: below is no likeness, above a file is seldom smaller than a
-photograph's JPEG.
+"""Shapes between which the curve is measured: fewer make no likeness, more a file that is larger than many a
+JPEG of the same photograph.
 """
 
 STEPS, INTERVAL = 400, 20
@@ -32,11 +32,22 @@ STEPS, INTERVAL = 400, 20
 SETTLED = 2.0
 """Shapes over ``FEWEST`` from which on the fit says something: the first ones have just been placed."""
 
-LATER_ERROR = 0.93
-"""Squared error of a run of the default effort over that of the survey's fit with as many shapes."""
+PROBED = 256
+"""Shapes with which it is measured what the curve misses: the reduced image lacks details."""
 
-DETAIL = 0.55
-"""Share of the details that the reduced image lacks which runs at the full size do not show either."""
+PROBE = 30
+"""Steps of that, at the finest size ..."""
+
+PROBE_RUN = 200
+"""... as the last ones of a run of so many: small ones."""
+
+GAIN_AT, GAIN_DOUBLES = 25.0, 4.3
+"""A run of the default effort gains a decibel over a probe of so many [dB], and twice as much over one that has
+so much more [dB]: what is easily drawn gains most. Fitted to five pictures (docs/experiments.md).
+"""
+
+MOST_GAIN = 5.0
+"""[dB]"""
 
 LATER_BYTES = 0.92
 """Bytes of a run's shapes over those of the survey's: they lose points and opacities."""
@@ -44,31 +55,54 @@ LATER_BYTES = 0.92
 
 @dataclass(frozen=True)
 class Curve:
-    """Quality and size as functions of the number of shapes, from ``fewest`` to ``most``.
+    """Quality and size by the number of shapes, from ``fewest`` to ``most``.
 
-    The error falls as a power of the number of shapes, whose exponent changes slowly: decibels are a parabola
-    over the logarithm of the number. Bytes are a power of it.
+    On the reduced image decibels are a parabola over the logarithm of the number. A run's squared error is
+    that of the reduced image times ``factor``, and what is left of its ``detail``. Bytes are a power of the
+    number.
     """
 
     fewest: int
     most: int
     parabola: tuple[float, float, float]
-    """Decibels of the reduced picture: coefficients of log2(shapes), the highest power first."""
-    detail: float
-    """Squared error that is left of details in any case."""
+    """Coefficients for log2(shapes), the highest power first [dB]."""
     power: tuple[float, float]
-    """Of the bytes: coefficients of log2(shapes) for log2(bytes)."""
+    """Of log2(bytes), likewise."""
     misfit: float
     """Root of the mean squared distance of the measured decibels from the parabola [dB]."""
+    factor: float = 1.0
+    detail: float = 0.0
+
+    def reduced(self, shapes: float | npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Mean squared error on the reduced image."""
+        return np.asarray(10 ** (-np.polyval(self.parabola, np.log2(shapes)) / 10))
 
     def psnr(self, shapes: float | npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """What a run of the default effort is expected to have with so many shapes [dB]."""
-        reduced = 10 ** (-np.polyval(self.parabola, np.log2(shapes)) / 10)
-        return np.asarray(-10 * np.log10(LATER_ERROR * reduced + self.detail))
+        return np.asarray(-10 * np.log10(self.factor * self.reduced(shapes) + self.detail))
 
     def size(self, shapes: float | npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Bytes that its file is expected to have."""
         return np.asarray(2 ** np.polyval(self.power, np.log2(shapes)))
+
+    def through(self, shapes: int, psnr: float, lost: float) -> Curve:
+        """The curve of which a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the squared error,
+        ``lost`` is what this size lacks of the image.
+        """
+        error, before = 10 ** (-psnr / 10), float(self.reduced(shapes))
+        if error < before:
+            return replace(self, factor=error / before, detail=lost)
+        return replace(self, factor=1.0, detail=error - before + lost)
+
+
+@dataclass
+class _Seen:
+    """What is noted of the fit."""
+
+    shapes: list[int] = field(default_factory=list)
+    decibels: list[float] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
+    probed: tuple[Scene, Past] | None = None
 
 
 def survey(
@@ -82,53 +116,78 @@ def survey(
 ) -> Curve | None:
     """Measure the curve of an image; None where it was stopped. Arguments are those of ``fit``."""
     most = max(FEWEST, min(MOST, simple_curves(image)))
-    chosen = _surveying(settings, most)
-    seen: list[tuple[int, float, int]] = []
+    growing = _growing(settings, most)
+    probing = _probing(settings, min(PROBED, most))
+    height, width = image.shape[:2]
+    costs = run_cost(growing, width, height), run_cost(probing, width, height, PROBE_RUN - PROBE)
+    meter, seen = Meter(report), _Seen()
+    told = meter.stage(costs[0], costs[1])
 
-    def told(now: Progress) -> None:
+    def note(now: Progress) -> None:
         if now.step % INTERVAL == 0 and now.snapshot and now.shapes >= min(SETTLED * FEWEST, most):
-            size = len(export(now.snapshot.scene(), chosen, min(USUAL_GRID, finest(chosen))))
-            seen.append((now.shapes, now.psnr, size))
-        if report:
-            report(now)
+            scene = now.snapshot.scene()
+            seen.shapes.append(now.shapes)
+            seen.decibels.append(now.psnr)
+            seen.sizes.append(len(export(scene, growing, min(USUAL_GRID, finest(growing)))))
+            if now.snapshot.past and not seen.probed and now.shapes >= min(PROBED, most):
+                seen.probed = scene, now.snapshot.past()
+        if told:
+            told(now)
 
-    made = fit(image, chosen, backend, finish=False, importance=importance, report=told, stop=stop)
-    if made.interrupted:
+    made = fit(image, growing, backend, finish=False, importance=importance, report=note, stop=stop)
+    if made.interrupted or seen.probed is None:
         return None
-    return curve_through(seen, FEWEST, most, detail_of(image, chosen))
-
-
-def _surveying(settings: Settings, most: int) -> Settings:
-    """A fit on the reduced image whose shapes grow all the way, geometrically, without a surplus."""
-    density = replace(
-        settings.density,
-        start=FEWEST / most,
-        surplus=1.0,
-        grown=1.0,
-        thin=1.0,
-        stop=1.0,
-        interval=INTERVAL,
+    curve = curve_through(seen.shapes, seen.decibels, seen.sizes, most)
+    scene, past = seen.probed
+    probe = fit(
+        image,
+        replace(probing, curves=len(scene)),
+        backend,
+        scene=scene,
+        past=past,
+        begin=PROBE_RUN - PROBE,
+        finish=False,
+        importance=importance,
+        report=meter.stage(costs[1], 0),
+        stop=stop,
     )
+    if probe.interrupted:
+        return None
+    gain = min(2 ** ((probe.render_psnr - GAIN_AT) / GAIN_DOUBLES), MOST_GAIN)
+    return curve.through(len(scene), probe.render_psnr + gain, lost_detail(image, probing))
+
+
+def _growing(settings: Settings, most: int) -> Settings:
+    """A fit on the reduced image whose shapes grow all the way, geometrically, without a surplus."""
+    all_the_way = {"surplus": 1.0, "grown": 1.0, "thin": 1.0, "stop": 1.0, "interval": INTERVAL}
+    density = replace(settings.density, start=FEWEST / most, **all_the_way)
     return replace(settings, curves=most, simplify=False, iterations=STEPS, coarse=1.0, density=density)
 
 
-def curve_through(seen: list[tuple[int, float, int]], fewest: int, most: int, detail: float) -> Curve:
-    """The curve that fits measured shapes, decibels and bytes best; see ``Curve``."""
-    shapes, decibels, sizes = (np.array(column, np.float64) for column in zip(*seen, strict=True))
-    x = np.log2(shapes)
-    degree = min(2, len(np.unique(x)) - 1)
-    found = np.polyfit(x, decibels, degree)
-    parabola = np.concatenate([np.zeros(2 - degree), found])
-    power = np.polyfit(x, np.log2(LATER_BYTES * sizes), 1) if degree else np.array([0.0, math.log2(sizes[0])])
+def _probing(settings: Settings, shapes: int) -> Settings:
+    """A fit at the finest size whose shapes stay."""
+    density = replace(settings.density, interval=0)
+    return replace(settings, curves=shapes, simplify=False, iterations=PROBE_RUN, coarse=0.0, density=density)
+
+
+def curve_through(
+    shapes: list[int], decibels: list[float], sizes: list[int], most: int, fewest: int = FEWEST
+) -> Curve:
+    """The curve that fits what was measured on the reduced image best, shape (measurement,) each."""
+    x = np.log2(np.array(shapes, np.float64))
+    degree = min(2, len(set(shapes)) - 1)
+    parabola = [0.0] * (2 - degree) + np.polyfit(x, decibels, degree).tolist()
+    degree = min(1, degree)
+    power = [0.0] * (1 - degree) + np.polyfit(x, np.log2(LATER_BYTES * np.array(sizes)), degree).tolist()
     misfit = float(np.sqrt(np.mean((np.polyval(parabola, x) - decibels) ** 2)))
-    a, b, c = map(float, parabola)
-    return Curve(fewest, most, (a, b, c), DETAIL * detail, (float(power[0]), float(power[1])), misfit)
+    a, b, c = parabola
+    return Curve(fewest, most, (a, b, c), (power[0], power[1]), misfit)
 
 
-def detail_of(image: FloatArray, settings: Settings) -> float:
-    """Mean squared difference of an image and what its reduced size, which ``settings`` say, has of it."""
+def lost_detail(image: FloatArray, settings: Settings) -> float:
+    """Mean squared difference of an image and what its finest size in a fit has of it."""
     height, width = image.shape[:2]
-    phase = phases(settings, width, height)[0]
+    phase = phases(settings, width, height)[-1]
     if (phase.width, phase.height) == (width, height):
         return 0.0
     small = cv2.resize(image, (phase.width, phase.height), interpolation=cv2.INTER_AREA)

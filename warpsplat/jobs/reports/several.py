@@ -152,8 +152,8 @@ def _words(results: Sequence[Version], at: int | None) -> str:
         return 1000 * (_psnr(two) - _psnr(one)) / (len(two.result.svg) - len(one.result.svg))
 
     return (
-        f"Of these, {here.shapes} shapes are at the knee: up to there a kB buys {bought(before, here):.2g} dB, "
-        f"beyond it {bought(here, after):.2g} dB."
+        f"Of these, {here.shapes} shapes are at the knee: up to there a kB buys "
+        f"{bought(before, here):.2g} dB, beyond it {bought(here, after):.2g} dB."
     )
 
 
