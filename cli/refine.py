@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.motion import Motion, motion_options
 from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
@@ -41,6 +42,7 @@ from warpsplat.jobs.options import BY_NAME
     help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
 )
 @checkpoint_options
+@motion_options
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
@@ -66,6 +68,7 @@ def command(
     IMAGE may be - for the standard input. The figures go to stderr where the
     SVG goes to stdout.
     """
+    motion = Motion.of(given)
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
@@ -75,6 +78,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, svg, image)
+    motion.check(svg, image, output, *filter(None, [checkpoint]), overwrite=overwrite)
     from warpsplat.api import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
@@ -92,7 +96,7 @@ def command(
             output=output,
             device=device,
             threads=threads,
-            callback=report,
+            callback=motion.watch(report),
             stop=interrupt,
             name=input_name(svg),
             checkpoint=checkpoint,
@@ -100,6 +104,7 @@ def command(
             checkpoint_every=checkpoint_every,
             overwrite=overwrite,
         )
+    motion.finish(result, quiet=quiet)
     before = result.before or 0.0
     if result.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)

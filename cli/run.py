@@ -104,11 +104,13 @@ def run_file(
     importance: Path | None = None,
     verbose: int = 0,
     quiet: bool = False,
+    watch: Callable[[Callable[[Progress], None]], Callable[[Progress], None]] | None = None,
     **keeping: Any,
 ) -> Result:
     """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask. ``keeping``: how its state is kept, see there.
+    ``importance``: file of a mask. ``watch``: makes of the bar's function the one that hears of the run.
+    ``keeping``: how its state is kept, see there.
     """
     pursued = settings.target_psnr or settings.max_bytes
     start_warp()
@@ -129,7 +131,7 @@ def run_file(
             threads=threads,
             name=input_name(source),
             importance=importance,
-            callback=report,
+            callback=watch(report) if watch else report,
             stop=interrupt,
             **keeping,
         )

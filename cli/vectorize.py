@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.batch import Manner, flags_of, perform
+from warpsplat.cli.motion import Motion, motion_options
 from warpsplat.cli.options import (
     FILE,
     checkpoint_options,
@@ -36,6 +37,7 @@ from warpsplat.jobs.options import settings_from
 @quality_options
 @importance_option
 @checkpoint_options
+@motion_options
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
@@ -63,7 +65,9 @@ def command(
     against the image, number of paths, size. They go to stderr where the SVG
     goes to stdout. Several images are made as batch makes them.
     """
+    motion = Motion.of(given)
     if len(images) > 1:
+        motion.for_several()
         device_given = None if device == "auto" else device
         several(
             images,
@@ -92,6 +96,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
+    motion.check(*inputs, output, *filter(None, [checkpoint]), overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(
@@ -108,7 +113,9 @@ def command(
         resume=resume,
         checkpoint_every=checkpoint_every,
         overwrite=overwrite,
+        watch=motion.watch,
     )
+    motion.finish(result, quiet=quiet)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 
