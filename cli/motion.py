@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +18,13 @@ if TYPE_CHECKING:
     from warpsplat.fit.work import Progress
     from warpsplat.jobs.vectorize import Result
     from warpsplat.motion.recorder import Recorder
+    from warpsplat.terminal.preview import Preview
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-OPTIONS = ("animate", "animate_what", "animate_width")
+OPTIONS = ("animate", "animate_what", "animate_width", "preview")
+
+PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
 
 
 def motion_options(function: Function) -> Function:
@@ -42,12 +46,31 @@ def motion_options(function: Function) -> Function:
             "--animate-width",
             type=int,
             metavar="PX",
-            help="Of an animation of pixels.  [default: that of the image, 800 px or a GIF's 480 at the most]",
+            help="Of an animation of pixels.  [default: the image's, but 800 px, 480 of a GIF, at the most]",
         ),
+        preview_option,
     ]
     for option in reversed(options):
         function = option(function)
     return function
+
+
+preview_option = click.option(
+    "--preview",
+    type=click.Choice(PROTOCOLS),
+    help="Show the picture in the terminal (stderr), also while it comes to be: the best way that the terminal"
+    " knows, or --preview=blocks ...",
+)
+
+
+class WithPreview(click.Command):
+    """A command whose ``--preview`` takes a value behind ``=`` only: what follows it may be an image."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As every command does."""
+        end = args.index("--") if "--" in args else len(args)
+        bare = ["--preview=auto" if word == "--preview" else word for word in args[:end]]
+        return super().parse_args(ctx, bare + args[end:])
 
 
 @dataclass
@@ -57,7 +80,9 @@ class Motion:
     animation: Path | None = None
     what: Any = None
     width: int | None = None
+    protocol: Any = None
     recorder: Recorder | None = None
+    preview: Preview | None = None
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> Motion:
@@ -70,8 +95,8 @@ class Motion:
         Raises:
             UsageError: the command line has wishes.
         """
-        if self.animation:
-            raise UsageError("--animate takes one image")
+        if self.animation or self.protocol:
+            raise UsageError(f"{'--animate' if self.animation else '--preview'} takes one image")
 
     def check(self, *files: Path, overwrite: bool) -> None:
         """Find out before the work whether the animation can be made, beside other ``files`` of the run.
@@ -82,32 +107,45 @@ class Motion:
         if self.animation is None:
             if self.what or self.width is not None:
                 raise UsageError("--animate-what and --animate-width say how --animate FILE is made")
-            return
+        else:
+            self._check_animation(self.animation, files, overwrite=overwrite)
+        self.preview = preview_of(self.protocol)
+
+    def _check_animation(self, path: Path, files: tuple[Path, ...], *, overwrite: bool) -> None:
         from warpsplat.files.inputs import STANDARD
         from warpsplat.files.output import check_output
         from warpsplat.motion.films import check_format
         from warpsplat.motion.recorder import Recorder, check_width
 
-        if self.animation == STANDARD:
+        if path == STANDARD:
             raise UsageError("an animation does not go to the standard output: give --animate FILE")
-        check_format(self.animation)
+        check_format(path)
         check_width(self.width)
-        check_output(self.animation, *files, overwrite=overwrite)
-        if self.animation.absolute() in {file.absolute() for file in files if file != STANDARD}:
-            raise UsageError(f"{self.animation}: is another file of this run; give another name")
+        check_output(path, *files, overwrite=overwrite)
+        if path.absolute() in {file.absolute() for file in files if file != STANDARD}:
+            raise UsageError(f"{path}: is another file of this run; give another name")
         self.recorder = Recorder()
 
     def watch(self, report: Callable[[Progress], None]) -> Callable[[Progress], None]:
-        """What hears of the run in place of ``report``, which hears first."""
-        recorder = self.recorder
-        if recorder is None:
-            return report
+        """What hears of the run in place of ``report``, a progress bar's: it comes below the picture."""
+        preview, recorder = self.preview, self.recorder
 
         def heard(progress: Progress) -> None:
+            if preview:
+                preview.report(progress)
             report(progress)
-            recorder(progress)
+            if recorder:
+                recorder(progress)
 
-        return heard
+        return heard if preview or recorder else report
+
+    def show(self, result: Result, source: bytes | Path | None) -> None:
+        """Show the finished picture, beside the image that it was made of if that can be read once more."""
+        if self.preview is None:
+            return
+        from warpsplat.cli.preview import finished
+
+        finished(self.preview, result, source)
 
     def finish(self, result: Result, *, quiet: bool) -> None:
         """Write what was asked for.
@@ -124,3 +162,12 @@ class Motion:
         size = self.recorder.save(self.animation, result, what=what, width=self.width)
         if not quiet:
             say(f"warpsplat: {self.animation}: animation of the {what}, {size:,} bytes", err=True)
+
+
+def preview_of(protocol: str | None) -> Preview | None:
+    """What draws on stderr, or None: nothing is to be shown, or nothing can; then a line says so."""
+    if protocol is None:
+        return None
+    from warpsplat.cli.preview import preview_on
+
+    return preview_on(sys.stderr, None if protocol == "auto" else protocol)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.motion import Motion, motion_options
+from warpsplat.cli.motion import Motion, WithPreview, motion_options
 from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
@@ -18,7 +18,7 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.options import BY_NAME
 
 
-@click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("refine", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=FILE)
 @click.argument("image", type=FILE)
 @click.option(
@@ -104,6 +104,7 @@ def command(
             checkpoint_every=checkpoint_every,
             overwrite=overwrite,
         )
+        motion.show(result, None if image == STANDARD else image)
     motion.finish(result, quiet=quiet)
     before = result.before or 0.0
     if result.kept and not quiet:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.batch import Manner, flags_of, perform
-from warpsplat.cli.motion import Motion, motion_options
+from warpsplat.cli.motion import Motion, WithPreview, motion_options
 from warpsplat.cli.options import (
     FILE,
     checkpoint_options,
@@ -24,7 +24,7 @@ from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
 
 
-@click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("vectorize", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
@@ -113,7 +113,7 @@ def command(
         resume=resume,
         checkpoint_every=checkpoint_every,
         overwrite=overwrite,
-        watch=motion.watch,
+        motion=motion,
     )
     motion.finish(result, quiet=quiet)
     if as_uri:

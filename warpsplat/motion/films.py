@@ -168,7 +168,7 @@ def _mp4(frames: Iterable[Frame]) -> bytes:
 
 
 def _encode_h264(path: Path, frames: Iterable[Frame]) -> None:
-    """Write an MP4 as all players take it: of a constant rate, with colours at half the size, of even sides."""
+    """Write an MP4 as all players take it: of even sides, a constant rate, and colours at half the size."""
     import av
 
     rate = round(FORMATS[".mp4"].rate)

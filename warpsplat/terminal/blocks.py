@@ -1,0 +1,56 @@
+"""Pictures of half blocks: two pixels a character, the upper one its colour, the lower one its ground."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Bytes = npt.NDArray[np.uint8]
+
+HALF = "\N{UPPER HALF BLOCK}"
+RESET = "\x1b[0m"
+
+CUBE = np.array([0, 95, 135, 175, 215, 255])
+"""Levels of the 6x6x6 colours from number 16 on, of the 256 that xterm has."""
+
+GREYS = np.arange(8, 248, 10)
+"""Of the colours from number 232 on."""
+
+
+def half_blocks(image: Bytes, *, true_color: bool) -> list[str]:
+    """Lines of a picture.
+
+    Args:
+        image: sRGB, shape (2 lines, columns, 3), uint8.
+        true_color: whether colours have 24 bits; else they are the nearest of xterm's 256.
+    """
+    if true_color:
+        names = np.array([f"2;{r};{g};{b}" for r, g, b in image.reshape(-1, 3).tolist()])
+    else:
+        names = np.array([f"5;{n}" for n in _numbers(image).ravel().tolist()])
+    names = names.reshape(image.shape[:2])
+    return [
+        _line(upper.tolist(), lower.tolist()) for upper, lower in zip(names[::2], names[1::2], strict=True)
+    ]
+
+
+def _line(upper: list[str], lower: list[str]) -> str:
+    """Colours are said where they change."""
+    parts, before = [], ("", "")
+    for now in zip(upper, lower, strict=True):
+        said = [
+            f"{place};{name}" for place, name, old in zip((38, 48), now, before, strict=True) if name != old
+        ]
+        parts.append(f"\x1b[{';'.join(said)}m{HALF}" if said else HALF)
+        before = now
+    return "".join(parts) + RESET
+
+
+def _numbers(image: Bytes) -> npt.NDArray[np.int64]:
+    """The nearest of xterm's colours of each pixel, shape (height, width)."""
+    pixels = image.astype(np.int64)
+    steps = np.abs(pixels[..., None] - CUBE).argmin(axis=-1)
+    grey = np.abs(pixels.mean(axis=-1)[..., None] - GREYS).argmin(axis=-1)
+    of_cube = ((CUBE[steps] - pixels) ** 2).sum(axis=-1)
+    of_grey = ((GREYS[grey][..., None] - pixels) ** 2).sum(axis=-1)
+    return np.where(of_grey < of_cube, 232 + grey, 16 + steps @ np.array([36, 6, 1]))
