@@ -58,8 +58,8 @@ def motion_options(function: Function) -> Function:
 preview_option = click.option(
     "--preview",
     type=click.Choice(PROTOCOLS),
-    help="Show the picture in the terminal (stderr), also while it comes to be: the best way that the terminal"
-    " knows, or --preview=blocks ...",
+    help="Show the picture in the terminal (stderr), also while it comes to be: as well as the terminal can,"
+    " or --preview=blocks ...",
 )
 
 

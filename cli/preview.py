@@ -20,7 +20,7 @@ LARGEST = 1600
 
 
 def preview_on(stream: TextIO, protocol: Any) -> Preview | None:
-    """What draws on ``stream``, with a ``protocol`` or the best that it knows; else a line says why not."""
+    """What draws on ``stream``, by a ``protocol`` or the best it knows; or None, and a line says why."""
     found = terminal(stream, protocol)
     if found is None:
         say(

@@ -59,6 +59,8 @@ def turns(root: ET.Element, seconds: float) -> list[Turn]:
     time by its length, the mean of them as much as what appears.
     """
     found = list(_drawn(root, stroked=False, filled=True))
+    if found and found[0][0].tag == f"{SPACE}rect":
+        found = found[1:]  # the paper is there from the beginning
     lengths = np.array([length for _, length in found])
     mean = lengths[lengths > 0].mean() if (lengths > 0).any() else 1.0
     weights = np.where(lengths > 0, lengths / mean, 1.0)

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 Bytes = npt.NDArray[np.uint8]
 
 HALF = "\N{UPPER HALF BLOCK}"
 RESET = "\x1b[0m"
 
-CUBE = np.array([0, 95, 135, 175, 215, 255])
-"""Levels of the 6x6x6 colours from number 16 on, of the 256 that xterm has."""
+CUBE = (0, 95, 135, 175, 215, 255)
+"""Levels of the 6x6x6 colours from number 16 on, of the 256 that xterm has; those before are anything."""
 
-GREYS = np.arange(8, 248, 10)
+GREYS = range(8, 248, 10)
 """Of the colours from number 232 on."""
+
+FIRST = 16
+"""Number of the first colour that is the same everywhere."""
 
 
 def half_blocks(image: Bytes, *, true_color: bool) -> list[str]:
@@ -22,7 +28,7 @@ def half_blocks(image: Bytes, *, true_color: bool) -> list[str]:
 
     Args:
         image: sRGB, shape (2 lines, columns, 3), uint8.
-        true_color: whether colours have 24 bits; else they are the nearest of xterm's 256.
+        true_color: whether colours have 24 bits; else they are xterm's 256.
     """
     if true_color:
         names = np.array([f"2;{r};{g};{b}" for r, g, b in image.reshape(-1, 3).tolist()])
@@ -46,11 +52,10 @@ def _line(upper: list[str], lower: list[str]) -> str:
     return "".join(parts) + RESET
 
 
-def _numbers(image: Bytes) -> npt.NDArray[np.int64]:
-    """The nearest of xterm's colours of each pixel, shape (height, width)."""
-    pixels = image.astype(np.int64)
-    steps = np.abs(pixels[..., None] - CUBE).argmin(axis=-1)
-    grey = np.abs(pixels.mean(axis=-1)[..., None] - GREYS).argmin(axis=-1)
-    of_cube = ((CUBE[steps] - pixels) ** 2).sum(axis=-1)
-    of_grey = ((GREYS[grey][..., None] - pixels) ** 2).sum(axis=-1)
-    return np.where(of_grey < of_cube, 232 + grey, 16 + steps @ np.array([36, 6, 1]))
+def _numbers(image: Bytes) -> npt.NDArray[np.uint8]:
+    """Of xterm's colours, whose mixtures are those of the pixels, shape (height, width)."""
+    colors = [*itertools.product(CUBE, repeat=3), *((grey,) * 3 for grey in GREYS)]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([level for color in colors for level in color])
+    dithered = Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+    return FIRST + np.asarray(dithered)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import secrets
 import time
 from collections.abc import Callable
@@ -14,10 +15,13 @@ from warpsplat.terminal.detect import Terminal
 from warpsplat.terminal.layout import Place, beside, drawing, joined, place, resized
 
 SHARE = 0.05
-"""Of the time of a run that is spent on drawing it, at the most: the next drawing waits for it."""
+"""Of the time of a run that is spent on drawing it: the next drawing waits until the last one is no more."""
 
 SOONEST = 0.1
-"""Time between two drawings [s]."""
+"""Time between two drawings [s], at the least."""
+
+FIRST_WAIT = 1.0
+"""Time from the first drawing to the second one [s], at the most: the first one takes longer than others."""
 
 SAVE, RESTORE = "\x1b7", "\x1b8"
 """The cursor's place, and back to it."""
@@ -39,7 +43,7 @@ class Preview:
         self._terminal: Terminal | None = None
         self._place: Place | None = None
         """Of the picture that is there; None: there is none."""
-        self._next = 0.0
+        self._next, self._cost = 0.0, math.inf
         self._name = 1 + secrets.randbelow(2**24 - 1)
 
     def report(self, progress: Progress) -> None:
@@ -51,7 +55,9 @@ class Preview:
         if terminal.live:
             self._draw(progress.snapshot.image(), None, terminal)
         now = self._clock()
-        self._next = now + max(SOONEST, (now - begun) * (1 / SHARE - 1))
+        before, self._cost = self._cost, now - begun
+        wait = min(before, self._cost) * (1 / SHARE - 1)  # one that was held up says nothing of the next one
+        self._next = now + max(SOONEST, wait if before < math.inf else min(wait, FIRST_WAIT))
 
     def move_on(self) -> None:
         """Leave the picture that is there: lines were written below it, and the next one goes below them."""
