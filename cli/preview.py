@@ -63,7 +63,7 @@ class _Aside(logging.Handler):
 
 
 def finished(preview: Preview, result: Result, source: bytes | Path | None) -> None:
-    """Show a result, beside its ``source`` where that can be read: a picture is no reason for a run to fail."""
+    """Show a result, beside its ``source`` where that can be read: to show is not to fail."""
     import numpy as np
 
     from warpsplat.files.sources import image_of

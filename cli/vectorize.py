@@ -18,6 +18,7 @@ from warpsplat.cli.options import (
     quality_options,
     run_options,
 )
+from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
@@ -38,6 +39,7 @@ from warpsplat.jobs.options import settings_from
 @importance_option
 @checkpoint_options
 @motion_options
+@report_option
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
@@ -48,6 +50,7 @@ def command(
     output: Path | None,
     overwrite: bool,
     importance: Path | None,
+    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -73,7 +76,7 @@ def command(
             images,
             output,
             {**given, "device": device_given, "importance": importance},
-            Manner(overwrite=overwrite, threads=threads, quiet=quiet, as_json=as_json),
+            Manner(overwrite=overwrite, threads=threads, report=report, quiet=quiet, as_json=as_json),
             as_uri=as_uri,
         )
         return
@@ -97,6 +100,7 @@ def command(
     if checkpoint:
         check_output(checkpoint, *inputs)
     motion.check(*inputs, output, *filter(None, [checkpoint]), overwrite=overwrite)
+    check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(
@@ -121,11 +125,19 @@ def command(
 
         say(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
+    if report:
+        values["report"] = str(report)
     aside = as_uri or output == STANDARD
     if as_json:
         say(json.dumps(values), err=aside)
     elif not quiet:
         say(summary(output, values), err=aside)
+    if report:
+        from warpsplat.jobs.reports.command import vectorize_command
+
+        further = () if importance is None else ("--importance", str(importance))
+        line = vectorize_command(settings, str(image), str(output), *further)
+        write_report(report, result, image, data, output, line, device=device, threads=threads)
     leave(result)
 
 

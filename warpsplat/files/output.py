@@ -52,6 +52,9 @@ MP4_MARK = b"\0\0\0\x12freewarpsplat\n"
 MARKED_ENDS = {b"%PDF-": PDF_MARK, b"RIFF": WEBP_MARK, b"ftyp": MP4_MARK}
 """Marks at the end of files, by what stands at the beginning of their kind, or four bytes behind it."""
 
+PAGE_MARK = b"<!--warpsplat page-->"
+"""In the head of every page written here (``pages.MARK``)."""
+
 HEAD = 2000
 """Bytes at the start of a file in which its mark stands."""
 
@@ -177,7 +180,7 @@ def may_replace(path: Path) -> bool:
         return True
     head = unpacked(head)
     gif = b"!\xfe" + bytes([len(GIF_COMMENT)]) + GIF_COMMENT
-    marks = (*SVG_MARKS, b"tEXtSoftware\0" + PNG_SOFTWARE.encode(), gif)
+    marks = (*SVG_MARKS, PAGE_MARK, b"tEXtSoftware\0" + PNG_SOFTWARE.encode(), gif)
     return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
 
 

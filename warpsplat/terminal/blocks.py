@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 
+import cv2
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -52,10 +52,17 @@ def _line(upper: list[str], lower: list[str]) -> str:
     return "".join(parts) + RESET
 
 
-def _numbers(image: Bytes) -> npt.NDArray[np.uint8]:
-    """Of xterm's colours, whose mixtures are those of the pixels, shape (height, width)."""
-    colors = [*itertools.product(CUBE, repeat=3), *((grey,) * 3 for grey in GREYS)]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([level for color in colors for level in color])
-    dithered = Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
-    return FIRST + np.asarray(dithered)
+def _numbers(image: Bytes) -> npt.NDArray[np.int64]:
+    """The nearest of xterm's colours to each pixel as eyes see them, shape (height, width). They are too far
+    apart to be mixed: dithering shows as grain.
+    """
+    colors = np.array([*itertools.product(CUBE, repeat=3), *((grey,) * 3 for grey in GREYS)], np.uint8)
+    pixels, known = _lab(image.reshape(-1, 3)), _lab(colors)
+    # |p - k|^2 but for |p|^2, which is the same for all k.
+    distances = (known**2).sum(axis=1) - 2 * pixels @ known.T
+    return FIRST + distances.argmin(axis=1).reshape(image.shape[:2])
+
+
+def _lab(colors: Bytes) -> npt.NDArray[np.float32]:
+    """sRGB, shape (color, 3), as CIE L*a*b*, in which distances are what eyes see."""
+    return cv2.cvtColor(colors[None].astype(np.float32) / 255, cv2.COLOR_RGB2LAB)[0]
