@@ -34,7 +34,10 @@ def preview_on(stream: TextIO, protocol: Any) -> Preview | None:
     if os.name == "nt":
         os.system("")  # has consoles of Windows read escape sequences
     made = Preview(stream, lambda: _now(found, stream))
-    logging.getLogger("warpsplat").addHandler(_Aside(made))
+    log = logging.getLogger("warpsplat")
+    for earlier in [handler for handler in log.handlers if isinstance(handler, _Aside)]:
+        log.removeHandler(earlier)
+    log.addHandler(_Aside(made))
     return made
 
 

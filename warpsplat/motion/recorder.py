@@ -46,17 +46,22 @@ class Recorder:
     def __init__(self) -> None:
         self.scenes: list[Scene] = []
         """The shapes of the run so far, in order; thinned where they became too many."""
-        self._bytes = 0
+        self.moments: list[int] = []
+        """Of which of the run's reports they are."""
+        self._heard = self._bytes = 0
 
     def __call__(self, progress: Progress) -> None:
         """Keep the shapes of a report."""
         if progress.snapshot is None:
             return
         self.scenes.append(progress.snapshot.scene())
+        self.moments.append(self._heard)
+        self._heard += 1
         self._bytes += _bytes_of(self.scenes[-1])
         while len(self.scenes) > FEWEST and (len(self.scenes) > MOST_SCENES or self._bytes > MOST_BYTES):
-            chosen = kept(len(self.scenes), max(FEWEST, len(self.scenes) * 2 // 3))
+            chosen = kept(self.moments, max(FEWEST, len(self.scenes) * 2 // 3))
             self.scenes = [self.scenes[i] for i in chosen]
+            self.moments = [self.moments[i] for i in chosen]
             self._bytes = sum(map(_bytes_of, self.scenes))
 
     @property
@@ -110,9 +115,11 @@ class Recorder:
             raise UsageError(f"{path}: the run had no training to show; the order of drawing can be shown")
         vector = path.suffix.lower() == ".svg"
         if what == "training" and vector:
-            data = training.vector(self.scenes, result, seconds).encode()
+            data = training.vector(self.scenes, self.moments, result, seconds).encode()
         elif what == "training":
-            data = films.encoded(path, training.pictures(self.scenes, result, path, width, seconds))
+            data = films.encoded(
+                path, training.pictures(self.scenes, self.moments, result, path, width, seconds)
+            )
         elif vector:
             data = drawing.vector(result.svg, seconds).encode()
         else:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 SECONDS = 6.0
@@ -27,14 +29,20 @@ class Showing:
     """How long it is shown."""
 
 
-def showings(count: int, ticks: int, seconds: float) -> list[Showing]:
-    """Which of ``count`` pictures, in the order of the run, ``seconds`` of ``ticks`` equal parts show.
+def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing]:
+    """Which pictures of a run ``seconds`` of ``ticks`` equal parts show.
 
     Early ones are shown longer; late ones are skipped where there are more than parts.
+
+    Args:
+        moments: when the pictures were, counted in reports of the run, ascending.
+        ticks: parts.
+        seconds: in all.
     """
     found: list[Showing] = []
-    for tick in range(ticks if count else 0):
-        index = int(count * ((tick + 0.5) / ticks) ** EARLY)
+    for tick in range(ticks if moments else 0):
+        now = (moments[-1] + 1) * ((tick + 0.5) / ticks) ** EARLY
+        index = max(0, bisect_right(moments, now) - 1)
         if found and found[-1].index == index:
             found[-1] = Showing(index, found[-1].seconds + seconds / ticks)
         else:
@@ -42,9 +50,9 @@ def showings(count: int, ticks: int, seconds: float) -> list[Showing]:
     return found
 
 
-def kept(count: int, most: int) -> list[int]:
-    """Which of ``count`` pictures of a run that goes on are kept where there is room for ``most``: as they
-    will be shown, the last one among them.
+def kept(moments: Sequence[int], most: int) -> list[int]:
+    """Indices of those pictures of a run that goes on that are kept where there is room for ``most``: those
+    that would be shown, the first and the last one among them.
     """
-    chosen = {showing.index for showing in showings(count, most - 1, 1.0)}
-    return sorted(chosen | {count - 1})
+    chosen = {showing.index for showing in showings(moments, most - 2, 1.0)}
+    return sorted(chosen | {0, len(moments) - 1})

@@ -18,13 +18,18 @@ from warpsplat.svg.write import GRIDS, MARK, resized
 
 
 def pictures(
-    scenes: Sequence[Scene], result: Result, path: Path, width: int | None, seconds: float
+    scenes: Sequence[Scene],
+    moments: Sequence[int],
+    result: Result,
+    path: Path,
+    width: int | None,
+    seconds: float,
 ) -> Iterator[Frame]:
-    """The frames of a film of a run; the last one is the file as a viewer shows it."""
+    """The frames of a film of scenes and their moments; the last one is the file as a viewer shows it."""
     end = finished(result)
     zoom = zoom_of(path, size_of(end), width)
     size = screen(end, zoom)
-    for showing in showings(len(scenes), ticks_of(path, size, seconds), seconds):
+    for showing in showings(moments, ticks_of(path, size, seconds), seconds):
         scene = scenes[showing.index]
         scale = zoom * result.scene.canvas.width / scene.canvas.width  # runs may be on reduced images
         text = page(scene, result, GRIDS[-1])
@@ -77,7 +82,7 @@ STYLE = (
 )
 
 
-def vector(scenes: Sequence[Scene], result: Result, seconds: float) -> str:
+def vector(scenes: Sequence[Scene], moments: Sequence[int], result: Result, seconds: float) -> str:
     """An SVG that shows scenes of the run, each coming over the one before it, and then stays the file.
 
     It is played by style sheets alone, once, also in ``<img>``. Where nothing is animated, or readers ask for
@@ -87,7 +92,7 @@ def vector(scenes: Sequence[Scene], result: Result, seconds: float) -> str:
     end = finished(result)
     head, inside = _parts(end)
     count = max(FEWEST_PAGES, min(MOST_PAGES, MOST_TEXT // max(1, len(end))))
-    shown = showings(len(scenes), count, seconds)
+    shown = showings(moments, count, seconds)
     box = [float(value) for value in VIEW_BOX.findall(head)[0].split()]
     pages, now = [], 0.0
     fade = FADE * seconds / count
