@@ -48,6 +48,8 @@ def make_several(
     Raises:
         WarpsplatError: what cannot be done is found before the work, as far as it can be.
     """
+    if image == importance == STANDARD:
+        raise UsageError("only one of image and mask can come from the standard input")
     settings = settings_from({**given, "curves": max(numbers)})
     check_several(settings, numbers)
     outputs = named(image, output, numbers, settings)

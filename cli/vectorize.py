@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.batch import Manner, flags_of, perform
+from warpsplat.cli.motion import Motion, WithPreview, motion_options
 from warpsplat.cli.options import (
     FILE,
     checkpoint_options,
@@ -25,7 +26,7 @@ from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
 
 
-@click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("vectorize", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
@@ -38,6 +39,7 @@ from warpsplat.jobs.options import settings_from
 @several_quality_options
 @importance_option
 @checkpoint_options
+@motion_options
 @report_option
 @run_options
 @click.option(
@@ -70,7 +72,9 @@ def command(
     goes to stdout. Several images are made as batch makes them. Several numbers
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
+    motion = Motion.of(given)
     if suggest:
+        motion.for_several("a run that makes a file")
         if len(images) > 1 or output or report or as_uri or checkpoint or resume:
             raise UsageError("--suggest takes one image, and writes nothing")
         suggest_number(
@@ -91,6 +95,7 @@ def command(
                 "several images, each with several numbers of shapes: a batch file, with "
                 f"matrix: {{curves: {list(numbers)}}}"
             )
+        motion.for_several()
         device_given = None if device == "auto" else device
         several(
             images,
@@ -102,6 +107,7 @@ def command(
         return
     image = images[0]
     if numbers:
+        motion.for_several("one number of shapes")
         if as_uri or checkpoint or resume:
             flag = "--data-uri" if as_uri else "--checkpoint" if checkpoint else "--resume"
             raise UsageError(f"several numbers of shapes and {flag} do not go together")
@@ -140,6 +146,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
+    motion.check(*inputs, output, *filter(None, [checkpoint]), overwrite=overwrite)
     check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
@@ -157,7 +164,9 @@ def command(
         resume=resume,
         checkpoint_every=checkpoint_every,
         overwrite=overwrite,
+        motion=motion,
     )
+    motion.finish(result, quiet=quiet)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 

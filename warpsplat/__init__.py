@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from warpsplat.jobs.suggest import Suggestion as Suggestion
     from warpsplat.jobs.vectorize import Result as Result
     from warpsplat.metrics import Score as Score
+    from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.scene import Canvas as Canvas
     from warpsplat.scene import Scene as Scene
 
@@ -54,6 +55,7 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
+    "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.jobs.render",
     "Result": "warpsplat.jobs.vectorize",
     "Score": "warpsplat.metrics",

@@ -86,7 +86,7 @@ class Curve:
         return np.asarray(2 ** np.polyval(self.power, np.log2(shapes)))
 
     def through(self, shapes: int, psnr: float, lost: float) -> Curve:
-        """The curve of which a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the squared error,
+        """The curve of which a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the squared error
         ``lost`` is what this size lacks of the image.
         """
         error, before = 10 ** (-psnr / 10), float(self.reduced(shapes))
