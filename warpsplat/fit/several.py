@@ -6,6 +6,7 @@ them are kept: from there the next fit grows on, further, and leaves out the beg
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,8 +17,10 @@ from warpsplat.fit.work import Progress, Report, run_cost, score_cost
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 
-BEGIN = 0.375
-"""Share of its schedule that a fit leaves out where it goes on from another one (docs/experiments.md)."""
+BEGIN = 0.25, 0.375
+"""Share of its schedule that a fit leaves out where it goes on from another one, at the least and at the most:
+in between, it begins where there would be as many shapes by now (docs/experiments.md).
+"""
 
 TURNS = 5
 """In which the number of shapes grows from where it goes on, at the least: many at a time find bad places.
@@ -48,18 +51,27 @@ class Series:
         measured = score_cost(width, height, backend, eyes=True)
         self._costs = {
             number: measured
-            + run_cost(replace(settings, curves=number), width, height, begin_of(settings) if later else 0)
-            for later, number in enumerate(self._numbers)
+            + run_cost(replace(settings, curves=number), width, height, self._expected(at, number))
+            for at, number in enumerate(self._numbers)
         }
         self._started = time.monotonic()
+
+    def _expected(self, at: int, number: int) -> int:
+        """The step at which a fit, the first one being 0, will begin."""
+        if at == 0:
+            return 0
+        shapes = round(self._settings.density.surplus * self._numbers[at - 1])
+        return begin_of(replace(self._settings, curves=number), shapes)
 
     def next(self, number: int) -> tuple[Settings, Start | None]:
         """The settings of the fit with ``number`` shapes, which are more than those before, and its start."""
         settings = replace(self._settings, curves=number)
-        begin = begin_of(settings)
-        if self._kept is None or begin == 0:
+        if self._kept is None:
             return settings, None
         scene, past = self._kept
+        begin = begin_of(settings, len(scene))
+        if begin == 0:
+            return settings, None
         return growing(settings, len(scene), begin), Start(scene, past, begin)
 
     def watch(self, number: int, report: Report | None) -> Report:
@@ -82,14 +94,15 @@ class Series:
         return told
 
 
-def begin_of(settings: Settings) -> int:
-    """The step at which a fit goes on from another one: that of a turn; 0 where it begins anew."""
-    density = settings.density
+def begin_of(settings: Settings, shapes: int) -> int:
+    """The step at which a fit goes on from so many ``shapes``: that of a turn; 0 where it begins anew."""
+    density, steps = settings.density, settings.iterations
     if density.interval <= 0:
         return 0
-    latest = density.grown * settings.iterations - TURNS * density.interval
-    share = min(BEGIN * settings.iterations, max(latest, 0.0))
-    return round(share) // density.interval * density.interval
+    missing = math.log(density.surplus * settings.curves / shapes) / math.log(density.surplus / density.start)
+    share = min(max(density.grown * (1 - missing), BEGIN[0]), BEGIN[1])
+    latest = max(density.grown * steps - TURNS * density.interval, 0)
+    return round(min(share * steps, latest)) // density.interval * density.interval
 
 
 def growing(settings: Settings, shapes: int, begin: int) -> Settings:

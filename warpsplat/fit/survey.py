@@ -42,8 +42,8 @@ PROBE_RUN = 200
 """... as the last ones of a run of so many: small ones."""
 
 GAIN_AT, GAIN_DOUBLES = 25.0, 4.3
-"""A run of the default effort gains a decibel over a probe of so many [dB], and twice as much over one that has
-so much more [dB]: what is easily drawn gains most. Fitted to five pictures (docs/experiments.md).
+"""A run of the default effort gains a decibel over a probe of so many [dB], and twice as much over one that
+has so much more [dB]: what is easily drawn gains most (docs/experiments.md).
 """
 
 MOST_GAIN = 5.0
