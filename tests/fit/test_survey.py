@@ -28,7 +28,7 @@ def test_one_measurement_is_a_level() -> None:
 
 @pytest.mark.parametrize("psnr", [22.0, 28.0])
 def test_it_goes_through_what_was_probed(psnr: float) -> None:
-    """With less quality than the reduced image promised details stay lost; with more all errors are smaller."""
+    """With less quality than the reduced image promised, details stay lost; with more, errors are smaller."""
     plain = curve_through([20, 100, 1000], [20.0, 25, 30], [2000, 10_000, 100_000], 1024)
     curve = plain.through(100, psnr, 0.0)
     assert float(curve.psnr(100)) == pytest.approx(psnr)

@@ -18,8 +18,8 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 
 BEGIN = 0.25, 0.375
-"""Share of its schedule that a fit leaves out where it goes on from another one, at the least and at the most:
-in between, it begins where there would be as many shapes by now (docs/experiments.md).
+"""Share of its schedule that a fit leaves out where it goes on from another one, at the least and at most: in
+between, it begins where there would be as many shapes by now (docs/experiments.md).
 """
 
 TURNS = 5
@@ -99,7 +99,8 @@ def begin_of(settings: Settings, shapes: int) -> int:
     density, steps = settings.density, settings.iterations
     if density.interval <= 0:
         return 0
-    missing = math.log(density.surplus * settings.curves / shapes) / math.log(density.surplus / density.start)
+    growth = math.log(density.surplus / density.start)
+    missing = math.log(density.surplus * settings.curves / shapes) / growth if growth > 0 else 0.0
     share = min(max(density.grown * (1 - missing), BEGIN[0]), BEGIN[1])
     latest = max(density.grown * steps - TURNS * density.interval, 0)
     return round(min(share * steps, latest)) // density.interval * density.interval
