@@ -20,7 +20,7 @@ from warpsplat.jobs.batch.names import Wanted, fields_of, name_results
 from warpsplat.jobs.formats import ENDINGS, check_format
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.reports.command import several_command
-from warpsplat.jobs.reports.several import Version, file_name, several_page
+from warpsplat.jobs.reports.several import Version, several_page
 from warpsplat.jobs.several import check_several
 from warpsplat.jobs.vectorize import Result
 
@@ -99,7 +99,7 @@ def _write_report(
     """Write the page that compares what was made."""
     further = () if importance is None else ("--importance", str(importance))
     line = several_command(settings, numbers, str(image), output, *further)
-    versions = [Version(result, file_name(path)) for path, result in made]
+    versions = [Version(result, f"{path.stem}.svg") for path, result in made]  # a result may be its picture
     versions.sort(key=lambda version: version.shapes)
     name = "image" if image == STANDARD else image.name
     write_result(report, several_page(versions, data, name=name, command=line).encode())

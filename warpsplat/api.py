@@ -32,6 +32,7 @@ from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.refine import refine as refine_scene
 from warpsplat.jobs.render import RendererName, drawn
+from warpsplat.jobs.reports.several import several_page, versions_of
 from warpsplat.jobs.reports.single import Facts, report_page
 from warpsplat.jobs.several import vectorize_several as make_several
 from warpsplat.jobs.suggest import Suggestion, suggest_curves
@@ -568,7 +569,7 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
 
 
 def report(
-    result: Result | SvgSource,
+    result: Result | SvgSource | Sequence[Result],
     image: ImageSource,
     output: str | os.PathLike[str] | None = None,
     *,
@@ -581,15 +582,17 @@ def report(
     """A page on a result, to look at in a browser: one file that needs nothing else and no network.
 
     It shows image and SVG under a slider, where they differ, the shapes with the decibels that each is worth,
-    the figures and the course of the run.
+    the figures and the course of the run. Of several results it compares these.
 
     Args:
-        result: what ``vectorize`` or ``refine`` made; or any SVG, as for ``refine``, which is measured.
+        result: what ``vectorize`` or ``refine`` made; or any SVG, as for ``refine``, which is measured; or
+            several results of one image, as ``vectorize_several`` makes them.
         image: that it shows, as for ``vectorize``.
         output: file to write the page to; an existing one is replaced in one step.
         command: what makes the result again, for people.
         name: of the image, for people; default: its file's name.
-        svg_name: that the SVG is downloaded as; default: the image's name with ``.svg``.
+        svg_name: that the SVG is downloaded as; default: the image's name with ``.svg``. Those of several
+            results have their numbers of shapes in their names.
         device: where to compute, see ``vectorize``.
         threads: see there.
 
@@ -601,6 +604,13 @@ def report(
         OutputError: ``output`` cannot be written.
     """
     name = name or Path(source_name(image)).name
+    svg_name = svg_name or Path(name).with_suffix(".svg").name
+    if isinstance(result, Sequence) and not isinstance(result, (str, bytes, bytearray, memoryview)):
+        versions = versions_of(result, svg_name)
+        made = several_page(versions, image, name=name, command=command)
+        if output is not None:
+            write_result(Path(output), made.encode())
+        return made
     if isinstance(result, Result):
         text, facts, own = result.svg, Facts.of(result, command), result.before is None
     else:
@@ -614,7 +624,7 @@ def report(
             backend,
             facts,
             name=name,
-            svg_name=svg_name or Path(name).with_suffix(".svg").name,
+            svg_name=svg_name,
             own=own,
         ).text
     if output is not None:

@@ -108,9 +108,9 @@ def test_batches_say_what_to_use(image: Path, tmp_path: Path, capsys: pytest.Cap
     assert run("batch", image, "--curves", "5,9") == 2
     assert "matrix: {curves: [5, 9]}" in one_line(capsys.readouterr().err)
     jobs = tmp_path / "jobs.yaml"
-    jobs.write_text("jobs:\n  - input: photo.png\n    curves: [5, 9]\n")
+    jobs.write_text("jobs:\n  - images: photo.png\n    curves: [5, 9]\n")
     assert run("batch", jobs) == 2
-    assert "matrix" in one_line(capsys.readouterr().err)
+    assert "matrix: {curves: [...]}" in one_line(capsys.readouterr().err)
 
 
 def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> None:

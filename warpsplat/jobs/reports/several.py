@@ -157,6 +157,8 @@ def _words(results: Sequence[Version], at: int | None) -> str:
     )
 
 
-def file_name(output: str | os.PathLike[str]) -> str:
-    """What a version's SVG is downloaded as: an output may be its picture."""
-    return f"{Path(output).stem}.svg"
+def versions_of(results: Sequence[Result], svg_name: str) -> list[Version]:
+    """Results, ascending by their shapes, that are downloaded as ``svg_name`` with these numbers in it."""
+    stem = Path(svg_name).stem
+    made = [Version(result, f"{stem}-{result.as_dict()['shapes']}.svg") for result in results]
+    return sorted(made, key=lambda version: version.shapes)
