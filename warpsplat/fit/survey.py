@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -22,7 +23,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
 FEWEST, MOST = 16, 1024
-"""Shapes between which the curve is measured: fewer make no likeness, more a file that is larger than many a
+"""Shapes between which it is measured: fewer make no likeness, more a file that is larger than many a
 JPEG of the same photograph.
 """
 
@@ -33,7 +34,7 @@ SETTLED = 2.0
 """Shapes over ``FEWEST`` from which on the fit says something: the first ones have just been placed."""
 
 PROBED = 256
-"""Shapes with which it is measured what the curve misses: the reduced image lacks details."""
+"""Shapes with which it is measured what that misses: the reduced image lacks details."""
 
 PROBE = 30
 """Steps of that, at the finest size ..."""
@@ -46,15 +47,20 @@ GAIN_AT, GAIN_DOUBLES = 25.0, 4.3
 has so much more [dB]: what is easily drawn gains most (docs/experiments.md).
 """
 
-MOST_GAIN = 5.0
-"""[dB]"""
+MOST_GAIN, HARD = 5.0, 4.0
+"""Most of this gain [dB], and most of its product with what the probe lacks of the decibels that the reduced
+image has [dB squared]: where that is much, there are details that shapes are too few for.
+"""
+
+SMALL = 0.5
+"""Of that gain, where the image is so small that it was not reduced: the survey has seen all of it."""
 
 LATER_BYTES = 0.92
 """Bytes of a run's shapes over those of the survey's: they lose points and opacities."""
 
 
 @dataclass(frozen=True)
-class Curve:
+class Worth:
     """Quality and size by the number of shapes, from ``fewest`` to ``most``.
 
     On the reduced image decibels are a parabola over the logarithm of the number. A run's squared error is
@@ -85,8 +91,8 @@ class Curve:
         """Bytes that its file is expected to have."""
         return np.asarray(2 ** np.polyval(self.power, np.log2(shapes)))
 
-    def through(self, shapes: int, psnr: float, lost: float) -> Curve:
-        """The curve of which a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the squared error
+    def through(self, shapes: int, psnr: float, lost: float) -> Worth:
+        """What is expected where a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the squared error
         ``lost`` is what this size lacks of the image.
         """
         error, before = 10 ** (-psnr / 10), float(self.reduced(shapes))
@@ -113,8 +119,8 @@ def survey(
     importance: FloatArray | None = None,
     report: Report | None = None,
     stop: Callable[[], bool] | None = None,
-) -> Curve | None:
-    """Measure the curve of an image; None where it was stopped. Arguments are those of ``fit``."""
+) -> Worth | None:
+    """What numbers of shapes are worth on an image; None where it was stopped. Arguments are those of ``fit``."""
     most = max(FEWEST, min(MOST, simple_curves(image)))
     growing = _growing(settings, most)
     probing = _probing(settings, min(PROBED, most))
@@ -137,7 +143,7 @@ def survey(
     made = fit(image, growing, backend, finish=False, importance=importance, report=note, stop=stop)
     if made.interrupted or seen.probed is None:
         return None
-    curve = curve_through(seen.shapes, seen.decibels, seen.sizes, most)
+    worth = worth_by(seen.shapes, seen.decibels, seen.sizes, most)
     scene, past = seen.probed
     probe = fit(
         image,
@@ -153,8 +159,18 @@ def survey(
     )
     if probe.interrupted:
         return None
-    gain = min(2 ** ((probe.render_psnr - GAIN_AT) / GAIN_DOUBLES), MOST_GAIN)
-    return curve.through(len(scene), probe.render_psnr + gain, lost_detail(image, probing))
+    psnr = probe.render_psnr
+    gain = expected_gain(psnr, -10 * math.log10(float(worth.reduced(len(scene)))) - psnr)
+    psnr += gain if len(phases(probing, width, height)) > 1 else SMALL * gain
+    return worth.through(len(scene), psnr, lost_detail(image, probing))
+
+
+def expected_gain(psnr: float, lacking: float) -> float:
+    """What a run of the default effort has over a probe with ``psnr`` [dB], which lacks so many of the
+    decibels of the reduced image.
+    """
+    most = HARD / lacking if lacking > 0 else MOST_GAIN
+    return float(min(2 ** ((psnr - GAIN_AT) / GAIN_DOUBLES), most, MOST_GAIN))
 
 
 def _growing(settings: Settings, most: int) -> Settings:
@@ -170,10 +186,10 @@ def _probing(settings: Settings, shapes: int) -> Settings:
     return replace(settings, curves=shapes, simplify=False, iterations=PROBE_RUN, coarse=0.0, density=density)
 
 
-def curve_through(
+def worth_by(
     shapes: list[int], decibels: list[float], sizes: list[int], most: int, fewest: int = FEWEST
-) -> Curve:
-    """The curve that fits what was measured on the reduced image best, shape (measurement,) each."""
+) -> Worth:
+    """What fits best what was measured on the reduced image, shape (measurement,) each."""
     x = np.log2(np.array(shapes, np.float64))
     degree = min(2, len(set(shapes)) - 1)
     parabola = [0.0] * (2 - degree) + np.polyfit(x, decibels, degree).tolist()
@@ -181,7 +197,7 @@ def curve_through(
     power = [0.0] * (1 - degree) + np.polyfit(x, np.log2(LATER_BYTES * np.array(sizes)), degree).tolist()
     misfit = float(np.sqrt(np.mean((np.polyval(parabola, x) - decibels) ** 2)))
     a, b, c = parabola
-    return Curve(fewest, most, (a, b, c), (power[0], power[1]), misfit)
+    return Worth(fewest, most, (a, b, c), (power[0], power[1]), misfit)
 
 
 def lost_detail(image: FloatArray, settings: Settings) -> float:

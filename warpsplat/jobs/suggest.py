@@ -14,7 +14,7 @@ from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.knee import knee
 from warpsplat.fit.settings import Settings, Subject
-from warpsplat.fit.survey import Curve, survey
+from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
 from warpsplat.jobs.vectorize import prepare
 from warpsplat.rendering.backend import Backend
@@ -23,7 +23,7 @@ TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Shapes of the rows of a table, over those suggested."""
 
 SAMPLES = 513
-"""Of the curve, where the knee is looked for."""
+"""Numbers of shapes among which the knee is looked for."""
 
 FINE = 0.05
 """Steps that a suggestion is rounded to, at the most, over itself: it is no more exact than that."""
@@ -56,7 +56,7 @@ class Suggestion:
     by_bytes: int | None
     """... and against bytes, in shapes."""
     misfit: float
-    """How far measured decibels lie from the curve, root of the mean square [dB]."""
+    """How far measured decibels lie from the parabola, root of the mean square [dB]."""
     seconds: float
 
     def as_dict(self) -> dict[str, Any]:
@@ -114,52 +114,52 @@ def suggest_curves(
         reason = f"{work.why}. " if work.why else ""
         why = f"{reason}It is traced: the picture says how many shapes there are; --subject photo fits them."
         return Suggestion(None, subject, why, (), None, None, 0.0, time.monotonic() - started)
-    curve = survey(work.target, work.settings, backend, importance=work.importance, report=report, stop=stop)
-    if curve is None:
+    worth = survey(work.target, work.settings, backend, importance=work.importance, report=report, stop=stop)
+    if worth is None:
         return None
-    return replace(suggestion(curve), seconds=time.monotonic() - started)
+    return replace(suggestion(worth), seconds=time.monotonic() - started)
 
 
-def suggestion(curve: Curve) -> Suggestion:
-    """What a curve suggests: the fewer shapes of its two knees."""
-    shapes = np.geomspace(curve.fewest, curve.most, SAMPLES)
-    quality, sizes = curve.psnr(shapes), curve.size(shapes)
+def suggestion(worth: Worth) -> Suggestion:
+    """What is suggested: the fewer shapes of its two knees."""
+    shapes = np.geomspace(worth.fewest, worth.most, SAMPLES)
+    quality, sizes = worth.psnr(shapes), worth.size(shapes)
     found = [knee(cost, quality) for cost in (shapes, sizes)]
     by_shapes, by_bytes = (None if at is None else rounded(float(shapes[at])) for at in found)
     known = [number for number in (by_shapes, by_bytes) if number is not None]
-    chosen = min(known) if known else curve.most
+    chosen = min(known) if known else worth.most
     rows = sorted({round(share * chosen) for share in TABLE})
-    expected = tuple(expect(curve, row) for row in rows if curve.fewest <= row <= curve.most)
+    expected = tuple(expect(worth, row) for row in rows if worth.fewest <= row <= worth.most)
     return Suggestion(
         chosen,
         "photo",
-        reason(curve, chosen, is_knee=bool(known)),
+        reason(worth, chosen, is_knee=bool(known)),
         expected,
         by_shapes,
         by_bytes,
-        curve.misfit,
+        worth.misfit,
         0.0,
     )
 
 
-def expect(curve: Curve, shapes: int) -> Expected:
+def expect(worth: Worth, shapes: int) -> Expected:
     """What ``shapes`` are expected to give."""
-    return Expected(shapes, round(float(curve.psnr(shapes)), 2), round(float(curve.size(shapes))))
+    return Expected(shapes, round(float(worth.psnr(shapes)), 2), round(float(worth.size(shapes))))
 
 
-def reason(curve: Curve, chosen: int, *, is_knee: bool) -> str:
+def reason(worth: Worth, chosen: int, *, is_knee: bool) -> str:
     """Why it is this number."""
-    one, two = expect(curve, chosen), expect(curve, 2 * chosen)
+    one, two = expect(worth, chosen), expect(worth, 2 * chosen)
     first = f"{chosen} shapes: {one.psnr:.1f} dB, {one.bytes / 1000:.0f} kB"
     more = (two.bytes - one.bytes) / 1000
     first += f"; twice as many buy {two.psnr - one.psnr:.1f} dB for {more:.0f} kB more."
     if not is_knee:
-        return f"{first} Up to {curve.most} shapes each further one buys as much as those before."
-    fewest, most = expect(curve, curve.fewest), expect(curve, curve.most)
+        return f"{first} Up to {worth.most} shapes each further one buys as much as those before."
+    fewest, most = expect(worth, worth.fewest), expect(worth, worth.most)
     average = (most.psnr - fewest.psnr) / ((most.bytes - fewest.bytes) / 1000)
     return (
         f"{first} Up to there a kB buys more than the {average:.2g} dB that it buys on the average from "
-        f"{curve.fewest} to {curve.most:,} shapes, beyond it less: this is the knee of the curve."
+        f"{worth.fewest} to {worth.most:,} shapes, beyond it less: this is the knee."
     )
 
 
