@@ -7,7 +7,7 @@ import pytest
 
 from tests.fit.pictures import picture
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.survey import worth_by, expected_gain, lost_detail, survey
+from warpsplat.fit.survey import expected_gain, lost_detail, survey, worth_by
 from warpsplat.rendering.backend import Backend
 
 

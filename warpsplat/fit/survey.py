@@ -92,8 +92,8 @@ class Worth:
         return np.asarray(2 ** np.polyval(self.power, np.log2(shapes)))
 
     def through(self, shapes: int, psnr: float, lost: float) -> Worth:
-        """What is expected where a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the squared error
-        ``lost`` is what this size lacks of the image.
+        """What is expected where a run with ``shapes`` has ``psnr`` at the finest size [dB]; of the error
+        ``lost`` is what this size lacks of the image, squared.
         """
         error, before = 10 ** (-psnr / 10), float(self.reduced(shapes))
         if error < before:
@@ -120,7 +120,7 @@ def survey(
     report: Report | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Worth | None:
-    """What numbers of shapes are worth on an image; None where it was stopped. Arguments are those of ``fit``."""
+    """What numbers of shapes are worth on an image; None where it was stopped. See ``fit`` for arguments."""
     most = max(FEWEST, min(MOST, simple_curves(image)))
     growing = _growing(settings, most)
     probing = _probing(settings, min(PROBED, most))
