@@ -16,7 +16,6 @@ import platform
 import re
 import secrets
 import stat
-import struct
 import sys
 import time
 import zlib
@@ -24,6 +23,7 @@ from pathlib import Path
 
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.inputs import STANDARD
+from warpsplat.files.marks import PDF_START, PDF_TAIL, PNG_MARK, is_marked_pdf
 from warpsplat.files.remote import is_remote, read_remote, write_remote
 
 SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
@@ -33,12 +33,6 @@ SHORT_SVG = re.compile(
     rb'<svg viewBox="0 0 [\d.]+ [\d.]+" xmlns="http://www\.w3\.org/2000/svg" height="\d+" width="\d+">'
 )
 """How short ones begin: nobody else has the attributes in this order (``svg.write.shortened``)."""
-
-PNG_SOFTWARE = "warpsplat"
-"""Text of the ``Software`` chunk of every PNG written here."""
-
-PDF_MARK = b"\n%warpsplat\n"
-"""Comment behind the end of every PDF written here."""
 
 HEAD = 2000
 """Bytes at the start of a file in which its mark stands."""
@@ -156,14 +150,14 @@ def may_replace(path: Path) -> bool:
         else:
             with path.open("rb") as file:
                 head = file.read(HEAD)
-                if head.startswith(b"%PDF-"):
+                if head.startswith(PDF_START):
                     size = file.seek(0, os.SEEK_END)
-                    file.seek(max(0, size - len(PDF_MARK)))
-                    return file.read() == PDF_MARK
+                    file.seek(max(0, size - PDF_TAIL))
+                    return is_marked_pdf(file.read())
     except FileNotFoundError:
         return True
     head = unpacked(head)
-    marks = (*SVG_MARKS, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
+    marks = (*SVG_MARKS, PNG_MARK)
     return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
 
 
@@ -179,17 +173,6 @@ def unpacked(head: bytes) -> bytes:
 
 GZIP = b"\x1f\x8b"
 """How gzipped files begin."""
-
-
-def mark_png(png: bytes) -> bytes:
-    """A PNG with a ``Software`` chunk behind its header, by which ``may_replace`` knows it."""
-    chunk = b"tEXtSoftware\0" + PNG_SOFTWARE.encode()
-    whole = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    return png[:PNG_HEADER] + whole + png[PNG_HEADER:]
-
-
-PNG_HEADER = 33
-"""Length of a PNG's signature and header chunk [bytes]."""
 
 
 def write_svg_text(path: Path, text: str) -> None:

@@ -140,6 +140,10 @@ KEY_BYTES = 6
 """Of a key: it is compared with the one that a file would have, so that chance hits one in 2^48."""
 
 
+STOPPED = "stopped"
+"""In place of a key: of a result that was cut short."""
+
+
 def vectorize(
     target: FloatArray,
     settings: Settings,
@@ -238,7 +242,7 @@ def vectorize(
     release_memory()
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
-        made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
+        made.scene, settings, made.per_pixel, STOPPED if made.interrupted else metadata
     )
     if write:
         write(svg)

@@ -14,13 +14,15 @@ from typing import Any, Literal, NamedTuple
 
 from warpsplat.errors import ImageError, OutputError
 from warpsplat.files.inputs import MAX_INPUT, read_input
+from warpsplat.files.marks import picture_key
 from warpsplat.files.output import GZIP, HEAD, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.jobs.batch.manifest import Entry, Manifest
 from warpsplat.jobs.batch.plan import Job
 from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Source, Stop, Task
 from warpsplat.jobs.executors.work import digest, failure, make_folder
-from warpsplat.jobs.vectorize import job_key
+from warpsplat.jobs.formats import is_picture
+from warpsplat.jobs.vectorize import STOPPED, job_key
 from warpsplat.svg.inspect import svg_text
 from warpsplat.svg.write import read_metadata
 
@@ -94,7 +96,8 @@ def standing(job: Job, key: str, manifest: Manifest) -> Standing:
     data = read_result(job.output)
     if data is not None:
         sum_ = digest(data)
-        known = [entry for entry in entries if entry.digest == sum_ and entry.event == "made"]
+        # What was about to be written and is there, is made.
+        known = [e for e in entries if e.digest == sum_ and (e.event == "made" or e.figures)]
         if known:
             return Standing(True, known[-1])
         if marked(data) == key or any(entry.digest == sum_ for entry in entries):
@@ -123,7 +126,9 @@ def marked(data: bytes) -> str:
             data = svg_text(data, "").encode()
         except ImageError:
             return ""
-    return read_metadata(data[:HEAD].decode("utf-8", "replace")) if data.endswith(TAIL) else ""
+    if data.endswith(TAIL):
+        return read_metadata(data[:HEAD].decode("utf-8", "replace"))
+    return picture_key(data)
 
 
 def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
@@ -236,8 +241,8 @@ class Batch:
     def _known(self, job: Job, key: str) -> Standing | None:
         """How a result stands; None if nothing is to be done, which was reported."""
         state = standing(job, key, self.manifest)
-        if state.made and state.entry:
-            self._hear(Report(job, "skipped", state.entry.figures))
+        if state.made and (state.entry or is_picture(job.output)):  # which is not measured
+            self._hear(Report(job, "skipped", state.entry.figures if state.entry else {}))
             return None
         if not state.made and state.entry and not self._retry:
             self._hear(Report(job, "failed", error=state.entry.error, before=True))
@@ -256,8 +261,9 @@ class Batch:
             job.device,
             self._threads,
             self._mask(job, found),
-            # What bears no mark is known by its digest, which must be noted before it is written.
-            bring=self._carry or away or job.settings.minify,
+            # What bears no mark is known by its digest, which must be noted before it is written; a picture
+            # is drawn once, for both.
+            bring=self._carry or away or job.settings.minify or is_picture(job.output),
             measure=measure,
             result=read_result(job.output) if measure and (away or self._carry) else None,
         )
@@ -296,6 +302,6 @@ class Batch:
         self._hear(Report(job, status, outcome.figures, error))
 
     def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
-        figures = outcome.figures if event == "made" else {}
-        name = self.manifest.name(job.output)
-        self.manifest.append(Entry(name, outcome.key, event, outcome.digest, str(job.image), figures=figures))
+        name, image = self.manifest.name(job.output), str(job.image)
+        key = STOPPED if outcome.status == "stopped" else outcome.key  # ours, and no result of the job
+        self.manifest.append(Entry(name, key, event, outcome.digest, image, figures=outcome.figures))
