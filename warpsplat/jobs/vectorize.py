@@ -18,6 +18,7 @@ from warpsplat.errors import Stopped
 from warpsplat.files.importance import load_importance
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
+from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.layered import fit_layered
@@ -26,7 +27,7 @@ from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
-from warpsplat.fit.work import Meter, Progress, run_cost, score_cost
+from warpsplat.fit.work import Meter, Progress
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.memory import has_room_for_eyes
@@ -182,8 +183,9 @@ def vectorize(
     seconds = training_seconds(settings, target, started)
     traced = scene is None and settings.subject not in {"auto", "photo"}
     height, width = target.shape[:2]
-    after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
-    after += len(settings.levels) * score_cost(width, height, backend, eyes=False)
+    pixels, eyes = width * height, has_time_for_eyes(settings, target)
+    after = score_cost(pixels, settings.curves, backend, eyes=eyes)
+    after += sum(score_cost(pixels, count, backend, eyes=False) for count in settings.levels)
     pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
@@ -223,7 +225,7 @@ def vectorize(
             scene=scene,
             importance=importance,
             seconds=seconds,
-            report=Meter(report, after).stage(run_cost(settings, width, height), 0),
+            report=Meter(report, after).stage(Course.of(settings, width, height, backend).cost(), 0),
             stop=stop,
             stages=fits,
         )
