@@ -457,13 +457,12 @@ def vectorize_image(
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
     key = ""
-    source = _read(source)
+    source, importance = _read(source), None if importance is None else _read(importance)
     if keyed:
-        importance = None if importance is None else _read(importance)
         assert isinstance(source, bytes), "pixels have no key"
         assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    memory = Memory.of(source, settings)
+    memory = Memory.of(source, settings, importance)
     factor = memory.factor(name, settings)
     target = load_target(source, name, settings.background, factor)
     chosen, why = decided(target, settings)
@@ -473,7 +472,9 @@ def vectorize_image(
     height, width = target.shape[:2]
     if reduction:
         height, width = reduction.height, reduction.width
-    mask = None if importance is None else load_importance(importance, width, height, mask_name)
+    mask = None
+    if importance is not None:
+        mask = load_importance(importance, width, height, mask_name, memory.mask_factor(factor))
     stages = None
     if checkpoint:
         stages = checkpoint.stages(identity("vectorize", settings, target, mask), backend)
