@@ -15,8 +15,9 @@ import pytest
 from PIL import Image
 
 import warpsplat
+from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
-from warpsplat.errors import ResourceError
+from warpsplat.errors import ExitCode, ResourceError
 from warpsplat.files.image import Facts, boxed, image_facts, load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.whole import load_whole
@@ -218,6 +219,31 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.Mo
 def test_a_small_mask_loses_nothing() -> None:
     for width, factor in ((12_000, 4), (6000, 2), (5999, 1), (300, 1)):
         assert mask_factor(HUGE, replace(HUGE, width=width), 4) == factor
+
+
+def test_refining_against_what_takes_too_much_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before its pixels are read."""
+    image, svg, output = tmp_path / "a.png", tmp_path / "a.svg", tmp_path / "b.svg"
+    image.write_bytes(encoded(pixels()))
+    svg.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}">'
+        '<path d="M9 9H40V30H9z" fill="#853"/></svg>'
+    )
+    arguments = ("refine", svg, image, "-o", output, "--iterations", 1, "--device", "cpu")
+    limit = memory.PROGRAM + memory.REFINED * WIDTH * HEIGHT
+    assert run(*arguments, "--max-memory", limit) == 0
+    monkeypatch.setattr("warpsplat.api.load_target", None)
+    capsys.readouterr()
+    assert run(*arguments, "--max-memory", limit - 1) == ExitCode.RESOURCES
+    error = one_line(capsys.readouterr().err)
+    assert "a.png: 65x49 pixels take about" in error
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1000)
+    with pytest.raises(
+        ResourceError, match=r"^the image: .* memory for it is 0 MB; refine against a smaller"
+    ):
+        warpsplat.refine(svg, image.read_bytes(), device="cpu")
 
 
 def test_nothing_of_a_run_is_left(monkeypatch: pytest.MonkeyPatch) -> None:

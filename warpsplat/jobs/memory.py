@@ -58,6 +58,9 @@ what a file adds that is not drawn in strips."""
 EYES = 500
 """Of a pixel, to measure SSIMULACRA2."""
 
+REFINED = 150
+"""Of a pixel of the image that an SVG is refined against: pictures of what was given and of what was read."""
+
 SHARE = 0.9
 """Of the machine's memory, where no limit is given: others are there."""
 
@@ -199,6 +202,23 @@ def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1, mask
             given = "max-memory is" if settings.max_memory else "memory for it is"
             raise ResourceError(f"{name}: at least {in_words(wanted)} are needed, {given} {in_words(limit)}")
     return factor
+
+
+def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
+    """Whether there is memory to refine an SVG against an image. That is done at the image's own size:
+    whether a result is better is for all of its pixels to say.
+
+    Raises:
+        ResourceError: there is not; the message begins with ``name``.
+    """
+    facts, limit = facts_of(source), memory_limit(settings)
+    if facts is None or limit is None:
+        return
+    wanted = PROGRAM + REFINED * facts.width * facts.height
+    if wanted > limit:
+        given = "max-memory is" if settings.max_memory else "memory for it is"
+        size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
+        raise ResourceError(f"{name}: {size}, {given} {in_words(limit)}; refine against a smaller image")
 
 
 def in_words(size: int) -> str:
