@@ -66,7 +66,8 @@ def test_kinds_of_steps_have_costs_of_their_own() -> None:
     assert costs[0] == min(costs)
 
 
-def test_measuring_takes_longer_with_eyes_and_beside_threads() -> None:
+def test_measuring_takes_longer_with_eyes_and_beside_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
     one, four = Backend.on("cpu", 1), replace(Backend.on("cpu", 1), threads=4)
     cost = score_cost(100_000, 64, one, eyes=False)
     assert score_cost(100_000, 64, one, eyes=True) > cost

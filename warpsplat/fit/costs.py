@@ -7,6 +7,7 @@ shapes and goals, on images of 0.1 to 3.4 million pixels with 4 to 770 shapes.
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,7 +44,7 @@ FILLS = Law(0.34, 0.66, 0.235, 0.49, 0.656)
 STROKES = Law(20.0, 0.64, 0.033, 0.69)
 SPLATS = Law(38.0, 0.59, 0.052, 0.85)
 SOFT = Law(14.0, 1.1, 0.075, 1.0)
-LINES = Law(1.1, 0.66, 0.011, 0.33)
+LINES = Law(1.1, 0.66, 0.013, 0.33)
 """Strokes of line art, which are thin."""
 DRAWINGS = Law(1.3, 1.0, 0.06, 0.1)
 """Outlines of a drawing: few and long."""
@@ -167,5 +168,6 @@ def file_cost(pixels: int, shapes: float) -> float:
 
 def score_cost(pixels: int, shapes: float, backend: Backend, *, eyes: bool) -> float:
     """What comes after a run: making its file and measuring it."""
-    cost = EYES + EYES_PIXELS * pixels / PIXELS if eyes else file_cost(pixels, shapes)
-    return serial(backend) * cost
+    if eyes and importlib.util.find_spec("ssimulacra2"):
+        return serial(backend) * (EYES + EYES_PIXELS * pixels / PIXELS)
+    return serial(backend) * file_cost(pixels, shapes)
