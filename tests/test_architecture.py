@@ -23,7 +23,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "kernels": (),
     "scene": ("kernels.constants", "errors"),
     "files": ("errors", "native", "scene", "_version"),
-    "svg": ("errors", "scene", "files.inputs"),
+    "svg": ("errors", "native", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
     "pages": ("errors",),
     "trace": ("alpha", "errors", "scene"),

@@ -181,8 +181,7 @@ def check_devices() -> Check:
 
 def check_machine() -> Check:
     """Cores and memory."""
-    from warpsplat.native import free_memory
-    from warpsplat.rendering.backend import available_cores
+    from warpsplat.native import available_cores, free_memory
 
     values: dict[str, Any] = {"cpu_threads": available_cores(), "free_memory": free_memory()}
     text, free = f"{values['cpu_threads']} CPU threads", values["free_memory"]

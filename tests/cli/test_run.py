@@ -20,7 +20,8 @@ from warpsplat.cli.run import Bar
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.vectorize import vectorize
-from warpsplat.rendering.backend import THREADS_PER_CORE, Backend, available_cores
+from warpsplat.native import available_cores
+from warpsplat.rendering.backend import THREADS_PER_CORE, Backend
 from warpsplat.svg.viewer import render_svg
 
 

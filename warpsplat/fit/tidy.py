@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -193,12 +193,12 @@ def tidied(
         report = told(min(len(candidates) / len(edits), ROUNDS - 1 - turn))
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
-        growth = by_cell(judge.errors(applied(drawing, edits)) - errors)
+        growth = judge.errors(applied(drawing, edits)) - errors
         left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
         while left:
             made, after = refitted(left)
-            growth = by_cell(after - errors)
+            growth = after - errors
             taken = [e for e in left if within(growth, e) <= e.saved * worth]
             if len(taken) == len(left):
                 drawing, errors = made, after
@@ -227,27 +227,28 @@ class Judge:
         """
 
     def errors(self, drawing: Drawing) -> Floats:
-        """What each pixel adds to the mean squared error, shape (height, width)."""
+        """What each cell adds to the mean squared error, as ``by_cell``."""
         parameters = Parameters(drawing.scene, self._backend)
         Keeper(Constraints.of(drawing), parameters).project()
         height, width = self._target.shape[:2]
         renderer = Renderer(parameters, Viewport(width, height), model=EXACT, capacity=self.capacity)
         renderer.forward_complete()
         self.capacity = renderer.capacity
-        errors = squares(renderer.read_image() - self._target).astype(np.float64)
-        return errors / (3 * errors.size)
+        return by_cell(squares(renderer.read_image() - self._target)) / (3 * height * width)
 
 
-def by_cell(errors: Floats) -> Floats:
-    """Sums over the cells that edits are told by, with an empty one beyond each border."""
-    height, width = errors.shape
-    padded = np.pad(errors, [(CELL, CELL + -height % CELL), (CELL, CELL + -width % CELL)])
-    rows = np.add.reduceat(padded, np.arange(0, padded.shape[0], CELL), axis=0)
-    return np.asarray(np.add.reduceat(rows, np.arange(0, padded.shape[1], CELL), axis=1))
+def by_cell(pixels: npt.NDArray[np.floating[Any]]) -> Floats:
+    """Sums over the cells by which edits are told, with one more beyond each border that is empty.
+
+    Pixels of shape (height, width) make cells of shape (rows + 2, columns + 2).
+    """
+    height, width = pixels.shape
+    rows = np.add.reduceat(pixels, np.arange(0, height, CELL), axis=0, dtype=np.float64)
+    return np.pad(np.add.reduceat(rows, np.arange(0, width, CELL), axis=1), 1)
 
 
 def within(cells: Floats, edit: Edit) -> float:
-    """Sum over the pixels that an edit may change; ``cells``: of ``by_cell``."""
+    """Sum over the cells that an edit may change; ``cells`` as of ``by_cell``."""
     columns, rows = np.array([*edit.cells]).T + 1
     height, width = cells.shape
     return float(cells[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].sum())
