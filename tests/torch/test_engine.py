@@ -70,7 +70,7 @@ def test_patterns_of_dashes_belong_to_the_structure() -> None:
 
 def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyPatch) -> None:
     step(random_scene(Kind.FILL, 2))
-    monkeypatch.setattr(kernel_cache, "_wait_for", None)  # what compiles
+    monkeypatch.setattr(kernel_cache, "compile_by", None)
     monkeypatch.setattr(engine, "KEPT", 3)
     tensors = []
     for counts in (range(3, 8), range(8, 13)):
