@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import weakref
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +28,16 @@ def step(scene: Scene, width: int = 40) -> torch.Tensor:
 def live(kind: type) -> int:
     gc.collect()
     return sum(type(each) is kind for each in gc.get_objects())  # others dislike being asked
+
+
+@pytest.fixture(scope="module", autouse=True)
+def only_what_is_new() -> Iterator[None]:
+    """Neither counted nor looked at is what there was before these tests: the objects of all modules."""
+    clear_cache()
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)
