@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.batch import Manner, flags_of, perform
+from warpsplat.cli.motion import Motion, WithPreview, motion_options
 from warpsplat.cli.options import (
     FILE,
     checkpoint_options,
@@ -17,13 +18,14 @@ from warpsplat.cli.options import (
     quality_options,
     run_options,
 )
+from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
 
 
-@click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("vectorize", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
@@ -36,6 +38,8 @@ from warpsplat.jobs.options import settings_from
 @quality_options
 @importance_option
 @checkpoint_options
+@motion_options
+@report_option
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
@@ -46,6 +50,7 @@ def command(
     output: Path | None,
     overwrite: bool,
     importance: Path | None,
+    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -63,13 +68,15 @@ def command(
     against the image, number of paths, size. They go to stderr where the SVG
     goes to stdout. Several images are made as batch makes them.
     """
+    motion = Motion.of(given)
     if len(images) > 1:
+        motion.for_several()
         device_given = None if device == "auto" else device
         several(
             images,
             output,
             {**given, "device": device_given, "importance": importance},
-            Manner(overwrite=overwrite, threads=threads, quiet=quiet, as_json=as_json),
+            Manner(overwrite=overwrite, threads=threads, report=report, quiet=quiet, as_json=as_json),
             as_uri=as_uri,
         )
         return
@@ -92,6 +99,8 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
+    motion.check(*inputs, output, *filter(None, [checkpoint]), overwrite=overwrite)
+    check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(
@@ -108,17 +117,27 @@ def command(
         resume=resume,
         checkpoint_every=checkpoint_every,
         overwrite=overwrite,
+        motion=motion,
     )
+    motion.finish(result, quiet=quiet)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 
         say(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
+    if report:
+        values["report"] = str(report)
     aside = as_uri or output == STANDARD
     if as_json:
         say(json.dumps(values), err=aside)
     elif not quiet:
         say(summary(output, values), err=aside)
+    if report:
+        from warpsplat.jobs.reports.command import vectorize_command
+
+        further = () if importance is None else ("--importance", str(importance))
+        line = vectorize_command(settings, str(image), str(output), *further)
+        write_report(report, result, image, data, output, line, device=device, threads=threads)
     leave(result)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from warpsplat.api import load_svg as load_svg
     from warpsplat.api import refine as refine
     from warpsplat.api import render as render
+    from warpsplat.api import report as report
     from warpsplat.api import save_svg as save_svg
     from warpsplat.api import score as score
     from warpsplat.api import starting_scene as starting_scene
@@ -32,12 +33,16 @@ if TYPE_CHECKING:
     from warpsplat.jobs.render import to_pillow as to_pillow
     from warpsplat.jobs.vectorize import Result as Result
     from warpsplat.metrics import Score as Score
+    from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.scene import Canvas as Canvas
     from warpsplat.scene import Scene as Scene
 
 _HOMES = {
     **dict.fromkeys(
-        ("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "starting_scene"),
+        (
+            *("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "report"),
+            "starting_scene",
+        ),
         "warpsplat.api",
     ),
     **dict.fromkeys(
@@ -46,6 +51,7 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
+    "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.jobs.render",
     "Result": "warpsplat.jobs.vectorize",
     "Score": "warpsplat.metrics",
