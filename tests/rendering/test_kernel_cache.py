@@ -15,8 +15,11 @@ import pytest
 import warp as wp
 
 from warpsplat.errors import ResourceError
+from warpsplat.kernels import constants
 from warpsplat.rendering import kernel_cache
 from warpsplat.rendering.kernel_cache import CHECKSUMS, LOCK, alone_with, load
+
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
 
 
 @wp.kernel
