@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +11,12 @@ import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
+from warpsplat.fit.costs import DRAWINGS, PIXELS, serial
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
 from warpsplat.fit.nodes import CELL, Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
-from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import Settings
-from warpsplat.fit.work import Meter, Report, step_cost
+from warpsplat.fit.work import Meter, Report
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters
@@ -31,8 +30,14 @@ ROUNDS = 16
 POINTS_A_ROUND = 110
 """Of a traced drawing: how many rounds there will be, as progress is shown."""
 
-ROUND_REFITS, GRID_REFITS = 2.5, 5.0
-"""What a round, and choosing the grid, take, in times that a drawing is fitted anew."""
+REFIT_STARTED = 8
+"""What fitting a drawing anew takes besides its steps, in steps."""
+
+GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.4
+"""What choosing the grid costs: of each drawing, of ``costs.PIXELS``, of a point."""
+
+ROUND_REFITS, ROUND_GRIDS = 1.5, 0.22
+"""What a round takes, in times that a drawing is fitted anew, and that its grid is chosen."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
 """After each round."""
@@ -87,7 +92,7 @@ def finish_drawing(
         how: rates and steps of the first refinement.
         finest: most units of the view box a pixel.
         report: called every few steps.
-        after: work that comes then (``fit.work``).
+        after: work that comes then (``fit.costs``).
         stop: asked after every step and round; once true, what there is is rounded.
     """
 
@@ -102,19 +107,18 @@ def finish_drawing(
     if not len(drawing.scene):
         return Finished(drawing, min(USUAL_GRID, finest))
     how, meter = how or Refinement(), Meter(report, after)
-    refit = REFIT.steps * step_cost(Settings(), Phase(*target.shape[1::-1]), len(drawing.scene))
-    rounds, last = ROUND_REFITS * refit, (3 + GRID_REFITS) * refit
-    first = how.steps / REFIT.steps * refit
+    second, costs = replace(REFIT, steps=2 * REFIT.steps), Costs(target, drawing, backend)
+    rounds, refit = costs.round(), costs.refit(REFIT)
+    last = costs.refit(second) + costs.grid() + refit
     usual = min(len(drawing.joints) / POINTS_A_ROUND, ROUNDS)
-    drawing = refined(drawing, how, meter.stage(first, usual * rounds + last))
+    drawing = refined(drawing, how, meter.stage(costs.refit(how), usual * rounds + last))
 
     def told(later: float) -> Report | None:
         return meter.stage(rounds, later * rounds + last)
 
     drawing = tidied(target, drawing, backend, told, stop)
-    drawing = refined(
-        drawing, replace(REFIT, steps=2 * REFIT.steps), meter.stage(2 * refit, last - 2 * refit)
-    )
+    drawing = refined(drawing, second, meter.stage(costs.refit(second), costs.grid() + refit))
+    meter.stage(costs.grid(), refit)  # of which nothing shows on the way
     grid = drawing_grid(target, drawing, backend, finest)
     on, _ = drawing.links()
     held = np.zeros(len(drawing.joints), np.bool_)
@@ -122,8 +126,34 @@ def finish_drawing(
     low = rounded(drawing.scene, grid)
     points = np.where(held[:, None], low.points, drawing.scene.points)
     drawing = replace(drawing, scene=replace(drawing.scene, points=points))
-    drawing = refined(drawing, REFIT, meter.stage(last - 2 * refit, 0), held)
+    drawing = refined(drawing, REFIT, meter.stage(refit, 0), held)
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What parts of finishing a drawing cost (``fit.costs``)."""
+
+    target: FloatArray
+    drawing: Drawing
+    backend: Backend
+
+    @property
+    def _size(self) -> float:
+        return self.target[..., 0].size / PIXELS
+
+    def refit(self, how: Refinement) -> float:
+        """Of fitting it."""
+        return (how.steps + REFIT_STARTED) * DRAWINGS.cost(self._size, len(self.drawing.scene))
+
+    def grid(self) -> float:
+        """Of choosing its grid."""
+        cost = GRID + GRID_PIXELS * self._size + GRID_POINT * len(self.drawing.joints)
+        return serial(self.backend) * cost
+
+    def round(self) -> float:
+        """Of a round of ``tidied``."""
+        return ROUND_REFITS * self.refit(after_round(self.target)) + ROUND_GRIDS * self.grid()
 
 
 def tidied(
@@ -140,7 +170,7 @@ def tidied(
     by how many may come after it.
     """
     refused: set[Key] = set()
-    how = replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
+    how = after_round(target)
     judge = Judge(target, backend)
     errors = judge.errors(drawing)
 
@@ -179,6 +209,11 @@ def tidied(
         if sum(e.saved for e in left) < WORTHWHILE * size:
             break
     return drawing
+
+
+def after_round(target: FloatArray) -> Refinement:
+    """How a drawing is fitted anew after each round."""
+    return replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
 
 
 class Judge:
