@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import re
 from pathlib import Path
 
@@ -144,8 +145,8 @@ def test_a_second_signal_leaves_the_cursor_to_be_seen(
 ) -> None:
     """A progress bar hides it, and nobody cleans up after a program that ends at once."""
     written: list[tuple[int, bytes]] = []
-    monkeypatch.setattr(signals.os, "isatty", lambda handle: terminal)
-    monkeypatch.setattr(signals.os, "write", lambda handle, text: written.append((handle, text)))
+    monkeypatch.setattr(os, "isatty", lambda handle: terminal)
+    monkeypatch.setattr(os, "write", lambda handle, text: written.append((handle, text)))
     monkeypatch.setattr(signals, "_exit", lambda code: None)
     signals._end(2)
     assert written == [(2, b"\x1b[?25h" * terminal + b"\nwarpsplat: interrupted\n")]
