@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import webbrowser
 
@@ -93,5 +94,5 @@ def command(
             # Some browsers are programs of the terminal, which return when they are closed.
             threading.Thread(target=webbrowser.open, args=[server.ticket()], daemon=True).start()
 
-    with interrupt.watching():
+    with contextlib.closing(server), interrupt.watching():
         server.run(interrupt, ready)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
+import traceback
 from collections.abc import AsyncIterator
 from typing import Any
 from urllib.parse import quote
@@ -76,7 +78,12 @@ class Service:
         )
         return Starlette(
             routes=[Route(path, answer, methods=[method]) for method, path, answer in routes],
-            exception_handlers={Refused: _refused, WarpsplatError: _failed, HTTPException: _unknown},
+            exception_handlers={
+                Refused: _refused,
+                HTTPException: _unknown,
+                WarpsplatError: _failed,
+                Exception: _failed,
+            },
             lifespan=self._living,
         )
 
@@ -202,26 +209,27 @@ def _length(request: Request) -> int | None:
 
 
 async def _body(request: Request, limit: int, name: str) -> bytes:
-    """All of it, refused as soon as it is too long."""
-    parts, size = [], 0
+    """All of it; of one that is too long nothing is held, and the rest of it thrown away."""
+    parts: list[bytes] = []
+    size = 0
     async for part in request.stream():
         size += len(part)
-        if size > limit:
-            await _drained(request)
-            raise Refused(413, f"{name}: more than {limit / 1e6:g} MB")
-        parts.append(part)
+        if size <= limit:
+            parts.append(part)
+        else:
+            parts.clear()
+        if size > limit + DRAIN:
+            break
+    if size > limit:
+        raise Refused(413, f"{name}: more than {limit / 1e6:g} MB")
     return b"".join(parts)
 
 
 async def _drained(request: Request) -> None:
-    """Read what comes, and hold nothing of it; not where the sender waits for leave to send it."""
-    if "expect" in request.headers:
-        return
-    left = DRAIN
-    async for part in request.stream():
-        left -= len(part)
-        if left < 0:
-            return
+    """Throw away what comes; not where the sender waits for leave to send it."""
+    with contextlib.suppress(Refused):
+        if "expect" not in request.headers:
+            await _body(request, 0, "")
 
 
 def _parsed(body: bytes) -> dict[str, Any]:
@@ -241,7 +249,9 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 
 async def _failed(_: Request, error: Exception) -> Response:
-    """What the library refuses: an image that is none, settings that do not go together."""
+    """What the library refuses, as an image that is none or settings that do not go together; or a fault."""
+    if os.environ.get("WARPSPLAT_TRACEBACK"):
+        traceback.print_exception(error)
     status = 415 if isinstance(error, ImageError) else 400 if isinstance(error, UsageError) else 500
     return line(status, explain(error)[0])
 

@@ -34,7 +34,9 @@ def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str,
     for name in given:
         if name not in FIELDS:
             raise UsageError(f"unknown setting {name!r}; there are {', '.join(FIELDS)}")
-    values: dict[str, Any] = {name: given[name] for name in FIELDS if given.get(name) not in (None, False)}
+    values: dict[str, Any] = {
+        name: value for name in FIELDS if (value := given.get(name)) is not None and value is not False
+    }
     keywords: dict[str, Any] = {"max_memory": max_memory}
     for name, value in values.items():
         option = BY_NAME[name]

@@ -21,7 +21,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from warpsplat.errors import explain, printable
+from warpsplat.errors import printable
 
 TOKEN = "token"
 """Of an address' query."""
@@ -65,24 +65,15 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        began = False
 
         async def marked(message: Message) -> None:
-            nonlocal began
             if message["type"] == "http.response.start":
-                began = True
                 headers = MutableHeaders(scope=message)
                 for name, value in (HEADERS | {"Content-Security-Policy": NOTHING}).items():
                     headers.setdefault(name, value)
             await send(message)
 
-        answer = self._checked(Request(scope))
-        try:
-            await (answer or self._app)(scope, receive, marked)
-        except Exception as error:
-            if began:
-                raise
-            await line(500, explain(error)[0])(scope, receive, marked)
+        await (self._checked(Request(scope)) or self._app)(scope, receive, marked)
 
     def _checked(self, request: Request) -> Response | None:
         """What is answered to somebody who may not ask, or brings the token; None: may pass."""

@@ -81,16 +81,17 @@ class WarpsplatServer:
             UsageError: the port cannot be had.
         """
         self._host, self._socket = host, bound(host, port)
+        self.port = int(self._socket.getsockname()[1])
+        """That it listens to."""
         self._token = secrets.token_urlsafe(24)
         self.store = Store(limits)
         page = serve_page(self.store.limits)
         service = Service(self.store, machine or Machine(), page, max_memory)
         self._guard = Guard(service.app(), self._token, host)
 
-    @property
-    def port(self) -> int:
-        """That it listens to."""
-        return int(self._socket.getsockname()[1])
+    def close(self) -> None:
+        """Listen no more."""
+        self._socket.close()
 
     def address(self, token: str | None = None) -> str:
         """Of the page; ``token``: another one than that of all."""
