@@ -46,7 +46,7 @@ def do(store: Store, svg: str = "<svg/>") -> Run:
     """The run whose turn it is, done."""
     run = store.next()
     assert run
-    store.finish(run, Made(svg))  # type: ignore[arg-type]
+    store.finish(run, Made(svg))
     return run
 
 
@@ -64,7 +64,7 @@ def test_a_page_that_is_closed_is_forgotten_after_a_while() -> None:
     clock.now = 10
     assert store.expire() and not store.expire()
     assert running and running.stopping.is_set()
-    store.finish(running, Made())  # type: ignore[arg-type] # it ends later, and nobody wants it
+    store.finish(running, Made())  # it ends later, and nobody wants it
     assert store.held() == {"sessions": 1, "runs": 0, "waiting": 0, "images": 0, "results": 0, "coming": 0}
     with pytest.raises(Refused, match="load it anew") as refused:
         store.told(unread)

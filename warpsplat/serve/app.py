@@ -34,11 +34,11 @@ from warpsplat.serve.worker import Machine, Worker
 MAX_REQUEST = 20_000
 """Of what is no image [bytes]."""
 
+UPLOAD_TIME = 300.0
+"""For an image to come [s]: the room that is kept for it is somebody else's."""
+
 TIDY_INTERVAL = 2.0
 """Between two looks for pages that were closed [s]."""
-
-DRAIN = 1 << 30
-"""Of a refused upload, what is read and thrown away [bytes]: a browser that is cut off shows no answer."""
 
 LAST_WAIT = 10.0
 """For the run that goes on when the server ends [s]."""
@@ -127,14 +127,16 @@ class Service:
         limit = self._store.limits.upload
         size = _length(request)
         if size is None or size > limit:
-            await _drained(request)
             what = "says no size" if size is None else f"has {size / 1e6:.1f} MB"
             raise Refused(
                 411 if size is None else 413, f"{name}: {what}; at most {limit / 1e6:g} MB are taken"
             )
         self._store.reserve(size)
         try:
-            data = await _body(request, limit, name)
+            try:
+                data = await asyncio.wait_for(_body(request, limit, name), UPLOAD_TIME)
+            except asyncio.TimeoutError:
+                raise Refused(408, f"{name}: did not come within {UPLOAD_TIME:g} s") from None
             async with self._reading:  # one at a time: pixels take many times the memory of their file
                 picture = await run_in_threadpool(read_picture, data, name)
         finally:
@@ -209,27 +211,14 @@ def _length(request: Request) -> int | None:
 
 
 async def _body(request: Request, limit: int, name: str) -> bytes:
-    """All of it; of one that is too long nothing is held, and the rest of it thrown away."""
-    parts: list[bytes] = []
-    size = 0
+    """All of it, refused as soon as it is too long: uvicorn throws away what comes after an answer."""
+    parts, size = [], 0
     async for part in request.stream():
         size += len(part)
-        if size <= limit:
-            parts.append(part)
-        else:
-            parts.clear()
-        if size > limit + DRAIN:
-            break
-    if size > limit:
-        raise Refused(413, f"{name}: more than {limit / 1e6:g} MB")
+        if size > limit:
+            raise Refused(413, f"{name}: more than {limit / 1e6:g} MB")
+        parts.append(part)
     return b"".join(parts)
-
-
-async def _drained(request: Request) -> None:
-    """Throw away what comes; not where the sender waits for leave to send it."""
-    with contextlib.suppress(Refused):
-        if "expect" not in request.headers:
-            await _body(request, 0, "")
 
 
 def _parsed(body: bytes) -> dict[str, Any]:

@@ -82,21 +82,22 @@
   const upload = attempt(async (files) => {
     complain("");
     if (files.length) await ready();
+    const refused = [];
     for (const file of files) {
       const name = file.name || "pasted.png";
-      if (file.size > facts.upload) {
-        const most = `at most ${facts.upload / 1e6} MB are taken`;
-        throw new Error(`${name}: has ${(file.size / 1e6).toFixed(1)} MB; ${most}`);
-      }
-      document.body.classList.add("busy");
       try {
-        const { image } = await ask("POST", `${at("images")}?name=${encodeURIComponent(name)}`, file, "application/octet-stream");
-        arriving = image;
+        if (file.size > facts.upload) {
+          const size = `has ${(file.size / 1e6).toFixed(1)} MB`;
+          throw new Error(`${name}: ${size}; at most ${facts.upload / 1e6} MB are taken`);
+        }
+        const path = `${at("images")}?name=${encodeURIComponent(name)}`;
+        arriving = (await ask("POST", path, file, "application/octet-stream")).image;
         show();
-      } finally {
-        document.body.classList.remove("busy");
+      } catch (error) {
+        refused.push(error.message);
       }
     }
+    complain(refused.join("\n"));
   });
 
   for (const input of document.querySelectorAll('input[type="file"]')) {
@@ -142,6 +143,7 @@
     complain("", "refused");
     const request = JSON.stringify({ image: current, settings: chosen() });
     follow = (await ask("POST", at("runs"), request, "application/json")).run;
+    $("stage").scrollIntoView({ block: "nearest", behavior: "smooth" }); // on a phone the form lies below it
   }, "refused");
   $("form").addEventListener("submit", (event) => {
     event.preventDefault();
