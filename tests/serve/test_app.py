@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import io
+import weakref
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from PIL import Image
@@ -11,6 +14,7 @@ from PIL import Image
 import warpsplat
 from tests.serve.helpers import Visitor, picture, until
 from warpsplat.fit.settings import make_settings
+from warpsplat.rendering.parameters import Parameters
 from warpsplat.serve.limits import Limits
 
 SHORT = {"curves": 4, "subject": "photo"}
@@ -65,6 +69,31 @@ def test_runs_wait_for_their_turn() -> None:
         assert [run["id"] for run in visitor.told()["runs"]] == [first, third]
         visitor.client.post(visitor.at("runs", first, "stop"))
         assert visitor.over(third)["state"] == "done" and visitor.run(first)["state"] == "stopped"
+
+
+def test_nothing_of_a_run_is_left_but_its_file(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays go when it is over, the image when it is removed; at once, without the collector of cycles."""
+    arrays: list[weakref.ref[object]] = []
+    create = Parameters.__init__
+
+    def noted(self: Parameters, *given: Any, **named: Any) -> None:
+        arrays.append(weakref.ref(self))
+        create(self, *given, **named)
+
+    monkeypatch.setattr(Parameters, "__init__", noted)
+    gc.collect()
+    gc.disable()
+    try:
+        image = visitor.upload(picture())
+        run = visitor.over(visitor.begin(image, **SHORT))
+        held = [weakref.ref(visitor.store.picture(visitor.session, image))]
+        held.append(weakref.ref(visitor.store.run(visitor.session, run["id"])))
+        assert arrays
+        until(lambda: not [each for each in arrays if each()])
+        assert visitor.client.delete(visitor.at("images", image)).status_code == 204
+        until(lambda: not [each for each in held if each()])
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from warpsplat.api import save_svg
@@ -59,7 +60,7 @@ class Live:
         self.left = (now - self._first[0]) / done * (1 - progress.work) if done > 0 else None
         self.note = ""
         snapshot = progress.snapshot
-        self.progress = progress
+        self.progress = replace(progress, snapshot=None)  # which keeps a run's arrays
         if snapshot and now >= self._next and self._is_watched():
             self._draw(snapshot, now)
         self._changed()
