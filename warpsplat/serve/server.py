@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import ipaddress
 import logging
+import os
 import secrets
 import socket
 from collections.abc import Callable, Generator
@@ -30,22 +31,15 @@ def bound(host: str, port: int) -> socket.socket:
     Raises:
         UsageError: it cannot be had; the message says why.
     """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        made = socket.socket(family, kind, protocol)
-    except (OSError, UnicodeError) as error:
+        return socket.create_server((host, port), family=family)
+    except (socket.gaierror, UnicodeError) as error:  # names
         raise UsageError(f"--host {printable(host)}: {getattr(error, 'strerror', None) or error}") from error
-    try:
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        made.bind(address)
-        made.listen()
     except OSError as error:
-        made.close()
         other = "; --port 0 finds a free one" if port else ""
-        raise UsageError(f"port {port} of {printable(host)}: {error.strerror or error}{other}") from error
-    return made
+        cause = os.strerror(error.errno) if error.errno else error
+        raise UsageError(f"port {port} of {printable(host)}: {cause}{other}") from error
 
 
 def is_loopback(host: str) -> bool:
