@@ -33,9 +33,11 @@ def bound(host: str, port: int) -> socket.socket:
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return socket.create_server((host, port), family=family)
-    except (socket.gaierror, UnicodeError) as error:  # names
+        socket.getaddrinfo(host, port, family)
+    except (OSError, UnicodeError) as error:
         raise UsageError(f"--host {printable(host)}: {getattr(error, 'strerror', None) or error}") from error
+    try:
+        return socket.create_server((host, port), family=family)
     except OSError as error:
         other = "; --port 0 finds a free one" if port else ""
         cause = os.strerror(error.errno) if error.errno else error
@@ -141,6 +143,7 @@ class _Uvicorn(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begin to answer."""
         await super().startup(sockets)
+        self._is_over()  # from the first question on a signal is a wish
         self._ready()
 
     async def on_tick(self, counter: int) -> bool:

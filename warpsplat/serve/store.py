@@ -7,7 +7,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import Any
 
 from warpsplat.fit.settings import Settings
@@ -16,25 +15,7 @@ from warpsplat.serve.limits import Limits, Refused
 from warpsplat.serve.live import Live
 from warpsplat.serve.pictures import Picture
 from warpsplat.serve.runs import Run
-
-
-@dataclass(eq=False)
-class Session:
-    """A page: its images and runs, oldest first."""
-
-    id: str
-    seen: float
-    """When it was opened, or the last of its readers left."""
-    readers: int = 0
-    """Streams of events that are open."""
-    begun: int = 0
-    """Runs so far."""
-    pictures: dict[str, Picture] = field(default_factory=dict)
-    runs: dict[str, Run] = field(default_factory=dict)
-
-    def runs_of(self, image: str) -> list[Run]:
-        """Of one image."""
-        return [run for run in self.runs.values() if run.image == image]
+from warpsplat.serve.session import Session
 
 
 class Store:
@@ -105,11 +86,8 @@ class Store:
         """A session as its page is told of it, for JSON."""
         with self._lock:
             session = self._session(name)
-            places = {run.id: place for place, run in enumerate(self._queue)}
-            pictures = [{"id": i} | picture.as_dict() for i, picture in session.pictures.items()]
             busy = any(run.state == "running" for run in self._all_runs())
-            runs = [run.as_dict(places.get(run.id, 0) + busy) for run in session.runs.values()]
-            return {"images": pictures, "runs": runs}
+            return session.as_dict({run: place + busy for place, run in enumerate(self._queue)})
 
     # Images
 
