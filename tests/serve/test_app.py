@@ -40,7 +40,16 @@ def test_an_image_becomes_the_file_of_the_command_line(visitor: Visitor) -> None
     assert answer.headers["content-disposition"] == "attachment; filename*=UTF-8''my%20photo.svg"
     assert run["figures"]["bytes"] == len(made.svg) and run["figures"]["shapes"] == len(made.scene)
     assert run["figures"]["psnr"] == made.as_dict()["psnr"]
-    assert run["command"] == "warpsplat vectorize 'my photo.png' --subject photo --curves 4"
+    assert run["command"] == "warpsplat vectorize 'my photo.png' --curves 4 --subject photo -o 'my photo.svg'"
+
+
+def test_the_command_says_what_the_form_says() -> None:
+    with Visitor(max_memory="2GB") as visitor:
+        run = visitor.begin(visitor.upload(picture(), "-a b.png"), colors=6, mixed=True, quality="high")
+        assert visitor.run(run)["command"] == (
+            "warpsplat vectorize './-a b.png' --quality high --mixed --colors 6 --max-memory 2000000000"
+            " -o './-a b.svg'"
+        )
 
 
 def test_a_run_that_is_stopped_has_a_file(visitor: Visitor) -> None:

@@ -12,7 +12,7 @@ import pytest
 import warpsplat
 from tests.serve.helpers import picture
 from warpsplat.fit.work import Progress, Snapshot
-from warpsplat.serve.form import command_line, settings_of
+from warpsplat.serve.form import settings_of
 from warpsplat.serve.live import LEAST_PAUSE, SHARE, Live
 
 
@@ -84,11 +84,8 @@ def test_a_real_run_has_pictures_of_its_shapes() -> None:
     assert live.number >= 1 and 1 <= len(warpsplat.load_svg(live.picture)) <= 6
 
 
-def test_the_command_says_what_the_form_says() -> None:
+def test_settings_of_the_form() -> None:
     given = {"colors": 6, "open": False, "curves": 64, "mixed": True, "quality": "high"}
     values, settings = settings_of(given, "2GB")
     assert list(values) == ["curves", "mixed", "quality", "colors"]
     assert (settings.curves, settings.mixed, settings.colors, settings.max_memory) == (64, True, 6, 2 * 10**9)
-    assert command_line("-a b.png", values, "2GB") == (
-        "warpsplat vectorize './-a b.png' --max-memory 2GB --curves 64 --mixed --quality high --colors 6"
-    )

@@ -22,9 +22,10 @@ from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Route
 
 from warpsplat.errors import ImageError, UsageError, WarpsplatError, explain
+from warpsplat.jobs.reports.command import vectorize_command
 from warpsplat.native import release_memory
 from warpsplat.serve.events import events
-from warpsplat.serve.form import command_line, settings_of
+from warpsplat.serve.form import settings_of
 from warpsplat.serve.guard import line
 from warpsplat.serve.limits import Refused
 from warpsplat.serve.pictures import DEFAULT_NAME, Picture, plain_name, read_picture
@@ -161,7 +162,8 @@ class Service:
         image = given.get("image")
         picture = self._store.picture(session, image if isinstance(image, str) else "")
         values, settings = settings_of(given.get("settings", {}), self._max_memory)
-        command = command_line(picture.name, values, self._max_memory)
+        path = f"./{picture.name}" if picture.name.startswith("-") else picture.name
+        command = vectorize_command(settings, path, f"{_stem(path)}.svg")
         run = self._store.add_run(session, str(image), values, settings, command)
         return JSONResponse({"run": run}, 201)
 
@@ -186,8 +188,8 @@ class Service:
         run = self._store.run(request.path_params["session"], request.path_params["run"])
         if "download" not in request.query_params:
             return _svg(run.svg, KEPT)
-        name = run.picture.name.rpartition(".")[0] or run.picture.name
-        disposition = f"attachment; filename*=UTF-8''{quote(name, safe='')}.svg"
+        name = quote(_stem(run.picture.name), safe="")
+        disposition = f"attachment; filename*=UTF-8''{name}.svg"
         return _svg(run.svg, {"Content-Disposition": disposition})
 
     def _picture(self, request: Request) -> Picture:
@@ -196,6 +198,12 @@ class Service:
 
 KEPT = {"Cache-Control": "private, max-age=3600, immutable"}
 """Of what stays as it is while there is an address for it."""
+
+
+def _stem(name: str) -> str:
+    """Of an image's file, for its SVG."""
+    stem, _, ending = name.rpartition(".")
+    return stem if stem and "/" not in ending else name
 
 
 def _svg(data: bytes, headers: dict[str, str]) -> Response:

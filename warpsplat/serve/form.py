@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from typing import Any
 
@@ -46,12 +45,3 @@ def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str,
             raise UsageError("closed and open do not go together")
         keywords[option.setting] = value if option.kind is None else option.kind
     return values, settings_from(keywords)
-
-
-def command_line(image: str, values: Mapping[str, Any], max_memory: str | None = None) -> str:
-    """What makes the same file of an image of that name, in a shell."""
-    words = ["warpsplat", "vectorize", f"./{image}" if image.startswith("-") else image]
-    for name, value in ({"max-memory": max_memory} | dict(values)).items():
-        if value is not None:
-            words += [f"--{name}"] if value is True else [f"--{name}", str(value)]
-    return shlex.join(words)
