@@ -35,6 +35,7 @@ EXTRAS = {
     "eyes": ("ssimulacra2", "SSIMULACRA2 in reports"),
     "compare": ("vtracer", "warpsplat compare"),
     "ray": ("ray", "warpsplat batch --executor ray"),
+    "serve": ("starlette", "warpsplat serve"),
     "remote": ("upath", "images and results behind URLs"),
 }
 """Extra -> its package, and what it is for."""
