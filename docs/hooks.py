@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import gallery_pages
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
@@ -44,6 +45,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         [COMMANDS_INTRODUCTION, *(line for name in COMMANDS for line in command_help(name))]
     )
     files.append(File.generated(config, "commands.md", content=reference))
+    for page, text in gallery_pages.pages().items():
+        files.append(File.generated(config, page, content=text))
     return files
 
 
