@@ -22,6 +22,7 @@ from warpsplat.cli.options import (
     threads_option,
     voice_options,
 )
+from warpsplat.cli.report import index_option
 from warpsplat.cli.say import say
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.jobs.options import KINDS
@@ -44,6 +45,8 @@ class Manner:
     threads: int | None = None
     shard: tuple[int, int] = (1, 1)
     manifest: Path | None = None
+    report: Path | None = None
+    """Folder of pages on the results, or the page that lists them."""
     cluster: Cluster | None = None
     """Other machines; None: this one."""
     quiet: bool = False
@@ -93,6 +96,7 @@ class Shard(click.ParamType):
     metavar="FILE",
     help="What was made, as JSON lines.  [default: warpsplat-manifest.jsonl, with the results]",
 )
+@index_option
 @quality_options
 @importance_option
 @click.option("--device", help="auto (a GPU if there is one), cpu, or cuda:N.")
@@ -115,6 +119,7 @@ def command(
     gpus: float | None,
     shard: tuple[int, int],
     manifest: Path | None,
+    report: Path | None,
     threads: int | None,
     verbose: int,
     quiet: bool,
@@ -145,7 +150,7 @@ def command(
     }
     cluster = cluster_of(executor, gpus)
     manner = Manner(
-        overwrite, retry_failed, dry_run, workers, threads, shard, manifest, cluster, quiet, as_json
+        overwrite, retry_failed, dry_run, workers, threads, shard, manifest, report, cluster, quiet, as_json
     )
     perform(inputs, flags, sets, manner)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import click
 
-from warpsplat.cli.options import FILE
+from warpsplat.cli.options import FILE, overwrite_option
+from warpsplat.cli.report import check_report, report_option
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 
@@ -15,8 +16,10 @@ from warpsplat.errors import UsageError
 @click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("image", type=FILE)
 @click.argument("svg", type=FILE)
+@report_option
+@overwrite_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(image: Path, svg: Path, as_json: bool) -> None:
+def command(image: Path, svg: Path, report: Path | None, overwrite: bool, as_json: bool) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
 
     The SVG is rendered at the image's size, on white; where the image has
@@ -25,18 +28,26 @@ def command(image: Path, svg: Path, as_json: bool) -> None:
     for images of up to 4 million pixels. One of the two may be - for the
     standard input.
     """
-    from warpsplat.api import score
-    from warpsplat.files.inputs import STANDARD
+    from warpsplat import api
+    from warpsplat.files.inputs import STANDARD, read_input
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")
-    values = score(svg, image).as_dict()
+    check_report(report, (image, svg), STANDARD, overwrite=overwrite)
+    # The standard input can be read once.
+    shown = read_input(image) if image == STANDARD else image
+    text = read_input(svg, "an SVG") if svg == STANDARD else svg
+    values = api.score(text, shown).as_dict()
+    if report:
+        named = "image" if image == STANDARD else image.name
+        svg_named = "image.svg" if svg == STANDARD else f"{svg.stem}.svg"
+        api.report(text, shown, report, name=named, svg_name=svg_named)
     if as_json:
         say(json.dumps({"image": str(image), "svg": str(svg), **values}))
         return
     for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):
         unit = " dB" if name == "psnr" else ""
-        shown = "-" if values[name] is None else values[name]
-        say(f"{name:12}{shown}{unit if values[name] is not None else ''}")
+        value = "-" if values[name] is None else values[name]
+        say(f"{name:12}{value}{unit if values[name] is not None else ''}")
     say(f"{'bytes':12}{values['bytes']}")
     say(f"{'gzip_bytes':12}{values['gzip_bytes']}")

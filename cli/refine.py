@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
+from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
@@ -41,6 +42,7 @@ from warpsplat.jobs.options import BY_NAME
     help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
 )
 @checkpoint_options
+@report_option
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
@@ -48,6 +50,7 @@ def command(
     image: Path,
     output: Path,
     overwrite: bool,
+    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -75,6 +78,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, svg, image)
+    check_report(report, (svg, image), output, overwrite=overwrite)
     from warpsplat.api import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
@@ -82,17 +86,18 @@ def command(
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
+    shown = read_input(image) if report else b""
     interrupt = Interrupt()
-    with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as report:
+    with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as tell:
         result = refine(
             data,
-            image,
+            shown or image,
             settings=settings,
             keep=keep,
             output=output,
             device=device,
             threads=threads,
-            callback=report,
+            callback=tell,
             stop=interrupt,
             name=input_name(svg),
             checkpoint=checkpoint,
@@ -108,8 +113,15 @@ def command(
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
+    if report:
+        values["report"] = str(report)
     if as_json:
         say(json.dumps(values), err=output == STANDARD)
     elif not quiet:
         say(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
+    if report:
+        from warpsplat.jobs.reports.command import refine_command
+
+        line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
+        write_report(report, result, image, shown, output, line, device=device, threads=threads)
     leave(result)

@@ -17,6 +17,7 @@ from warpsplat.cli.options import (
     quality_options,
     run_options,
 )
+from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
@@ -36,6 +37,7 @@ from warpsplat.jobs.options import settings_from
 @quality_options
 @importance_option
 @checkpoint_options
+@report_option
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
@@ -46,6 +48,7 @@ def command(
     output: Path | None,
     overwrite: bool,
     importance: Path | None,
+    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -69,7 +72,7 @@ def command(
             images,
             output,
             {**given, "device": device_given, "importance": importance},
-            Manner(overwrite=overwrite, threads=threads, quiet=quiet, as_json=as_json),
+            Manner(overwrite=overwrite, threads=threads, report=report, quiet=quiet, as_json=as_json),
             as_uri=as_uri,
         )
         return
@@ -92,6 +95,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
+    check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(
@@ -114,11 +118,19 @@ def command(
 
         say(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
+    if report:
+        values["report"] = str(report)
     aside = as_uri or output == STANDARD
     if as_json:
         say(json.dumps(values), err=aside)
     elif not quiet:
         say(summary(output, values), err=aside)
+    if report:
+        from warpsplat.jobs.reports.command import vectorize_command
+
+        further = () if importance is None else ("--importance", str(importance))
+        line = vectorize_command(settings, str(image), str(output), *further)
+        write_report(report, result, image, data, output, line, device=device, threads=threads)
     leave(result)
 
 

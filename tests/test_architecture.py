@@ -25,6 +25,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "files": ("errors", "native", "scene", "_version"),
     "svg": ("errors", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
+    "pages": ("errors",),
     "trace": ("alpha", "errors", "scene"),
     "rendering": ("errors", "native", "scene", "kernels"),
     "fit": ("alpha", "errors", "scene", "kernels", "rendering", "svg", "metrics"),
@@ -40,6 +41,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "files",
         "svg",
         "metrics",
+        "pages",
         "torch",
     ),
     "torch": ("errors", "scene", "kernels", "rendering", "fit", "svg"),
@@ -47,7 +49,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.
 Those that are not named may import all but ``cli``."""
 
-HEAVY = {"numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "svgelements", "scipy", "matplotlib"}
+HEAVY = {"numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "svgelements", "scipy", "matplotlib", "jinja2"}
 """What the command line imports only when a command runs: ``--help`` answers at once."""
 
 

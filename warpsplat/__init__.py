@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from warpsplat.api import load_svg as load_svg
     from warpsplat.api import refine as refine
     from warpsplat.api import render as render
+    from warpsplat.api import report as report
     from warpsplat.api import save_svg as save_svg
     from warpsplat.api import score as score
     from warpsplat.api import starting_scene as starting_scene
@@ -37,7 +38,10 @@ if TYPE_CHECKING:
 
 _HOMES = {
     **dict.fromkeys(
-        ("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "starting_scene"),
+        (
+            *("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "report"),
+            "starting_scene",
+        ),
         "warpsplat.api",
     ),
     **dict.fromkeys(

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import ImageError, UsageError
+from warpsplat.files.output import write_result
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
@@ -31,6 +32,7 @@ from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.refine import refine as refine_scene
 from warpsplat.jobs.render import RendererName, drawn
+from warpsplat.jobs.reports.single import Facts, report_page
 from warpsplat.jobs.vectorize import Result, load_target, vectorize_image
 from warpsplat.metrics import Score, score_svg
 from warpsplat.rendering.backend import Backend, Viewport
@@ -454,6 +456,61 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
         return score_svg(text, target)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
+
+
+def report(
+    result: Result | SvgSource,
+    image: ImageSource,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    command: str = "",
+    name: str | None = None,
+    svg_name: str | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+) -> str:
+    """A page on a result, to look at in a browser: one file that needs nothing else and no network.
+
+    It shows image and SVG under a slider, where they differ, the shapes with the decibels that each is worth,
+    the figures and the course of the run.
+
+    Args:
+        result: what ``vectorize`` or ``refine`` made; or any SVG, as for ``refine``, which is measured.
+        image: that it shows, as for ``vectorize``.
+        output: file to write the page to; an existing one is replaced in one step.
+        command: what makes the result again, for people.
+        name: of the image, for people; default: its file's name.
+        svg_name: that the SVG is downloaded as; default: the image's name with ``.svg``.
+        device: where to compute, see ``vectorize``.
+        threads: see there.
+
+    Returns:
+        the page.
+
+    Raises:
+        ImageError: the image or the SVG cannot be read, or their proportions differ.
+        OutputError: ``output`` cannot be written.
+    """
+    name = name or Path(source_name(image)).name
+    if isinstance(result, Result):
+        text, facts, own = result.svg, Facts.of(result, command), result.before is None
+    else:
+        text = _text(result, _svg_name(result))
+        image = source_bytes(image) if isinstance(image, (str, os.PathLike, Readable)) else image
+        facts, own = Facts(score(text, image).as_dict(), command=command), False
+    with _backend(device, threads) as backend:
+        made = report_page(
+            text,
+            image,
+            backend,
+            facts,
+            name=name,
+            svg_name=svg_name or Path(name).with_suffix(".svg").name,
+            own=own,
+        )
+    if output is not None:
+        write_result(Path(output), made.encode())
+    return made
 
 
 def _kind(*, closed: bool | None, open: bool | None) -> Kind | None:

@@ -40,6 +40,9 @@ PNG_SOFTWARE = "warpsplat"
 PDF_MARK = b"\n%warpsplat\n"
 """Comment behind the end of every PDF written here."""
 
+PAGE_MARK = b"<!--warpsplat page-->"
+"""In the head of every page written here (``pages.MARK``)."""
+
 HEAD = 2000
 """Bytes at the start of a file in which its mark stands."""
 
@@ -163,7 +166,7 @@ def may_replace(path: Path) -> bool:
     except FileNotFoundError:
         return True
     head = unpacked(head)
-    marks = (*SVG_MARKS, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
+    marks = (*SVG_MARKS, PAGE_MARK, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
     return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
 
 

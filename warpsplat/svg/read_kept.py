@@ -41,6 +41,12 @@ class KeptScene:
     """Whether the SVG itself has one."""
     kept: str
     """What is kept, for people; empty: nothing."""
+    document: Document | None = None
+    """That it was read from."""
+    elements: tuple[int | None, ...] = ()
+    """Which element of the document draws each shape, counted from 0, the root; None: no single one."""
+    background_element: int | None = None
+    """Which one is the background."""
 
 
 def load_kept(text: str, width: int, height: int, name: str, *, background_apart: bool = True) -> KeptScene:
@@ -64,7 +70,16 @@ def load_kept(text: str, width: int, height: int, name: str, *, background_apart
             raise ImageError(f"has no path that can be refined{causes}")
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
-    return KeptScene(scene, has_background, _words(kept, scene.pictures) if kept else "")
+    numbers = {element: number for number, element in enumerate(document.root.iter())}
+    drawn = [None if s.element is None else numbers[s.element] for s in shapes if isinstance(s, Shape)]
+    return KeptScene(
+        scene,
+        has_background,
+        _words(kept, scene.pictures) if kept else "",
+        document,
+        tuple(drawn[has_background:]),
+        drawn[0] if has_background else None,
+    )
 
 
 def _words(kept: Sequence[Kept], pictures: Sequence[Picture] = ()) -> str:

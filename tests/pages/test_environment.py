@@ -1,0 +1,92 @@
+"""Pages hold whatever texts they are given as texts."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from urllib.parse import unquote_to_bytes
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from jinja2 import ChoiceLoader, DictLoader, UndefinedError
+
+from warpsplat.files.output import PAGE_MARK
+from warpsplat.pages import MARK, environment, page
+from warpsplat.pages.embed import image_uri, svg_uri
+
+SOURCE = """{% extends "base.html.j2" %}{% block title %}{{ name }}{% endblock %}
+{% block main %}<p id="it" title="{{ name }}">{{ name }}</p><a href="{{ name|address }}">x</a>
+<script type="application/json" id="data">{{ {"name": name}|tojson }}</script>{% endblock %}"""
+
+NASTY = [
+    "</script><script>alert(1)</script>",
+    "\"' onmouseover=alert(1) x=",
+    "<!--<script>",
+    "]]></title><img src=x onerror=alert(1)>",
+    "{{ 7*7 }}{% include 'base.html.j2' %}",
+    "javascript:alert(1)",
+    "a\udcff\x00\u2028b",
+]
+
+
+class Tags(HTMLParser):
+    """Elements, and the text of the one with the id ``it``."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: list[str] = []
+        self.links: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [name for name, _ in attrs]
+        self.links += [value or "" for name, value in attrs if name == "href" and tag == "a"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def template() -> None:
+    made = environment.environment()
+    assert made.loader
+    made.loader = ChoiceLoader([DictLoader({"test.html.j2": SOURCE}), made.loader])
+
+
+def made(name: str) -> Tags:
+    return Tags(page("test.html.j2", assets=("viewer.css", "viewer.js"), name=name))
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_nasty_texts_add_no_element_and_no_attribute(name: str) -> None:
+    nasty, plain = made(name), made("plain")
+    assert nasty.tags == plain.tags
+    assert nasty.attributes == plain.attributes
+    link = nasty.links[-1]
+    assert not re.search(r"[^\w./%~-]", link)
+    assert unquote_to_bytes(link) == name.encode("utf-8", "surrogateescape")
+
+
+@given(st.text(alphabet=st.characters(codec="utf-8") | st.sampled_from("<>\"'&/{}%"), max_size=40))
+def test_no_text_adds_an_element(name: str) -> None:
+    assert made(name).tags == made("plain").tags
+
+
+def test_what_a_page_loads() -> None:
+    """Scripts run by their hashes only, nothing comes from elsewhere, the mark is where it is looked for."""
+    text = page("test.html.j2", assets=("viewer.css", "viewer.js"), name="x")
+    assert "default-src &#39;none&#39;" in text and "script-src &#39;sha256-" in text
+    assert "connect-src" not in text
+    assert "connect-src" in page("test.html.j2", connects=True, name="x")
+    assert MARK.encode() == PAGE_MARK and PAGE_MARK in text.encode()[:2000]
+    assert not re.findall(r"(?:src|href)=[\"'](?!data:|#|x)", text)
+
+
+def test_a_missing_value_is_an_error() -> None:
+    with pytest.raises(UndefinedError):
+        page("test.html.j2")
+
+
+def test_pictures() -> None:
+    assert image_uri(b"\x89PNG...").startswith("data:image/png;base64,")
+    assert "<" not in svg_uri('<svg onload="alert(1)"/>')

@@ -1,0 +1,157 @@
+"""What a report's slider shows, small enough to be embedded."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from warpsplat.files.sources import ImageSource, image_of
+from warpsplat.jobs.memory import facts_of
+from warpsplat.pages.embed import image_uri
+from warpsplat.scene import FloatArray
+
+Bytes = npt.NDArray[np.uint8]
+
+PAGE_PIXELS = 2_000_000
+"""Most pixels of a picture on a page; of larger images a reduced copy is shown."""
+
+ROOM, ROOM_SHARE = 190_000, 1.5
+"""Bytes that the pictures of a page may take: so many, and this share of the image's file. With what base64
+adds a page weighs no more than the SVG, twice the image and 400 kB."""
+
+QUALITIES = (92, 85, 75, 60, 40, 20)
+"""Of WebP, the best that there is room for."""
+
+MAP_QUALITY = 70
+"""Of the error map: colours that stand for numbers, looked at, not measured."""
+
+FEW_COLORS = 4096
+"""Up to so many different colours an image is a drawing, which is kept without loss."""
+
+MOST_ERROR = 64.0
+"""The end of the error map's scale, the same on all pages [levels of 255]."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """An image as a page shows it."""
+
+    pixels: FloatArray
+    """sRGB in [0, 1], shape (height, width, 3); with opacity premultiplied, shape (height, width, 4)."""
+    width: int
+    """Of the image itself [px]."""
+    height: int
+
+    @property
+    def is_reduced(self) -> bool:
+        """Whether the image itself is larger."""
+        return self.pixels.shape[:2] != (self.height, self.width)
+
+
+def shown_image(source: ImageSource, name: str | None) -> Shown:
+    """The image, smaller by a whole factor where it has more than ``PAGE_PIXELS``.
+
+    Raises:
+        ImageError, TypeError: as ``image_of``.
+    """
+    facts = facts_of(source)
+    factor = max(1, math.ceil(math.sqrt(facts.width * facts.height / PAGE_PIXELS))) if facts else 1
+    pixels = image_of(source, name, factor=factor)
+    height, width = pixels.shape[:2]
+    return Shown(pixels, facts.width if facts else width, facts.height if facts else height)
+
+
+def error_map(shown: Bytes, target: FloatArray) -> Bytes:
+    """Where a file differs from an image: the root of the mean square of the channels' differences, black for
+    none, white for ``MOST_ERROR`` and more.
+
+    Args:
+        shown: the file as a viewer shows it, not premultiplied, shape (height, width, 4).
+        target: the image, as ``Shown.pixels``; both lie on white.
+
+    Returns:
+        RGB, shape (height, width, 3).
+    """
+    alpha = shown[..., 3:] / np.float32(255)
+    error = on_white(target) - (shown[..., :3] * alpha + 255 * (1 - alpha))
+    size = np.sqrt(np.mean(error**2, axis=2))
+    levels = np.clip(np.round(size * (255 / MOST_ERROR)), 0, 255).astype(np.uint8)
+    return np.asarray(
+        cv2.cvtColor(cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO), cv2.COLOR_BGR2RGB), np.uint8
+    )
+
+
+def map_colors(count: int = 9) -> list[str]:
+    """Colours along the error map's scale, for a legend, ``#rrggbb``."""
+    levels = np.linspace(0, 255, count).astype(np.uint8)[:, None]
+    colors = cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[:, 0, ::-1]
+    return ["#" + bytes(color.tolist()).hex() for color in colors]
+
+
+def on_white(pixels: FloatArray) -> FloatArray:
+    """An image in 0..255 on white, shape (height, width, 3)."""
+    levels = pixels[..., :3] * np.float32(255)
+    if pixels.shape[2] == 4:
+        levels = levels + 255 * (1 - pixels[..., 3:])
+    return np.asarray(levels, np.float32)
+
+
+def straight(pixels: FloatArray) -> Bytes:
+    """An image in 8 bits, not premultiplied, with opacity if it has some."""
+    if pixels.shape[2] == 4:
+        alpha = pixels[..., 3:]
+        color = np.divide(pixels[..., :3], alpha, out=np.zeros_like(pixels[..., :3]), where=alpha > 0)
+        pixels = np.concatenate([color, alpha], axis=2)
+    return np.round(255 * np.clip(pixels, 0, 1)).astype(np.uint8)
+
+
+def encoded(pixels: FloatArray, room: float) -> str:
+    """An image as a data URI: without loss where it is a drawing and small, else as good as ``room`` bytes
+    allow.
+    """
+    levels = straight(pixels)
+    image = Image.fromarray(levels)
+    if _has_few_colors(levels):
+        data = _webp(image, lossless=True)
+        if len(data) <= room:
+            return image_uri(data)
+    return image_uri(_first_within(image, QUALITIES, room))
+
+
+def encoded_map(pixels: Bytes, room: float) -> str:
+    """An error map as a data URI."""
+    return image_uri(_first_within(Image.fromarray(pixels), (MAP_QUALITY, 50, 30, 10), room))
+
+
+def _first_within(image: Image.Image, qualities: Sequence[int], room: float) -> bytes:
+    for quality in qualities:
+        data = _webp(image, quality=quality)
+        if len(data) <= room:
+            break
+    return data
+
+
+def _webp(image: Image.Image, *, lossless: bool = False, quality: int = 80) -> bytes:
+    file = io.BytesIO()
+    image.save(file, "WEBP", lossless=lossless, quality=quality, method=2)
+    return file.getvalue()
+
+
+def _has_few_colors(levels: Bytes) -> bool:
+    whole = np.zeros((*levels.shape[:2], 4), np.uint8)
+    whole[..., : levels.shape[2]] = levels
+    return len(np.unique(whole.reshape(-1, 4).view(np.uint32))) <= FEW_COLORS
+
+
+def thumbnail(pixels: FloatArray, side: int = 128) -> bytes:
+    """A small copy on white for lists, WebP."""
+    image = Image.fromarray(np.round(np.clip(on_white(pixels), 0, 255)).astype(np.uint8))
+    image.thumbnail((side, side))
+    return _webp(image, quality=75)

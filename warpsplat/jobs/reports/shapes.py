@@ -1,0 +1,181 @@
+"""The shapes of a file as a report lists them, with the decibels that each is worth."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.errors import CapacityError
+from warpsplat.fit.losses import Aim
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Renderer
+from warpsplat.scene import OPACITY_RANGE, FloatArray, Kind, Paint, Scene
+from warpsplat.svg.document import Document, Element
+from warpsplat.svg.numbers import hex_colors
+from warpsplat.svg.read_kept import KeptScene
+
+ROUNDING = 1 / (12 * 255**2)
+"""Mean squared error that 8 bits have anyway: a file that shows an image exactly has no decibels."""
+
+MOST_LAYERS = 24
+"""More named groups than these are no layers to choose from."""
+
+PARTS = 4
+"""Layers of a file that names none: its shapes in painter's order, in so many parts."""
+
+LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Shapes, back to front, as lists of equal length; and their layers, back to front."""
+
+    elements: list[int | None]
+    """Which element of the document draws each, counted from 0, the root; None: no single one."""
+    kinds: list[str]
+    colors: list[list[str]]
+    """``#rrggbb``: one, or the first and last of a gradient; none of what is kept as it is."""
+    opacities: list[float]
+    layers: list[int]
+    worth: list[float | None]
+    """PSNR that goes with the shape [dB]; None: not known."""
+    names: list[str]
+    """Of the layers."""
+    background: int | None
+    """The element that is the background."""
+
+    def data(self) -> dict[str, Any]:
+        """For the page's script."""
+        return vars(self)
+
+
+def listing(base: KeptScene, worth: list[float | None] | None) -> Listing:
+    """What there is to list of a file that was read.
+
+    Args:
+        base: what was read.
+        worth: see ``decibels``; None: not known.
+    """
+    scene = base.scene
+    layers, names = _layers(base)
+    return Listing(
+        elements=list(base.elements),
+        kinds=[_kind(scene, i) for i in range(len(scene))],
+        colors=_colors(scene),
+        opacities=[round(float(value), 2) for value in scene.opacities],
+        layers=layers,
+        worth=worth or [None] * len(scene),
+        names=names,
+        background=base.background_element,
+    )
+
+
+def decibels(scene: Scene, target: FloatArray, backend: Backend) -> list[float | None] | None:
+    """What each shape is worth: by how much the PSNR falls without it, the others staying as they are.
+
+    Args:
+        scene: shapes on a canvas of the target's size.
+        target: sRGB in [0, 1], shape (height, width, 3); of a transparent canvas premultiplied with opacity.
+        backend: where to compute.
+
+    Returns:
+        decibels, None for pictures that are kept; None where there is no room to compute them.
+    """
+    height, width = target.shape[:2]
+    viewport = Viewport(width, height, 1.0)
+    # What lies behind an opaque shape is found by what light that lets through.
+    scene = replace(
+        scene,
+        opacities=np.minimum(scene.opacities, OPACITY_RANGE[1]),
+        stop_opacities=np.minimum(scene.stop_opacities, OPACITY_RANGE[1]),
+    )
+    try:
+        renderer = Renderer(Parameters(scene, backend), viewport)
+        renderer.forward_complete()
+        costs = renderer.removal_costs(Aim(target, backend, viewport).target)
+        error = _squared_error(renderer.read_image() - target) + ROUNDING
+    except CapacityError:
+        return None
+    found = 10 * np.log10(np.maximum((error + costs.astype(np.float64)) / error, 1e-6))
+    return [
+        None if paint == Paint.PICTURE else round(float(value), 4)
+        for paint, value in zip(scene.paint, found, strict=True)
+    ]
+
+
+def _squared_error(difference: FloatArray) -> float:
+    """Mean over pixels and colours; with opacity, of that on black and that on white."""
+    color = difference[..., :3].astype(np.float64)
+    if difference.shape[2] == 3:
+        return float(np.mean(color**2))
+    return float(np.mean(color**2) + np.mean((color - difference[..., 3:]) ** 2)) / 2
+
+
+def matched(base: KeptScene, target: FloatArray) -> tuple[KeptScene, FloatArray]:
+    """A file and an image on one canvas: a background that the file has lies behind the image as well."""
+    canvas = base.scene.canvas
+    if target.shape[2] == 4 and base.has_background:
+        assert canvas.background is not None
+        target = np.asarray(target[..., :3] + (1 - target[..., 3:]) * canvas.background, np.float32)
+    elif target.shape[2] == 4:
+        scene = replace(base.scene, canvas=replace(canvas, background=None))
+        base = replace(base, scene=scene)
+    return base, target
+
+
+def _kind(scene: Scene, shape: int) -> str:
+    if scene.paint[shape] == Paint.PICTURE:
+        return "kept"
+    return "fill" if scene.kind[shape] == Kind.FILL else "stroke"
+
+
+def _colors(scene: Scene) -> list[list[str]]:
+    flat, stops = hex_colors(scene.colors), hex_colors(scene.stop_colors)
+    found: list[list[str]] = []
+    for shape, (first, last) in enumerate(itertools.pairwise(scene.stop_first.tolist())):
+        if scene.paint[shape] == Paint.PICTURE:
+            found.append([])
+        else:
+            found.append([stops[first], stops[last - 1]] if last > first else [flat[shape]])
+    return found
+
+
+def _layers(base: KeptScene) -> tuple[list[int], list[str]]:
+    """The layer of each shape, and their names: groups with names, or else parts in painter's order."""
+    count = len(base.scene)
+    if base.document is not None:
+        named = _named_groups(base.document, base.elements)
+        names = list(dict.fromkeys(named))
+        if 1 < len(names) <= MOST_LAYERS:
+            return [names.index(name) for name in named], names
+    parts = min(PARTS, count)
+    layers: npt.NDArray[np.intp] = np.arange(count) * parts // max(count, 1)
+    ends = np.searchsorted(layers, np.arange(parts), "right")
+    words = {0: " (back)", parts - 1: " (front)"} if parts > 1 else {}
+    starts = [0, *ends[:-1].tolist()]
+    names = [
+        f"{first + 1}\N{EN DASH}{last}{words.get(part, '')}"
+        for part, (first, last) in enumerate(zip(starts, ends.tolist(), strict=True))
+    ]
+    return layers.tolist(), names
+
+
+def _named_groups(document: Document, numbers: tuple[int | None, ...]) -> list[str]:
+    """The outermost group with a name that the element of each shape is in."""
+    elements = list(document.root.iter())
+
+    def name_of_layer(element: Element) -> str:
+        found = ""
+        while element in document.parents:
+            element = document.parents[element]
+            found = (
+                element.get(LABEL) or element.get("id") or found if element is not document.root else found
+            )
+        return found or "without a name"
+
+    return ["kept" if number is None else name_of_layer(elements[number]) for number in numbers]
