@@ -169,14 +169,16 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
     """
     from warpsplat.cli import signals
     from warpsplat.cli.batch_show import Show
+    from warpsplat.jobs.batch.index import Index
     from warpsplat.jobs.batch.layers import command_layer
     from warpsplat.jobs.batch.manifest import NAME, Manifest
     from warpsplat.jobs.batch.plan import home_of, in_shard, plan_jobs
-    from warpsplat.jobs.batch.run import Batch
+    from warpsplat.jobs.batch.reports import Reports
+    from warpsplat.jobs.batch.run import Batch, Report
 
-    jobs = plan_jobs(inputs, command_layer(flags, sets))
-    home = home_of(jobs, inputs)
-    jobs = [job for job in jobs if in_shard(job, home, *manner.shard)]
+    planned = plan_jobs(inputs, command_layer(flags, sets))
+    home = home_of(planned, inputs)
+    jobs = [job for job in planned if in_shard(job, home, *manner.shard)]
     show = Show(len(jobs), quiet=manner.quiet, as_json=manner.as_json)
     interrupt, begun = signals.Interrupt(), time.monotonic()
     with contextlib.closing(Manifest(manner.manifest or home / NAME)) as notes:
@@ -186,7 +188,17 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
         if not manner.overwrite:
             check_ours(jobs, notes)
         executor, threads = executor_for(jobs, manner, interrupt)
-        batch = Batch(jobs, notes, hear=show.hear, retry=manner.retry_failed, threads=threads)
+        reports = None
+        if manner.report and not manner.dry_run:
+            reports = Reports.at(manner.report, home, overwrite=manner.overwrite)
+        index = Index(planned, reports) if reports else None
+
+        def hear(report: Report) -> None:
+            if index:
+                index.hear(report)
+            show.hear(report)
+
+        batch = Batch(jobs, notes, hear=hear, retry=manner.retry_failed, threads=threads, reports=reports)
         with interrupt.watching():
             if manner.dry_run:
                 batch.look(interrupt)
@@ -194,6 +206,8 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
                 notes.open()
                 with contextlib.suppress(KeyboardInterrupt), executor:
                     batch.run(executor, interrupt, show.advance)
+                if index:
+                    index.write(notes)
     show.finish(time.monotonic() - begun, executor.workers, notes.path)
     if manner.dry_run:
         return

@@ -507,7 +507,7 @@ def report(
             name=name,
             svg_name=svg_name or Path(name).with_suffix(".svg").name,
             own=own,
-        )
+        ).text
     if output is not None:
         write_result(Path(output), made.encode())
     return made

@@ -18,7 +18,8 @@ from warpsplat.files.output import GZIP, HEAD, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.jobs.batch.manifest import Entry, Manifest
 from warpsplat.jobs.batch.plan import Job
-from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Source, Stop, Task
+from warpsplat.jobs.batch.reports import Reports
+from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, ReportWish, Source, Stop, Task
 from warpsplat.jobs.executors.work import digest, failure, make_folder
 from warpsplat.jobs.vectorize import job_key
 from warpsplat.svg.inspect import svg_text
@@ -157,6 +158,7 @@ class Batch:
         retry: bool = False,
         threads: int | None = None,
         carry: bool = False,
+        reports: Reports | None = None,
     ) -> None:
         """Args:
         jobs: what to do.
@@ -165,9 +167,13 @@ class Batch:
         retry: whether what failed is tried again.
         threads: of each task, on a CPU.
         carry: whether workers do not see the files: images go out, and results come back, as bytes.
+        reports: where pages on results are kept; None: none are made.
         """
         self.jobs, self.manifest = jobs, manifest
         self._hear, self._retry, self._threads, self._carry = hear, retry, threads, carry
+        self._reports = reports
+        self._made_before: dict[int, Entry] = {}
+        """What the manifest says of results in work that only lack a report."""
         self._keys: dict[int, str] = {}
         """Of the tasks in work."""
 
@@ -221,6 +227,8 @@ class Batch:
                 self.manifest.release(job.output, found.key)
                 continue
             self._keys[number] = found.key
+            if state.made and state.entry:
+                self._made_before[number] = state.entry
             yield self._task(number, found, measure=state.made)
 
     def _prepared(self, number: int) -> Prepared | None:
@@ -236,7 +244,7 @@ class Batch:
     def _known(self, job: Job, key: str) -> Standing | None:
         """How a result stands; None if nothing is to be done, which was reported."""
         state = standing(job, key, self.manifest)
-        if state.made and state.entry:
+        if state.made and state.entry and not (self._reports and self._reports.lacks(job.output)):
             self._hear(Report(job, "skipped", state.entry.figures))
             return None
         if not state.made and state.entry and not self._retry:
@@ -260,7 +268,15 @@ class Batch:
             bring=self._carry or away or job.settings.minify,
             measure=measure,
             result=read_result(job.output) if measure and (away or self._carry) else None,
+            report=self._report_wish(number),
         )
+
+    def _report_wish(self, number: int) -> ReportWish | None:
+        if self._reports is None:
+            return None
+        before = self._made_before.get(number)
+        back = self._reports.way_back(self.jobs[number].output)
+        return ReportWish(back, before.figures if before else {})
 
     def _mask(self, job: Job, found: Prepared) -> Source | None:
         if job.importance is None:
@@ -270,6 +286,7 @@ class Batch:
     def _settle(self, outcome: Outcome) -> None:
         """Write what is to be written, note it, and report it."""
         job, key = self.jobs[outcome.number], self._keys.pop(outcome.number)
+        before = self._made_before.pop(outcome.number, None)
         status: Status = "skipped" if outcome.status == "measured" else outcome.status
         error = outcome.error
         try:
@@ -277,7 +294,7 @@ class Batch:
                 self._note(job, outcome, "writing")
                 make_folder(job.output.parent)
                 write_result(job.output, outcome.data)
-            if outcome.status in ("made", "measured"):
+            if outcome.status in ("made", "measured") and not before:
                 self._note(job, outcome, "made")
         except OutputError as failed:
             status, error = "failed", failure(failed, str(job.image), str(job.output))
@@ -292,8 +309,10 @@ class Batch:
                         error=error,
                     )
                 )
+        if self._reports and status != "failed":
+            self._reports.keep(job.output, outcome)
         self.manifest.release(job.output, key)
-        self._hear(Report(job, status, outcome.figures, error))
+        self._hear(Report(job, status, before.figures if before else outcome.figures, error))
 
     def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
         figures = outcome.figures if event == "made" else {}

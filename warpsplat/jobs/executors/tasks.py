@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Literal, Protocol
@@ -17,6 +17,16 @@ Stop = Callable[[], bool]
 
 Advance = Callable[[int, float], None]
 """Told the number of a task and which part of it is done."""
+
+
+@dataclass(frozen=True)
+class ReportWish:
+    """What a report says besides what its task says."""
+
+    back: str
+    """Where its link to the index leads, a relative path."""
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    """Of a result that was made earlier, what is known of it."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,8 @@ class Task:
     """Whether ``output`` is there already, and only its figures are wanted."""
     result: Source | None = None
     """What is to be measured, where the worker does not see ``output``."""
+    report: ReportWish | None = None
+    """The report that is to be brought along; None: none."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +77,10 @@ class Outcome:
     """See ``vectorize.Result.as_dict``; of a task that measured, what was measured of those."""
     error: str = ""
     """One line that names the image, of a task that failed."""
+    report: str = field(default="", repr=False)
+    """The page, where one was asked for and could be made."""
+    report_error: str = ""
+    """One line on why it could not."""
 
 
 class Executor(Protocol):

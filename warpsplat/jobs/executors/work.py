@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from warpsplat.errors import OutputError, explain, printable
+from warpsplat.errors import OutputError, WarpsplatError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import svg_bytes
 from warpsplat.files.remote import is_remote
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
+from warpsplat.jobs.reports.command import vectorize_command
+from warpsplat.jobs.reports.single import Facts, report_page
 from warpsplat.jobs.vectorize import job_key, load_target, vectorize_image
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
@@ -81,10 +85,14 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
             report=report,
             stop=stop,
         )
+        made = Outcome(task.number, "made")
+        if task.report and not result.stopped:
+            line = vectorize_command(task.settings, task.name, task.output)
+            made = _reported(task, image, result.svg, Facts.of(result, line), backend, own=True)
     data = svg_bytes(output, result.svg)
-    return Outcome(
-        task.number,
-        "stopped" if result.stopped else "made",
+    return replace(
+        made,
+        status="stopped" if result.stopped else "made",
         key=key,
         digest=digest(data),
         data=data if task.bring else None,
@@ -96,7 +104,35 @@ def _measured(task: Task, key: str, image: bytes) -> Outcome:
     data = read(task.result or task.output, "an SVG")
     target = load_target(image, task.name, task.settings.background)
     score = score_svg(svg_text(data, task.output), target, eyes=False)
-    return Outcome(task.number, "measured", key=key, digest=digest(data), figures=score.as_dict())
+    made = Outcome(task.number, "measured")
+    if task.report:
+        line = vectorize_command(task.settings, task.name, task.output)
+        facts = Facts(task.report.figures or score.as_dict(), command=line)
+        start_warp()
+        backend = Backend.on(choose_device(task.device), task.threads)
+        with turn(backend.device):
+            made = _reported(task, image, svg_text(data, task.output), facts, backend, own=False)
+    return replace(made, key=key, digest=digest(data), figures=score.as_dict())
+
+
+def _reported(task: Task, image: bytes, svg: str, facts: Facts, backend: Backend, *, own: bool) -> Outcome:
+    """The report of a result that is there: if it cannot be made, that is no reason to lose the result."""
+    outcome = Outcome(task.number, "made" if own else "measured")
+    name, svg_name = (os.path.basename(path) for path in (task.name, task.output))
+    try:
+        made = report_page(
+            svg,
+            image,
+            backend,
+            facts,
+            name=name,
+            svg_name=f"{svg_name.rpartition('.')[0]}.svg",
+            own=own,
+            back=task.report.back if task.report else "",
+        )
+    except (WarpsplatError, OSError, MemoryError) as error:
+        return replace(outcome, report_error=failure(error, task.name, task.output))
+    return replace(outcome, report=made.text)
 
 
 def digest(data: bytes) -> str:

@@ -150,8 +150,22 @@ def _has_few_colors(levels: Bytes) -> bool:
     return len(np.unique(whole.reshape(-1, 4).view(np.uint32))) <= FEW_COLORS
 
 
-def thumbnail(pixels: FloatArray, side: int = 128) -> bytes:
-    """A small copy on white for lists, WebP."""
-    image = Image.fromarray(np.round(np.clip(on_white(pixels), 0, 255)).astype(np.uint8))
-    image.thumbnail((side, side))
-    return _webp(image, quality=75)
+def thumbnails(target: FloatArray, shown: Bytes) -> bytes:
+    """Small copies of an image and of the file, side by side on white, WebP.
+
+    Args:
+        target: the image, as ``Shown.pixels``.
+        shown: the file, not premultiplied, shape (height, width, 4).
+    """
+    alpha = shown[..., 3:] / np.float32(255)
+    flat = shown[..., :3] * alpha + 255 * (1 - alpha)
+    height, width = target.shape[:2]
+    scale = min(1.0, THUMBNAIL / max(width, height))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    both = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in (on_white(target), flat)]
+    levels = np.clip(np.round(np.concatenate(both, axis=1)), 0, 255).astype(np.uint8)
+    return _webp(Image.fromarray(levels), quality=70)
+
+
+THUMBNAIL = 112
+"""Longest side of an image in a list [px]."""

@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from warpsplat.errors import ImageError, printable
 from warpsplat.files.sources import ImageSource, Readable, source_bytes
@@ -22,10 +22,12 @@ from warpsplat.jobs.reports.pictures import (
     error_map,
     map_colors,
     shown_image,
+    thumbnails,
 )
 from warpsplat.jobs.reports.shapes import decibels, listing, matched
 from warpsplat.jobs.vectorize import Result
 from warpsplat.pages import page
+from warpsplat.pages.embed import image_uri
 from warpsplat.pages.plot import Plot, plot
 from warpsplat.rendering.backend import Backend
 from warpsplat.svg.read_kept import load_kept
@@ -55,6 +57,14 @@ class Facts:
         return Facts(result.as_dict(), result.history, command, result.before, result.kept)
 
 
+class Report(NamedTuple):
+    """A page, and what lists show of it."""
+
+    text: str
+    thumbnail: str
+    """The image and the file side by side, as a data URI; empty without an index."""
+
+
 def report_page(
     svg: str,
     image: ImageSource,
@@ -65,8 +75,8 @@ def report_page(
     svg_name: str,
     own: bool = False,
     back: str = "",
-) -> str:
-    """The page as text.
+) -> Report:
+    """The page.
 
     Args:
         svg: the file's text, ours or not.
@@ -101,12 +111,14 @@ def report_page(
     # Base64 takes four bytes for three.
     left = room - len(differs) * 3 / 4
     picture = encoded(shown.pixels, left)
-    return page(
+    thumbnail = image_uri(thumbnails(shown.pixels, pixels)) if back else ""
+    text = page(
         "report.html.j2",
         assets=ASSETS,
         name=printable(name),
         svg_name=printable(svg_name),
         back=back,
+        thumbnail=thumbnail,
         pictures=[
             {"name": "image", "label": "Original", "url": picture, "pixels": True},
             {"name": "svg", "label": "SVG", "url": "", "pixels": False},
@@ -123,11 +135,12 @@ def report_page(
         plots=[one for one in plots(facts.history) if one],
         reduced_part=any(not progress.fine for progress in facts.history),
         command=facts.command,
-        levels=facts.figures.get("levels") or [],
+        levels=levels(facts.figures),
         listed=listed is not None,
         why_not=why_not,
         data={"svg": svg, "view": view, "listing": listed.data() if listed else None, "name": svg_name},
     )
+    return Report(text, thumbnail)
 
 
 VIEW = re.compile(
@@ -158,7 +171,7 @@ def headline(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ("PSNR", _psnr(figures), "dB"),
         ("SSIM", _number(figures, "ssim", ".3f"), ""),
         ("SSIMULACRA2", _number(figures, "ssimulacra2", ".1f"), ""),
-        ("Size", _kilobytes(figures.get("bytes")), "kB"),
+        ("Size", _kilobytes(figures, "bytes"), "kB"),
         ("Shapes", _number(figures, "shapes", ",d"), ""),
         ("Time", _number(figures, "seconds", ".1f"), "s"),
     ]
@@ -172,18 +185,20 @@ EXACT = "exact"
 def _psnr(figures: Mapping[str, Any]) -> str | None:
     if figures.get("psnr") is None:
         return EXACT if figures.get("ssim") == 1 else None
-    return f"{figures['psnr']:.2f}"
+    return _number(figures, "psnr", ".2f")
 
 
 def _number(figures: Mapping[str, Any], name: str, form: str) -> str | None:
-    value = figures.get(name)
+    value = figures.get(name) if isinstance(figures, Mapping) else None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
+    value = int(value) if form == ",d" else value
     return format(value, form).replace(",", "\N{THIN SPACE}").replace("-", "\N{MINUS SIGN}")
 
 
-def _kilobytes(count: Any) -> str | None:
-    return None if count is None else f"{count / 1000:.1f}"
+def _kilobytes(figures: Mapping[str, Any], name: str) -> str | None:
+    count = figures.get(name)
+    return f"{count / 1000:.1f}" if isinstance(count, (int, float)) else None
 
 
 def table(facts: Facts, shown: Shown) -> list[tuple[str, str]]:
@@ -197,8 +212,8 @@ def table(facts: Facts, shown: Shown) -> list[tuple[str, str]]:
         ("SSIM", _number(figures, "ssim", ".4f"), ""),
         ("MS-SSIM", _number(figures, "ms_ssim", ".4f"), ""),
         ("SSIMULACRA2", _number(figures, "ssimulacra2", ".2f"), ""),
-        ("Size", _kilobytes(figures.get("bytes")), "kB"),
-        ("Size, gzipped", _kilobytes(figures.get("gzip_bytes")), "kB"),
+        ("Size", _kilobytes(figures, "bytes"), "kB"),
+        ("Size, gzipped", _kilobytes(figures, "gzip_bytes"), "kB"),
         ("Shapes", _number(figures, "shapes", ",d"), ""),
         ("Paths", _number(figures, "paths", ",d"), ""),
         ("Nodes", _number(figures, "nodes", ",d"), ""),
@@ -237,7 +252,21 @@ def notes(facts: Facts) -> list[str]:
         found.append(f"Numbers of shapes were not finite, {figures['renewed']} times; these began anew.")
     if facts.kept:
         found.append(f"Kept as it is: {facts.kept}.")
-    found += [f"Goal missed: {goal}." for goal in figures.get("missed") or ()]
+    missed = figures.get("missed")
+    found += [f"Goal missed: {goal}." for goal in (missed if isinstance(missed, (list, tuple)) else ())]
+    return found
+
+
+def levels(figures: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Name and figure of each level's picture."""
+    given = figures.get("levels")
+    found = []
+    for level in given if isinstance(given, (list, tuple)) else ():
+        count, value = _number(level, "shapes", ",d"), _number(level, "psnr", ".2f")
+        if count is not None:
+            found.append(
+                (f"The first {count} shapes", EXACT if value is None else f"{value}\N{NO-BREAK SPACE}dB")
+            )
     return found
 
 
