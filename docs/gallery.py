@@ -1,8 +1,8 @@
 """The gallery's SVGs and their figures: ``python docs/gallery.py [--only NAME ...] [--force]``.
 
-``docs/gallery/gallery.yaml`` lists the images with their settings. What is up to date (image, settings, the code
-that decides the result, and the SVG itself) is left alone; ``gallery_pages.py`` makes the pages of all this when
-the site is built.
+``docs/gallery/gallery.yaml`` lists the images with their settings. What is up to date (image, settings, the
+code that decides the result, and the SVG itself) is left alone. Pages and reports are made when the site is
+built (``gallery_pages.py``, ``gallery_reports.py``).
 """
 
 from __future__ import annotations

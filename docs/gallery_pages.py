@@ -9,15 +9,15 @@ from gallery import SUBJECTS, Entry, entries, licences
 LEGENDS = {
     "photo": (
         "Photographs",
-        "Shapes that overlap and are translucent, as brush strokes are: fitted by gradient descent.",
+        "Shapes that overlap and are translucent, as brush strokes are, fitted by gradient descent.",
     ),
     "drawing": (
         "Drawings",
-        "Logos, icons, emoji, flags: one opaque path a region, with true corners and straight lines, its outline fitted.",
+        "Logos, icons, emoji, flags: one opaque path a region, with true corners and straight lines.",
     ),
     "line": (
         "Line art",
-        "Strokes along the middle of the ink, for plotters and for animation; with `--mixed`, areas that are filled stay fills.",
+        "Strokes along the middle of the ink, as plotters need them; with `--mixed`, filled areas stay so.",
     ),
     "pixel": ("Pixel art", "Cell by cell, without loss; cells may be of several pixels."),
 }
@@ -25,15 +25,17 @@ LEGENDS = {
 
 INTRODUCTION = """# Gallery
 
-What warpsplat makes of photographs, drawings, line art and pixel art, each with its command. Figures are those of the files, as an
-independent renderer (resvg) shows them. Each picture leads to its image, its figures, and a page where the two can be compared.
+What warpsplat makes of photographs, drawings, line art and pixel art, each with its command. Figures are
+those of the files, as an independent renderer (resvg) shows them. Each picture leads to its image and its
+figures, and from there to its report, where image and SVG lie under a slider.
 """
 
 SOURCES = """# Pictures of the gallery
 
-Images that others made, with their authors and licences as the packages state them in which they were found, and how they were changed.
-The SVGs are made of them by the commands beside them. Copyright notices of those under the MIT licence are in
-[NOTICES.txt](NOTICES.txt). NASA, SpaceX and whoever else made an image have nothing to do with this project.
+Images that others made, with their authors and licences as the packages state them in which they were
+found, and how they were changed. The SVGs are made of them by the commands on the gallery's pages.
+Copyright notices of those under the MIT licence are in [NOTICES.txt](NOTICES.txt). Who made an image has
+nothing to do with this project.
 
 | image | author | licence | source | changes |
 |---|---|---|---|---|
@@ -71,13 +73,14 @@ def index(listed: Sequence[Entry]) -> str:
 
 def card(entry: Entry) -> str:
     """An image beside its SVG, with the command and its figures."""
+    report = f"reports/{entry.name}.html"
     credit = f"Image: {entry.author}, [{entry.licence}]({licences()[entry.licence]})"
     return f"""<div class="card" markdown>
 ### {entry.title} {{ #{entry.name} }}
 
 <div class="pair" markdown>
-{picture(entry, "image")}
-{picture(entry, "svg")}
+[{picture(entry, "image")}]({report}){{ title="Compare" }}
+[{picture(entry, "svg")}]({report}){{ title="Compare" }}
 </div>
 
 {entry.what}
@@ -86,7 +89,7 @@ def card(entry: Entry) -> str:
 {entry.command}
 ```
 
-{" · ".join(figures(entry))}
+{" · ".join(figures(entry))} · [report]({report})
 {{ .figures }}
 
 {credit}{", " + entry.changes if entry.changes else ""}
@@ -123,8 +126,13 @@ def sources(listed: Sequence[Entry]) -> str:
     """A table of where the images are from."""
     where = licences()
     rows = (
-        f"| [{entry.title}]({entry.subject}.md#{entry.name}) | {entry.author} | [{entry.licence}]({where[entry.licence]}) "
-        f"| {entry.package}{f': `{entry.file}`' if entry.file else ''} | {entry.changes or 'none'} |"
+        (
+            f"[{entry.title}]({entry.subject}.md#{entry.name})",
+            entry.author,
+            f"[{entry.licence}]({where[entry.licence]})",
+            f"{entry.package}: `{entry.file}`" if entry.file else entry.package,
+            entry.changes or "none",
+        )
         for entry in listed
     )
-    return SOURCES + "\n".join(rows) + "\n"
+    return SOURCES + "".join(f"| {' | '.join(row)} |\n" for row in rows)
