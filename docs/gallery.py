@@ -171,6 +171,7 @@ def make(entry: Entry, code: str) -> dict[str, Any]:
         "made_of": {**entry.inputs(), "code": code, "svg": digest(entry.svg.read_bytes())},
         "seconds": round(seconds, 1),
         **{name: figures[name] for name in kept if figures.get(name) is not None},
+        "bytes": entry.svg.stat().st_size,  # on its sheet
         "levels": figures["levels"],
         "history": thinned(result.history),
     }
