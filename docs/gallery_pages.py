@@ -23,6 +23,8 @@ LEGENDS = {
 }
 """Of each subject: its heading, and what is made of it."""
 
+PHONE_COLUMNS = 36
+
 INTRODUCTION = """# Gallery
 
 What warpsplat makes of photographs, drawings, line art and pixel art, each with its command. Figures are
@@ -86,7 +88,7 @@ def card(entry: Entry) -> str:
 {entry.what}
 
 ```sh
-{entry.command}
+{folded(entry.command)}
 ```
 
 {" · ".join(figures(entry))} · [report]({report})
@@ -102,8 +104,13 @@ def picture(entry: Entry, which: str) -> str:
     """The image, or the SVG, of an entry."""
     path = entry.image if which == "image" else entry.svg
     alt = entry.title if which == "image" else f"{entry.title}, as SVG"
-    pixels = ".pixels " if entry.subject == "pixel" else ""
-    return f"![{alt}]({path.relative_to(entry.folder).as_posix()}){{ {pixels}loading=lazy }}"
+    style = {"pixel": ".pixels ", "photo": ".photograph "}.get(entry.subject, "")
+    return f"![{alt}]({path.relative_to(entry.folder).as_posix()}){{ {style}loading=lazy }}"
+
+
+def folded(command: str) -> str:
+    """A command on two lines where one is too long for a phone."""
+    return command if len(command) <= PHONE_COLUMNS else command.replace(" --", " \\\n  --", 1)
 
 
 def figures(entry: Entry) -> Iterator[str]:
