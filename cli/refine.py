@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.motion import Motion, WithPreview, motion_options
 from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
 from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
@@ -18,7 +19,7 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.options import BY_NAME
 
 
-@click.command("refine", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("refine", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=FILE)
 @click.argument("image", type=FILE)
 @click.option(
@@ -42,6 +43,7 @@ from warpsplat.jobs.options import BY_NAME
     help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
 )
 @checkpoint_options
+@motion_options
 @report_option
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
@@ -69,6 +71,7 @@ def command(
     IMAGE may be - for the standard input. The figures go to stderr where the
     SVG goes to stdout.
     """
+    motion = Motion.of(given)
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
@@ -78,6 +81,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, svg, image)
+    motion.check(svg, image, output, *filter(None, [checkpoint]), overwrite=overwrite)
     check_report(report, (svg, image), output, overwrite=overwrite)
     from warpsplat.api import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
@@ -97,7 +101,7 @@ def command(
             output=output,
             device=device,
             threads=threads,
-            callback=tell,
+            callback=motion.watch(tell),
             stop=interrupt,
             name=input_name(svg),
             checkpoint=checkpoint,
@@ -105,6 +109,8 @@ def command(
             checkpoint_every=checkpoint_every,
             overwrite=overwrite,
         )
+        motion.show(result, None if image == STANDARD else image)
+    motion.finish(result, quiet=quiet)
     before = result.before or 0.0
     if result.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)

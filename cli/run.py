@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from warpsplat.api import vectorize
+from warpsplat.cli.motion import Motion
 from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
@@ -104,11 +105,13 @@ def run_file(
     importance: Path | None = None,
     verbose: int = 0,
     quiet: bool = False,
+    motion: Motion | None = None,
     **keeping: Any,
 ) -> Result:
     """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
 
-    ``importance``: file of a mask. ``keeping``: how its state is kept, see there.
+    ``importance``: file of a mask. ``motion``: what shows the run besides. ``keeping``: how its state is
+    kept, see there.
     """
     pursued = settings.target_psnr or settings.max_bytes
     start_warp()
@@ -119,7 +122,7 @@ def run_file(
             number = "no more than needed"
         plural = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
         say(f"{source}: {number} {plural} on {chosen}", err=True)
-    interrupt = Interrupt()
+    interrupt, motion = Interrupt(), motion or Motion()
     with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
         result = vectorize(
             data,
@@ -129,10 +132,11 @@ def run_file(
             threads=threads,
             name=input_name(source),
             importance=importance,
-            callback=report,
+            callback=motion.watch(report),
             stop=interrupt,
             **keeping,
         )
+        motion.show(result, data)
     count = len(result.scene)
     traced = result.subject != "photo"
     if result.why and not quiet and (traced or verbose):

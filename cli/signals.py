@@ -19,6 +19,10 @@ from typing import Any
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
+SHOW_CURSOR = b"\x1b[?25h"
+"""A progress bar hides it, and is not asked any more."""
+
+
 class _State:
     """What the process's handlers saw."""
 
@@ -46,7 +50,7 @@ def _handle(number: int, frame: Any) -> None:
 def _end(number: int) -> None:
     """End now; no clean-up but that of files that are being written, no wait for threads."""
     with contextlib.suppress(OSError):
-        os.write(2, b"\nwarpsplat: interrupted\n")
+        os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + b"\nwarpsplat: interrupted\n")
     _exit(128 + number)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.batch import Manner, flags_of, perform
+from warpsplat.cli.motion import Motion, WithPreview, motion_options
 from warpsplat.cli.options import (
     FILE,
     checkpoint_options,
@@ -24,7 +25,7 @@ from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
 
 
-@click.command("vectorize", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("vectorize", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
@@ -37,6 +38,7 @@ from warpsplat.jobs.options import settings_from
 @quality_options
 @importance_option
 @checkpoint_options
+@motion_options
 @report_option
 @run_options
 @click.option(
@@ -66,7 +68,9 @@ def command(
     against the image, number of paths, size. They go to stderr where the SVG
     goes to stdout. Several images are made as batch makes them.
     """
+    motion = Motion.of(given)
     if len(images) > 1:
+        motion.for_several()
         device_given = None if device == "auto" else device
         several(
             images,
@@ -95,6 +99,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, *inputs)
+    motion.check(*inputs, output, *filter(None, [checkpoint]), overwrite=overwrite)
     check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
@@ -112,7 +117,9 @@ def command(
         resume=resume,
         checkpoint_every=checkpoint_every,
         overwrite=overwrite,
+        motion=motion,
     )
+    motion.finish(result, quiet=quiet)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 

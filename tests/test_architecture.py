@@ -44,6 +44,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "pages",
         "torch",
     ),
+    "motion": ("errors", "files", "fit", "jobs", "scene", "svg"),
+    "terminal": ("scene", "fit.work"),
     "torch": ("errors", "scene", "kernels", "rendering", "fit", "svg"),
 }
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from warpsplat.jobs.render import to_pillow as to_pillow
     from warpsplat.jobs.vectorize import Result as Result
     from warpsplat.metrics import Score as Score
+    from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.scene import Canvas as Canvas
     from warpsplat.scene import Scene as Scene
 
@@ -50,6 +51,7 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
+    "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.jobs.render",
     "Result": "warpsplat.jobs.vectorize",
     "Score": "warpsplat.metrics",

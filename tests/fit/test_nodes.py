@@ -11,10 +11,11 @@ from tests.fit.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, poly
 from tests.fit.test_drawing import assert_clean, psnr
 from tests.fit.test_merge import halves
 from warpsplat.fit.constraints import Drawing, Joint
+from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
-from warpsplat.fit.tidy import apart, finish_drawing, tidied
+from warpsplat.fit.tidy import Judge, apart, by_cell, finish_drawing, tidied, within
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import render
+from warpsplat.rendering.renderer import Renderer, render
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
@@ -113,6 +114,46 @@ def test_chosen_candidates_have_no_cell_in_common() -> None:
     chosen = apart(edits)
     assert 1 < len(chosen) < len(edits)
     assert sum(len(edit.cells) for edit in chosen) == len(frozenset().union(*(e.cells for e in chosen)))
+
+
+def test_what_was_refused_is_not_measured_again() -> None:
+    outlines = Outlines(split(logo()))
+    edits = outlines.edits()
+    refused = {edit.key for edit in edits[::2]}
+    assert [e.key for e in outlines.edits(refused)] == [e.key for e in edits if e.key not in refused]
+    again = Outlines(split(logo()))
+    assert not again.edits({edit.key for edit in edits})
+    assert not again._cells, "what it would change"
+
+
+def test_errors_within_an_edit() -> None:
+    """Those of its cells, whole or cut by the border, none beyond."""
+    errors = np.random.default_rng(0).random((7, 9))
+    (edit, *_) = Outlines(split(logo())).edits()
+    for cells, want in (
+        ([(0, 0), (4, 3)], errors[:2, :2].sum() + errors[6, 8]),
+        ([(-1, 0), (-2, -2), (5, 1), (1, 4), (9, 9)], 0),
+        ([(2, 1)], errors[2:4, 4:6].sum()),
+    ):
+        assert within(by_cell(errors), replace(edit, cells=frozenset(cells))) == pytest.approx(want)
+
+
+def test_a_drawing_like_the_last_one_needs_no_second_renderer(
+    device: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    backend, made, target = Backend.on(device, 1), split(logo()), np.ones((64, 64, 3), np.float32)
+    judge = Judge(target, backend)
+    built: list[None] = []
+    build = Renderer._build
+    monkeypatch.setattr(
+        Renderer, "_build", lambda self, capacity: built.append(None) or build(self, capacity)
+    )
+    first = judge.errors(made)
+    before = len(built)
+    np.testing.assert_array_equal(judge.errors(made), first)
+    step = start(target, made, backend, Refinement(), capacity=judge.capacity)
+    step.render()
+    assert len(built) == before + 2
 
 
 def test_turned_outlines_are_the_same() -> None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import click
 import pytest
 
 from tests import ROOT
 from warpsplat.cli.vectorize import command
+from warpsplat.errors import UsageError
 from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.jobs import options
 from warpsplat.jobs.batch.layers import KEYS
-from warpsplat.jobs.options import OPTIONS, Option
+from warpsplat.jobs.options import OPTIONS, Option, settings_from
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ROWS = [
@@ -42,3 +45,19 @@ def test_a_default_is_what_a_run_takes(option: Option) -> None:
         assert ("auto" if value is None else str(value)) == option.default.partition(";")[0]
     else:
         assert option.name in {"quality", "layered"} or option.setting in Settings.__dataclass_fields__
+
+
+def test_a_palette_is_read_up_to_its_limit(tmp_path: Path) -> None:
+    path = tmp_path / "colors.txt"
+    path.write_text("#ff0000 " * (options.PALETTE_BYTES // 8))
+    assert len(settings_from({"palette": str(path)}).palette) == 1
+    with path.open("a") as file:
+        file.write("#00ff00")
+    with pytest.raises(UsageError, match=f"has more than {options.PALETTE_BYTES} bytes"):
+        settings_from({"palette": str(path)})
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="the system has no device without an end")
+def test_a_palette_without_an_end_is_refused() -> None:
+    with pytest.raises(UsageError, match="/dev/zero: has more than"):
+        settings_from({"palette": "/dev/zero"})

@@ -10,6 +10,7 @@ import pytest
 from tests.fit.drawings import logo, seam
 from tests.scenes import random_scene
 from warpsplat.scene import Kind
+from warpsplat.svg import commands
 from warpsplat.svg.commands import Pair, Segment, _ways, row, shortest, shortest_ring
 from warpsplat.svg.data import cubic_data
 from warpsplat.svg.paths import cubics
@@ -91,6 +92,29 @@ SAID = {
 def test_how_lines_are_said(points: list[Pair], text: str) -> None:
     made = shortest(None, [Segment(a, None, b) for a, b in itertools.pairwise(points)])
     assert len(made) == len(text)
+
+
+def test_a_ring_is_the_shortest_of_its_starts() -> None:
+    """And the ways to write a segment are found once, not for each start."""
+    chain = segments(3, 40)
+    chain.append(Segment(chain[-1].end, None, chain[0].start))
+    text, end = shortest_ring((3, 4), chain)
+    turned = (chain[i:] + chain[:i] for i in range(len(chain)))
+    texts = [shortest((3, 4), one[:-1] if one[-1].handles is None else one) for one in turned]
+    assert text in texts
+    assert len(text) <= sorted(map(len, texts))[len(texts) // 4]
+    (drawn,) = cubics(text, keep_dots=True)
+    assert tuple(drawn.points[-1]) == end
+
+
+def test_work_for_a_ring_grows_with_its_segments(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Segment] = []
+    found = commands._ways
+    monkeypatch.setattr(commands, "_ways", lambda one, before: asked.append(one) or found(one, before))
+    for count in (20, 80):
+        asked.clear()
+        shortest_ring(None, segments(5, count))
+        assert len(asked) <= count + commands.STARTS
 
 
 def test_a_line_that_closes_is_left_out() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from warpsplat.errors import UsageError
+from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.svg.page import Sheet, in_units, on_sheet, parse_page, parse_size
 from warpsplat.svg.viewer import render_svg
@@ -71,3 +72,9 @@ def test_a_viewer_shows_it_there() -> None:
     assert shown.shape == (96, 96)
     assert (columns.min(), columns.max() + 1) == pytest.approx((8 * scale, 52 * scale), abs=1.5)
     assert rows.min() == pytest.approx((8 + 10) * scale, abs=1.5)
+
+
+@pytest.mark.parametrize("placing", [{"size": 3}, {"page": 4}, {"units": True, "page": "a4"}])
+def test_what_is_no_text_is_named(placing: dict[str, object]) -> None:
+    with pytest.raises(UsageError, match="must be text, not "):
+        make_settings(**placing)  # as a batch file may give it

@@ -55,6 +55,9 @@ LOST = {
     f'<svg width="9" height="9"><path d="M1 1h19" {ROUND}/></svg>': "viewport cuts off",
     '<radialGradient id="a" fx="2"><stop/><stop offset="1"/></radialGradient>'
     '<path d="M1 1h9v9z" fill="url(#a)"/>': "focus",
+    '<linearGradient id="a" gradientUnits="userSpaceOnUse" x2="1e39">'
+    '<stop/><stop offset="1"/></linearGradient>'
+    '<path d="M1 1h9v9z" fill="url(#a)"/>': "a gradient reaches farther than",
 }
 
 

@@ -36,6 +36,12 @@ def dithered(side: int = 96) -> FloatArray:
     return np.repeat(dots, 3, axis=2).astype(np.float32)
 
 
+def grainy(image: FloatArray, levels: float = 13.0) -> FloatArray:
+    """With noise of so many levels in each pixel and channel."""
+    noise = np.random.default_rng(0).normal(0, levels, image.shape)
+    return (np.clip(np.round(255 * image + noise), 0, 255) / 255).astype(np.float32)
+
+
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -44,6 +50,8 @@ PICTURES = {
     "one colour": (np.ones((64, 64, 3), np.float32), "drawing"),
     "lines": (draw(LINES), "line"),
     "photograph": (photograph(96), "photo"),
+    "grainy logo": (grainy(draw(BARS, 192, 192)), "drawing"),
+    "grainy photograph": (grainy(0.2 + 0.6 * photograph(192)), "photo"),
     "dithered": (dithered(160), "photo"),
     "code": (cells(25, 4, 2), "pixel"),
     "sprite": (cells(32, 1, 6), "pixel"),

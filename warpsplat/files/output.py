@@ -40,6 +40,18 @@ PNG_SOFTWARE = "warpsplat"
 PDF_MARK = b"\n%warpsplat\n"
 """Comment behind the end of every PDF written here."""
 
+GIF_COMMENT = b"warpsplat"
+"""Comment in the head of every GIF written here."""
+
+WEBP_MARK = b"wspl\x0a\0\0\0warpsplat\n"
+"""Chunk at the end of every WebP written here, of a kind that readers pass over."""
+
+MP4_MARK = b"\0\0\0\x12freewarpsplat\n"
+"""Box at the end of every MP4 written here, of the kind that is there to be passed over."""
+
+MARKED_ENDS = {b"%PDF-": PDF_MARK, b"RIFF": WEBP_MARK, b"ftyp": MP4_MARK}
+"""Marks at the end of files, by what stands at the beginning of their kind, or four bytes behind it."""
+
 PAGE_MARK = b"<!--warpsplat page-->"
 """In the head of every page written here (``pages.MARK``)."""
 
@@ -159,14 +171,16 @@ def may_replace(path: Path) -> bool:
         else:
             with path.open("rb") as file:
                 head = file.read(HEAD)
-                if head.startswith(b"%PDF-"):
-                    size = file.seek(0, os.SEEK_END)
-                    file.seek(max(0, size - len(PDF_MARK)))
-                    return file.read() == PDF_MARK
+                for begin, mark in MARKED_ENDS.items():
+                    if head.startswith(begin) or head.startswith(begin, 4):
+                        size = file.seek(0, os.SEEK_END)
+                        file.seek(max(0, size - len(mark)))
+                        return file.read() == mark
     except FileNotFoundError:
         return True
     head = unpacked(head)
-    marks = (*SVG_MARKS, PAGE_MARK, b"tEXtSoftware\0" + PNG_SOFTWARE.encode())
+    gif = b"!\xfe" + bytes([len(GIF_COMMENT)]) + GIF_COMMENT
+    marks = (*SVG_MARKS, PAGE_MARK, b"tEXtSoftware\0" + PNG_SOFTWARE.encode(), gif)
     return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
 
 

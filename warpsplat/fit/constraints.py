@@ -123,8 +123,7 @@ class Constraints:
         line_start[following[straight]] = on[straight]
         ties = _Ties(2 * count)
         ties.join_same(drawing.same)
-        for a, b in zip(on[straight].tolist(), following[straight].tolist(), strict=True):
-            ties.join_where(_equal(points, a, b), a, b)
+        ties.join_where(_equal(points, on[straight], following[straight]), on[straight], following[straight])
         joints = _smooth_joints(drawing, line_start, line_end, ties)
         turned = np.full((count, 2), NONE, np.int32)
         for number, (_, begin, end, side) in enumerate(joints):
@@ -147,8 +146,8 @@ class Constraints:
         return found
 
 
-def _equal(points: FloatArray, a: int, b: int) -> npt.NDArray[np.bool_]:
-    """In which axes two points have the same coordinate."""
+def _equal(points: FloatArray, a: Links, b: Links) -> npt.NDArray[np.bool_]:
+    """In which axes points ``a`` and ``b`` have the same coordinate, shape (pair, 2)."""
     return np.asarray(np.abs(points[a] - points[b]) < EQUAL)
 
 
@@ -166,34 +165,39 @@ def _smooth_joints(
     """
     points = drawing.scene.points
     on, following = drawing.links()
-    previous = dict(zip(following.tolist(), on.tolist(), strict=True))
-    places = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(len(points)))
+    before_of = np.zeros(len(points), np.intp)
+    before_of[following] = on
+    places = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(len(points))).tolist()
+    smooth = on[drawing.joints[on] == Joint.SMOOTH]
+    starts, ends = line_start[smooth], line_end[smooth]
+    handles = np.stack([before_of[smooth] + 2, smooth + 1], axis=1)
+    free = np.stack([starts == NONE, ends == NONE], axis=1)
+    reach = _reach(points, smooth, handles, free)
+    lines = np.stack([starts, ends], axis=1)
+    turned = ~free.all(axis=1) & (reach > LEVER * _reach(points, smooth, lines, ~free))
+    around = np.where(free, handles, lines)
+    flat = _equal(points, around[:, 0], smooth) & _equal(points, smooth, around[:, 1])
     bound: set[int] = set()
     joints = []
-    for p in on[drawing.joints[on] == Joint.SMOOTH].tolist():
-        free = BEFORE * (line_start[p] == NONE) + AFTER * (line_end[p] == NONE)
-        handles = _handles(previous[p] + 2, p + 1, free)
-        keys = {int(places[handle]) for handle in handles}
-        if not handles or keys & bound:
-            continue
-        ends = [int(end) for end in (line_start[p], line_end[p]) if end != NONE]
-        if ends and _reach(points, p, handles) > LEVER * _reach(points, p, ends):
+    for i in np.flatnonzero(free.any(axis=1)).tolist():
+        own = handles[i][free[i]].tolist()
+        keys = {places[handle] for handle in own}
+        if keys & bound or turned[i]:
             continue
         bound |= keys
-        before = handles[0] if free & BEFORE else int(line_start[p])
-        after = p + 1 if free & AFTER else int(line_end[p])
-        flat = _equal(points, before, p) & _equal(points, p, after)
-        if flat.any():
-            for handle in handles:
-                ties.join_where(flat, p, handle)
+        if flat[i].any():
+            for handle in own:
+                ties.join_where(flat[i : i + 1], smooth[i : i + 1], np.array([handle]))
         else:
-            joints.append((p, before, after, free))
+            (before, after), sides = around[i].tolist(), free[i].tolist()
+            joints.append((int(smooth[i]), before, after, BEFORE * sides[0] + AFTER * sides[1]))
     return joints
 
 
-def _reach(points: FloatArray, p: int, others: list[int]) -> float:
-    """How far from ``p`` the furthest of ``others`` lies."""
-    return float(np.linalg.norm(points[others] - points[p], axis=1).max())
+def _reach(points: FloatArray, on: Links, others: Links, counted: npt.NDArray[np.bool_]) -> FloatArray:
+    """How far from each point ``on`` the further of two ``others``, (point, 2), lies that is ``counted``."""
+    way = np.linalg.norm(points[others] - points[on][:, None], axis=2)
+    return np.asarray(np.where(counted, way, 0).max(axis=1, initial=0))
 
 
 def _handles(before: int, after: int, free: int) -> list[int]:
@@ -206,6 +210,8 @@ class _Ties:
 
     def __init__(self, count: int) -> None:
         self._parent = list(range(count))
+        self._joined: set[int] = set()
+        """All that is one with others: few of them all."""
 
     def root(self, i: int) -> int:
         while self._parent[i] != i:
@@ -213,17 +219,21 @@ class _Ties:
             i = self._parent[i]
         return i
 
-    def join_where(self, axes: npt.NDArray[np.bool_], a: int, b: int) -> None:
-        """Two points' coordinates along ``axes``, shape (2,)."""
-        for axis in np.flatnonzero(axes).tolist():
-            i, j = sorted((self.root(2 * a + axis), self.root(2 * b + axis)))
+    def join_where(self, axes: npt.NDArray[np.bool_], a: Links, b: Links) -> None:
+        """Two points' coordinates along ``axes``, shape (pair, 2), for each pair of ``a`` and ``b``."""
+        pairs, which = np.nonzero(axes)
+        for first, second in zip(
+            (2 * a[pairs] + which).tolist(), (2 * b[pairs] + which).tolist(), strict=True
+        ):
+            i, j = sorted((self.root(first), self.root(second)))
             self._parent[j] = i
+            self._joined |= {first, second}
 
     def join_same(self, same: Ints) -> None:
         """All points with the same number."""
-        first: dict[int, int] = {}
-        for point in np.flatnonzero(same >= 0).tolist():
-            self.join_where(np.ones(2, np.bool_), first.setdefault(int(same[point]), point), point)
+        points = np.flatnonzero(same >= 0)
+        _, first, number = np.unique(same[points], return_index=True, return_inverse=True)
+        self.join_where(np.ones((len(points), 2), np.bool_), points[first][number], points)
 
     def groups(
         self, leaders: set[int], on: set[int], laid: set[int], border: npt.NDArray[np.bool_]
@@ -236,11 +246,11 @@ class _Ties:
             laid: points that are in none.
             border: coordinates that are pinned, with their ties, shape (point, 2).
         """
+        pinned = border.reshape(-1)
         members: dict[int, list[int]] = {}
-        for i in range(len(self._parent)):
+        for i in sorted(self._joined.union(np.flatnonzero(pinned).tolist())):
             if i // 2 not in laid:
                 members.setdefault(self.root(i), []).append(i)
-        pinned = border.reshape(-1)
         kept = [m for m in members.values() if len(m) > 1 or pinned[m].any()]
         ordered = [sorted(m, key=lambda i: (i // 2 not in leaders, i // 2 not in on)) for m in kept]
         first = np.cumsum([0, *map(len, ordered)]).astype(np.int32)

@@ -17,6 +17,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Capacity
 from warpsplat.scene import Canvas, FloatArray, Scene
 
 Colors = Literal["held", "fitted"]
@@ -70,6 +71,7 @@ def refine_drawing(
     how: Refinement | None = None,
     *,
     held: npt.NDArray[np.bool_] | None = None,
+    capacity: Capacity | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Scene:
@@ -85,6 +87,7 @@ def refine_drawing(
         backend: where to compute.
         how: rates and steps.
         held: points that stay where they are, shape (point,).
+        capacity: of the renderer to begin with, if it is known.
         report: called every few steps.
         stop: asked after every step; once true, the best so far is taken.
 
@@ -99,7 +102,7 @@ def refine_drawing(
     if not len(scene):
         return scene
     target = matching(target, scene.canvas)
-    step = start(target, drawing, backend, how, held)
+    step = start(target, drawing, backend, how, held, capacity)
     best, least = _look(step)
     gained = 0
     """Steps at the last gain that counts."""
@@ -137,8 +140,11 @@ def start(
     backend: Backend,
     how: Refinement,
     held: npt.NDArray[np.bool_] | None = None,
+    capacity: Capacity | None = None,
 ) -> Step:
-    """A step for ``drawing``, whose points are brought to where they may be; ``held`` ones stay there."""
+    """A step for ``drawing``, whose points are brought to where they may be; ``held`` ones stay there.
+    ``capacity``: to begin with; the first look makes room where it is not enough.
+    """
     state = FitState.start(drawing.scene, backend, np.random.default_rng(0))
     keeper = Keeper(Constraints.of(drawing), state.parameters, held)
     keeper.project()
@@ -149,7 +155,8 @@ def start(
     if how.colors == "held":
         state.parameters.hold("colors", every)
     height, width = target.shape[:2]
-    return Step(state, how.settings(drawing.scene), Target(target, Phase(width, height, slack=1.0)))
+    goal = Target(target, Phase(width, height, slack=1.0))
+    return Step(state, how.settings(drawing.scene), goal, capacity=capacity)
 
 
 def _look(step: Step) -> tuple[Scene, float]:

@@ -7,7 +7,7 @@ What it costs is for the renderer to say (``fit.tidy``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -39,6 +39,14 @@ CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
 """What a cubic, a line, the handles of a cubic and a number take in a file."""
 
 
+Key = tuple[str, int, int]
+
+
+def key_of(kind: str, at: tuple[float, float]) -> Key:
+    """Of an ``Edit``."""
+    return kind, round(at[0] / 2), round(at[1] / 2)
+
+
 @dataclass(frozen=True)
 class Edit:
     """A change of a drawing."""
@@ -58,9 +66,9 @@ class Edit:
     removed: tuple[int, ...] = ()
 
     @property
-    def key(self) -> tuple[Any, ...]:
+    def key(self) -> Key:
         """What names it from round to round, whatever the numbers of its points are."""
-        return (self.kind, *np.round(np.divide(self.at, 2)).tolist())
+        return key_of(self.kind, self.at)
 
 
 def applied(drawing: Drawing, edits: Sequence[Edit]) -> Drawing:
@@ -108,6 +116,7 @@ class Outlines:
         self._firsts = set(starts[:-1].tolist())
         sizes = np.repeat(np.diff(starts), np.diff(starts))
         self._sizes = sizes.tolist()
+        self._refused: Set[Key] = frozenset()
 
     def members(self, point: int) -> list[int]:
         """All points at the place of ``point``."""
@@ -141,8 +150,9 @@ class Outlines:
         x, y = self.points[p].tolist()
         return x, y
 
-    def edits(self) -> list[Edit]:
-        """All candidates."""
+    def edits(self, refused: Set[Key] = frozenset()) -> list[Edit]:
+        """All candidates but the ``refused`` ones: of those there are more with every round."""
+        self._refused = refused
         found: list[Edit] = []
         merged = self._merged()
         done: set[int] = set()
@@ -155,13 +165,17 @@ class Outlines:
             found += self._level_tangent(p)
         # Once for all shapes.
         firsts = [a for a in self.on if min(self.members(a + 1) + self.members(a + 2)) >= a]
-        thirds = self._thirds([a for a in firsts if not self.is_line[a]])
+        thirds = self._thirds([a for a in firsts if not self.is_line[a] and self._is_open("straight", a + 1)])
         for a in firsts:
             if self.is_line[a]:
                 found += self._level_line(a)
             elif a in thirds:
                 found.append(self._straight(a, *thirds[a]))
         return found
+
+    def _is_open(self, kind: str, point: int) -> bool:
+        """Whether an edit of this kind at ``point`` was not refused."""
+        return key_of(kind, self._at(point)) not in self._refused
 
     def _is_spare(self, p: int) -> bool:
         """Whether the pieces that meet in ``p`` meet nothing else there."""
@@ -184,7 +198,7 @@ class Outlines:
         done: set[int] = set()
         spare = []
         for p in self.on:
-            if self.place[p] not in done and self._is_spare(p):
+            if self.place[p] not in done and self._is_spare(p) and self._is_open("without", p):
                 spare.append(p)
             done.add(self.place[p])
         if not spare:
@@ -239,6 +253,8 @@ class Outlines:
 
     def _level_line(self, a: int) -> Iterator[Edit]:
         """A line that is almost level or upright, so."""
+        if not self._is_open("level", a + 1):
+            return
         b = self.next[a]
         way = np.abs(self.points[b] - self.points[a])
         axis = int(way.argmin())
@@ -273,6 +289,8 @@ class Outlines:
         """A smooth joint whose tangent is almost level or upright, so."""
         a = self.previous[p]
         if self.drawing.joints[p] != Joint.SMOOTH or self.is_line[a] or self.is_line[p]:
+            return
+        if not self._is_open("tangent", p):
             return
         handles = (a + 2, p + 1)
         ways = np.abs(self.points[list(handles)] - self.points[p])

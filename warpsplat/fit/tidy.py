@@ -12,7 +12,7 @@ import numpy.typing as npt
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
-from warpsplat.fit.nodes import CELL, Edit, Outlines, applied, turned
+from warpsplat.fit.nodes import CELL, Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
 from warpsplat.fit.schedule import Phase
@@ -21,7 +21,7 @@ from warpsplat.fit.work import Meter, Report, step_cost
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.rendering.renderer import Renderer
+from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
@@ -139,33 +139,37 @@ def tidied(
     around it, and where some cost too much, the others are made alone. ``told``: what a round reports to,
     by how many may come after it.
     """
-    refused: set[tuple[object, ...]] = set()
+    refused: set[Key] = set()
     how = replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
-    errors = error_map(target, drawing, backend)
+    judge = Judge(target, backend)
+    errors = judge.errors(drawing)
 
     report: Report | None = None
 
     def refitted(edits: Sequence[Edit]) -> tuple[Drawing, Floats]:
         made = applied(drawing, edits)
         fields = (made.scene, made.joints, made.same)
-        scene = refine_drawing(target, *fields, backend, how, report=report, stop=stop)
+        scene = refine_drawing(
+            target, *fields, backend, how, capacity=judge.capacity, report=report, stop=stop
+        )
         made = replace(made, scene=scene)
-        return made, error_map(target, made, backend)
+        return made, judge.errors(made)
 
     for turn in range(ROUNDS):
-        candidates = [e for e in Outlines(drawing).edits() if e.key not in refused]
+        candidates = Outlines(drawing).edits(refused)
         edits = apart(candidates)
         if not edits or (stop and stop()):
             break
         report = told(min(len(candidates) / len(edits), ROUNDS - 1 - turn))
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
-        growth = error_map(target, applied(drawing, edits), backend) - errors
+        growth = by_cell(judge.errors(applied(drawing, edits)) - errors)
         left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
         while left:
             made, after = refitted(left)
-            taken = [e for e in left if within(after - errors, e) <= e.saved * worth]
+            growth = by_cell(after - errors)
+            taken = [e for e in left if within(growth, e) <= e.saved * worth]
             if len(taken) == len(left):
                 drawing, errors = made, after
                 break
@@ -177,23 +181,41 @@ def tidied(
     return drawing
 
 
-def error_map(target: FloatArray, drawing: Drawing, backend: Backend) -> Floats:
-    """What each pixel adds to the mean squared error, shape (height, width)."""
-    parameters = Parameters(drawing.scene, backend)
-    Keeper(Constraints.of(drawing), parameters).project()
-    height, width = target.shape[:2]
-    renderer = Renderer(parameters, Viewport(width, height), model=EXACT)
-    renderer.forward_complete()
-    errors = squares(renderer.read_image() - target).astype(np.float64)
-    return errors / (3 * errors.size)
+class Judge:
+    """What drawings lack of one picture."""
+
+    def __init__(self, target: FloatArray, backend: Backend) -> None:
+        self._target, self._backend = target, backend
+        self.capacity: Capacity | None = None
+        """Of a renderer that the last drawing fits into; one that is much like it will as well, so that
+        arrays and launches need not be made twice.
+        """
+
+    def errors(self, drawing: Drawing) -> Floats:
+        """What each pixel adds to the mean squared error, shape (height, width)."""
+        parameters = Parameters(drawing.scene, self._backend)
+        Keeper(Constraints.of(drawing), parameters).project()
+        height, width = self._target.shape[:2]
+        renderer = Renderer(parameters, Viewport(width, height), model=EXACT, capacity=self.capacity)
+        renderer.forward_complete()
+        self.capacity = renderer.capacity
+        errors = squares(renderer.read_image() - self._target).astype(np.float64)
+        return errors / (3 * errors.size)
 
 
-def within(errors: Floats, edit: Edit) -> float:
-    """Sum over the pixels that an edit may change."""
-    cells = (
-        errors[CELL * y : CELL * (y + 1), CELL * x : CELL * (x + 1)] for x, y in edit.cells if min(x, y) >= 0
-    )
-    return float(sum(cell.sum() for cell in cells))
+def by_cell(errors: Floats) -> Floats:
+    """Sums over the cells that edits are told by, with an empty one beyond each border."""
+    height, width = errors.shape
+    padded = np.pad(errors, [(CELL, CELL + -height % CELL), (CELL, CELL + -width % CELL)])
+    rows = np.add.reduceat(padded, np.arange(0, padded.shape[0], CELL), axis=0)
+    return np.asarray(np.add.reduceat(rows, np.arange(0, padded.shape[1], CELL), axis=1))
+
+
+def within(cells: Floats, edit: Edit) -> float:
+    """Sum over the pixels that an edit may change; ``cells``: of ``by_cell``."""
+    columns, rows = np.array([*edit.cells]).T + 1
+    height, width = cells.shape
+    return float(cells[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].sum())
 
 
 def worth_of(errors: Floats, size: int) -> float:
@@ -214,11 +236,12 @@ def apart(edits: Sequence[Edit]) -> list[Edit]:
 
 def drawing_grid(target: FloatArray, drawing: Drawing, backend: Backend, finest: float) -> float:
     """Units a pixel of the grid that costs least: in error, of which refitting mends most, and in bytes."""
-    errors = error_map(target, drawing, backend)
+    judge = Judge(target, backend)
+    errors = judge.errors(drawing)
     worth = worth_of(errors, len(write_svg(drawing.scene, per_pixel=USUAL_GRID)))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(drawing, scene=rounded(drawing.scene, grid))
-        loss = float(error_map(target, low, backend).sum() - errors.sum())
+        loss = float(judge.errors(low).sum() - errors.sum())
         costs[grid] = 2 * STAGED * loss + worth * len(write_svg(low.scene, per_pixel=grid))
     return min(costs, key=costs.__getitem__)

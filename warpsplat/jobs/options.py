@@ -130,12 +130,16 @@ def read_palette(path: Path) -> str:
     """The colours in a text file.
 
     Raises:
-        UsageError: it cannot be read.
+        UsageError: it cannot be read, or has no end, as some devices.
     """
     try:
-        return path.read_bytes()[:PALETTE_BYTES].decode("ascii")
-    except (OSError, ValueError) as error:
-        cause = "no text" if isinstance(error, ValueError) else error.strerror
+        with path.open("rb") as file:
+            found = file.read(PALETTE_BYTES + 1)
+        if len(found) > PALETTE_BYTES:
+            raise UsageError(f"palette {printable(str(path))}: has more than {PALETTE_BYTES} bytes")
+        return found.decode("ascii")
+    except (OSError, UnicodeDecodeError) as error:
+        cause = "no text" if isinstance(error, UnicodeDecodeError) else error.strerror
         raise UsageError(f"palette {printable(str(path))}: {cause}; colours begin with #") from error
 
 

@@ -7,7 +7,7 @@ shortest text is found by dynamic programming over the last letter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 Pair = tuple[int, int]
@@ -33,11 +33,21 @@ class Segment(NamedTuple):
         return 2 * x - u, 2 * y - v
 
 
-class Text(NamedTuple):
-    """What is written so far."""
+class Written(NamedTuple):
+    """What is written so far: a chain, so that a long contour is not copied with each piece."""
 
     length: int
-    text: str
+    added: str
+    """What came last."""
+    before: Written | None
+
+    def text(self) -> str:
+        """All of it."""
+        parts, last = [], self
+        while last.before:
+            parts.append(last.added)
+            last = last.before
+        return "".join([last.added, *reversed(parts)])
 
 
 def minus(a: Pair, b: Pair) -> Pair:
@@ -76,25 +86,48 @@ def _ways(segment: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]
     return ways
 
 
+class Way(NamedTuple):
+    """A command that draws a segment."""
+
+    letter: str
+    after_another: str
+    """Its numbers, where the letter need not be said."""
+    fresh: str
+    """With the letter."""
+
+
+def _written_ways(segment: Segment, mirrored: Pair) -> list[Way]:
+    """``_ways`` as text."""
+    found = []
+    for letter, numbers in _ways(segment, mirrored):
+        text = row(numbers, False)
+        found.append(Way(letter, f" {text}" if numbers[0] >= 0 else text, letter + text))
+    return found
+
+
 def shortest(pen: Pair | None, segments: Sequence[Segment]) -> str:
     """Path data of a contour, from its move on; ``pen``: where the one before ended, if there is one."""
     start = segments[0].start
+    mirrored = [start, *(segment.mirrored() for segment in segments[:-1])]
+    return _shortest(pen, start, map(_written_ways, segments, mirrored))
+
+
+def _shortest(pen: Pair | None, start: Pair, ways_of: Iterable[Sequence[Way]]) -> str:
+    """The same of segments of which only the ways to write them are known."""
     moves = {"M": f"M{row(start, False)}", "m": f"m{row(minus(start, pen or (0, 0)), False)}"}
-    best = {letter: Text(len(text), text) for letter, text in moves.items()}
-    mirrored = start
-    for segment in segments:
-        after: dict[str, Text] = {}
-        ways = [(way, row(numbers, True), row(numbers, False)) for way, numbers in _ways(segment, mirrored)]
-        for letter, (length, text) in best.items():
-            for way, joined, fresh in ways:
-                goes_on = way == IMPLIED.get(letter, letter)
-                added = joined if goes_on else way + fresh
+    best = {letter: Written(len(text), text, None) for letter, text in moves.items()}
+    for ways in ways_of:
+        after: dict[str, Written] = {}
+        for letter, written in best.items():
+            implied, length = IMPLIED.get(letter, letter), written.length
+            for way, after_another, fresh in ways:
+                added = after_another if way == implied else fresh
                 total = length + len(added)
                 if way not in after or total < after[way].length:
-                    after[way] = Text(total, text + added)
+                    after[way] = Written(total, added, written)
         best = after
-        mirrored = segment.mirrored()
-    return min(best.values()).text
+    least = min(written.length for written in best.values())
+    return min(written.text() for written in best.values() if written.length == least)
 
 
 STARTS = 4
@@ -106,18 +139,25 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
 
     A line that comes last need not be written.
     """
+    behind = [segments[-1], *segments[:-1]]
+    ways = [
+        _written_ways(segment, before.mirrored()) for before, segment in zip(behind, segments, strict=True)
+    ]
     promise = []
-    for i, (before, segment) in enumerate(zip([segments[-1], *segments[:-1]], segments, strict=True)):
+    for i, (before, segment) in enumerate(zip(behind, segments, strict=True)):
         spared = 0
         if before.handles is None and len(segments) > 1:
-            spared = 1 + min(len(row(numbers, True)) for _, numbers in _ways(before, before.start))
+            spared = 1 + min(len(way.after_another) for way in ways[i - 1])
         promise.append((len(row(segment.start, False)) - spared, segment.start, i))
     found = []
-    for _, _, i in sorted(promise)[:STARTS]:
-        turned = segments[i:] + segments[:i]
-        if turned[-1].handles is None and len(turned) > 1:
+    for _, start, i in sorted(promise)[:STARTS]:
+        # Behind the move no handle is mirrored.
+        turned = [_written_ways(segments[i], start), *ways[i + 1 :], *ways[:i]]
+        last = i - 1
+        if behind[i].handles is None and len(turned) > 1:
             turned.pop()
-        found.append((shortest(pen, turned), turned[-1].end))
+            last -= 1
+        found.append((_shortest(pen, start, turned), segments[last].end))
     return min(found, key=lambda one: len(one[0]))
 
 

@@ -142,6 +142,8 @@ def _gradient(
     frame = matrix @ transform @ own
     if not abs(np.linalg.det(frame[:2, :2])) > 1e-12:
         return None
+    if not (np.abs(frame) <= np.finfo(np.float32).max).all():
+        raise ImageError("a gradient reaches farther than can be drawn")
     spread = said("spreadMethod")
     return Gradient(
         is_radial, frame, focus, spread if spread in {"reflect", "repeat"} else "pad", offsets, stops

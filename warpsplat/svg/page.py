@@ -108,8 +108,11 @@ def check_placing(size: str, page: str, unit: str) -> None:
     """Whether ``placed`` will understand these.
 
     Raises:
-        UsageError: as there.
+        UsageError: as there, or one is no text.
     """
+    for name, value in (("size", size), ("page", page), ("units", unit)):
+        if not isinstance(value, str):  # as batch files and callers in Python may give it
+            raise UsageError(f"{name} must be text, not {value!r}")
     if size and page:
         raise UsageError("size and page do not go together")
     if size:

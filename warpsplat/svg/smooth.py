@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from warpsplat.svg.commands import Pair, Text, minus, row
+from warpsplat.svg.commands import Pair, minus, row
 
 SMALL = 300
 """Where coordinates of the view box reach further, absolute ones are hardly ever shorter than relative ones,
 and not looked for."""
+
+
+class Text(NamedTuple):
+    """What is written so far."""
+
+    length: int
+    text: str
 
 
 def shortest_smooth(joints: Sequence[Pair], control: Pair) -> str:

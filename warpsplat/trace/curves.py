@@ -36,6 +36,9 @@ TURNS = 3
 FLAT_SLOPE = 0.012
 """Slope below which a line is taken as horizontal or vertical, if its ends differ by about a tolerance."""
 
+RANK = 1e-14
+"""Singular values below so much of the largest one are none: points in one place say no direction."""
+
 CIRCLE = 4 * (np.sqrt(2) - 1) / 3
 """Length of the handles of a quarter of the unit circle."""
 
@@ -217,13 +220,11 @@ def _with_knots(part: Floats, closed: bool = False) -> _Span:
     total = float(along[-1])
     count = int(np.clip(total / SPACING, 1, KNOTS))
     wanted = np.linspace(0, total, count + 1)
-    places = np.unique(np.abs(along[:, None] - wanted).argmin(axis=1) if False else _nearest(along, wanted))
+    places = np.unique(_nearest(along, wanted))
     if len(places) < 2:
         places = np.array([0, len(part) - 1])
-    knots, tangents = part[places].copy(), np.zeros((len(places), 2))
     ring = part[:-1] if closed else part
-    for number, place in enumerate(places.tolist()):
-        knots[number], tangents[number] = _local(ring, along, total, place, closed)
+    knots, tangents = _local(ring, along, places, closed)
     if not closed:
         knots[0], knots[-1] = part[0], part[-1]
     else:
@@ -236,28 +237,35 @@ def _nearest(along: Floats, wanted: Floats) -> Ints:
     return right - (wanted - along[right - 1] < along[right] - wanted)
 
 
-def _local(ring: Floats, along: Floats, total: float, place: int, closed: bool) -> tuple[Floats, Floats]:
-    """Where the outline passes and in which direction, by a parabola through the points near."""
-    here = float(along[place])
-    window = min(WINDOW, 0.5 * total) if closed else WINDOW
-    away = along[: len(ring)] - here
+def _local(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[Floats, Floats]:
+    """Where the outline passes at ``places``, and its directions, by parabolas through the points near."""
+    total, here = float(along[-1]), along[places]
+    along = along[: len(ring)]  # a closed outline's last point is its first one
+    away = along - here[:, None]
     if closed:
         away = (away + 0.5 * total) % total - 0.5 * total
-    near = np.abs(away) <= window
-    if near.sum() < 3:
-        near = np.abs(away) <= np.partition(np.abs(away), min(2, len(away) - 1))[min(2, len(away) - 1)]
-    t, points = away[near], ring[near]
-    degree = 2 if near.sum() > 4 and np.ptp(t) > 2 else 1
-    matrix = np.vander(t, degree + 1, increasing=True)
+    distance = np.abs(away)
+    third = min(2, len(ring) - 1)
+    window = min(WINDOW, 0.5 * total) if closed else WINDOW
+    near = distance <= np.maximum(window, np.partition(distance, third, axis=1)[:, third])[:, None]
+    counts = near.sum(axis=1)
+    # The near points of all places as one array, filled up with points that have no weight.
+    columns = np.argsort(~near, axis=1, kind="stable")[:, : counts.max()]
+    known = np.arange(counts.max()) < counts[:, None]
+    t = np.where(known, np.take_along_axis(away, columns, axis=1), 0.0)
+    bent = (counts > 4) & (np.ptp(t, axis=1) > 2)
     # Corners and junctions at the ends are known exactly.
-    weights = np.where((along[: len(ring)][near] == 0) | (along[: len(ring)][near] == total), 4.0, 1.0)
-    weights = np.ones_like(weights) if closed else weights
-    found, *_ = np.linalg.lstsq(matrix * weights[:, None], points * weights[:, None], rcond=None)
-    way = found[1]
-    size = float(np.hypot(*way))
-    if size < 1e-9:
-        way, size = ring[min(place + 1, len(ring) - 1)] - ring[place - 1], 1.0
-    return found[0], way / max(float(np.hypot(*way)), 1e-9)
+    at_end = (along == 0) | (along == total)
+    weights = np.where(at_end[columns] & (not closed), 4.0, 1.0) * known
+    matrix = np.stack([np.ones_like(t), t, t * t * bent[:, None]], axis=2) * weights[..., None]
+    inverse = np.linalg.pinv(matrix, rcond=RANK)
+    found = inverse @ (ring[columns] * weights[..., None])
+    ways = found[:, 1]
+    size = np.hypot(*ways.T)
+    still = size < 1e-9
+    ways[still] = (ring[np.minimum(places + 1, len(ring) - 1)] - ring[places - 1])[still]
+    size = np.where(still, np.hypot(*ways.T), size)
+    return found[:, 0], ways / np.maximum(size, 1e-9)[:, None]
 
 
 def _choose(spans: list[_Span], tolerance: float) -> list[Pieces]:

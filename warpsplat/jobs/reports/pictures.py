@@ -131,11 +131,14 @@ def encoded_map(pixels: Bytes, room: float) -> str:
 
 
 def _first_within(image: Image.Image, qualities: Sequence[int], room: float) -> bytes:
+    """Of the first quality that fits; where none does, of a smaller copy."""
     for quality in qualities:
         data = _webp(image, quality=quality)
         if len(data) <= room:
-            break
-    return data
+            return data
+    if min(image.size) < 2:
+        return data
+    return _first_within(image.reduce(2), qualities[-2:], room)
 
 
 def _webp(image: Image.Image, *, lossless: bool = False, quality: int = 80) -> bytes:
@@ -163,9 +166,13 @@ def thumbnails(target: FloatArray, shown: Bytes) -> bytes:
     scale = min(1.0, THUMBNAIL / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     both = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in (on_white(target), flat)]
-    levels = np.clip(np.round(np.concatenate(both, axis=1)), 0, 255).astype(np.uint8)
+    gap = np.full((size[1], GAP, 3), 255, np.float32)
+    levels = np.clip(np.round(np.concatenate([both[0], gap, both[1]], axis=1)), 0, 255).astype(np.uint8)
     return _webp(Image.fromarray(levels), quality=70)
 
 
 THUMBNAIL = 112
 """Longest side of an image in a list [px]."""
+
+GAP = 3
+"""Between the two [px]."""

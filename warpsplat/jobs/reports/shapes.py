@@ -39,7 +39,7 @@ class Listing:
     """Which element of the document draws each, counted from 0, the root; None: no single one."""
     kinds: list[str]
     colors: list[list[str]]
-    """``#rrggbb``: one, or the first and last of a gradient; none of what is kept as it is."""
+    """For style sheets: one, or the first and last of a gradient; none of what is kept as it is."""
     opacities: list[float]
     layers: list[int]
     worth: list[float | None]

@@ -48,7 +48,7 @@
     called.append(linked(row.name, row.report || row.svg));
     const rest = node("div", "small quiet");
     if (row.svg) rest.append(linked(row.output, row.svg));
-    else rest.append(row.status === "failed" ? "failed" : row.status === "open" ? "not made yet" : row.status);
+    else if (!row.error) rest.append(row.status === "stopped" ? "stopped" : "not made yet");
     named.append(called, rest);
     if (row.error) named.append(node("div", "message", row.error));
     const first = node("td", "");

@@ -131,7 +131,8 @@
     // Bring a rectangle of the picture [px] into view, magnified where it is small.
     focus(x, y, width, height) {
       const box = this.box;
-      this.k = Math.max(this.least, Math.min(8, (0.5 * box.width) / width, (0.5 * box.height) / height));
+      const room = Math.min((0.5 * box.width) / width, (0.5 * box.height) / height);
+      this.k = Math.max(this.least, Math.min(Math.max(8, 4 * this.least), room));
       this.fitted = Math.abs(this.k / this.least - 1) < 1e-6;
       this.x = box.width / 2 - (x + width / 2) * this.k;
       this.y = box.height / 2 - (y + height / 2) * this.k;

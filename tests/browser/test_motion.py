@@ -1,0 +1,87 @@
+"""Animations play in a browser, and end with the file."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import warpsplat
+from warpsplat import Recorder, Result
+from warpsplat.motion.timing import HOLD
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+SECONDS = 0.5
+END = 2500
+"""By when an animation is over [ms], fades and the start of the page included."""
+
+
+@pytest.fixture(scope="module")
+def recorded() -> tuple[Recorder, Result]:
+    y, x = np.mgrid[:36, :48] / 48
+    pixels = np.stack([x, y, 0.5 + 0.3 * np.sin(9 * x * y)], axis=2)
+    recorder = Recorder()
+    result = warpsplat.vectorize(pixels, 6, subject="photo", iterations=50, device="cpu", callback=recorder)
+    return recorder, result
+
+
+def shot(tab: Page, element: str = "#shown") -> np.ndarray:
+    data = tab.locator(element).first.screenshot()
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+
+
+def page_with(tab: Page, folder: Path, element: str) -> None:
+    page = folder / "page.html"
+    page.write_text(f'<!doctype html><title>a</title><body style="margin:0;background:#fff">{element}')
+    tab.goto(page.as_uri())
+
+
+@pytest.mark.parametrize("what", ["training", "drawing"])
+def test_an_svg_plays_in_an_image(
+    tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path, what: str
+) -> None:
+    """And ends as the file. Opened by itself it is that at once for readers that ask for less motion."""
+    made, result = recorded
+    made.save(tmp_path / "a.svg", result, what=what, seconds=SECONDS)
+    result.save(tmp_path / "file.svg")
+    page_with(tab, tmp_path, '<img id="shown" src="file.svg" width="48">')
+    file = shot(tab)
+    page_with(tab, tmp_path, '<img id="shown" src="a.svg" width="48">')
+    pictures = [shot(tab)]
+    tab.wait_for_timeout(END)
+    pictures.append(shot(tab))
+    assert np.abs(pictures[0] - file).mean() > 2, "it begins with something else"
+    assert np.array_equal(pictures[1], file)
+    tab.emulate_media(reduced_motion="reduce")
+    tab.goto((tmp_path / "a.svg").as_uri())
+    assert np.array_equal(shot(tab, "svg"), file)
+
+
+@pytest.mark.parametrize("ending", ["webp", "gif"])
+def test_a_film_plays_in_an_image(
+    tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path, ending: str
+) -> None:
+    recorded[0].save(tmp_path / f"a.{ending}", recorded[1], seconds=SECONDS, width=48)
+    page_with(tab, tmp_path, f'<img id="shown" src="a.{ending}" width="48">')
+    first = shot(tab)
+    tab.wait_for_timeout(1000 * SECONDS + 500)
+    assert np.abs(shot(tab) - first).mean() > 2
+
+
+def test_an_mp4_plays(tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path) -> None:
+    """By a browser that knows H.264, as all but builds without patents do."""
+    pytest.importorskip("av", reason="pip install av, for MP4s")
+    recorded[0].save(tmp_path / "a.mp4", recorded[1], seconds=SECONDS, width=48)
+    page_with(tab, tmp_path, '<video id="shown" src="a.mp4" width="48" muted></video>')
+    if not tab.evaluate("shown.canPlayType('video/mp4; codecs=\"avc1.64000a\"')"):
+        pytest.skip("this browser plays no H.264")
+    first = shot(tab)
+    ended = "new Promise(done => { shown.onended = () => done(shown.currentTime); shown.play() })"
+    assert tab.evaluate(ended) == pytest.approx(SECONDS + HOLD, abs=0.15)
+    assert np.abs(shot(tab) - first).mean() > 2

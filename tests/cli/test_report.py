@@ -1,0 +1,57 @@
+"""``--report``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.helpers import QUICK, one_line, run
+
+MARK = "<!--warpsplat page-->"
+
+
+def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    svg, page = tmp_path / "a.svg", tmp_path / "a.html"
+    assert run("vectorize", image, "-o", svg, "--report", page, "--json", *QUICK) == 0
+    assert json.loads(capfd.readouterr().out)["report"] == str(page)
+    text = page.read_text("utf-8")
+    assert MARK in text and "photo.png" in text and "--curves 8 --iterations 12" in text
+    better = tmp_path / "b.svg"
+    arguments = ("-o", better, "--iterations", "5", "--device", "cpu", "--report", page, "-q")
+    assert run("refine", svg, image, *arguments) == 0  # our page may be replaced
+    assert "warpsplat refine" in page.read_text("utf-8") and "PSNR before" in page.read_text("utf-8")
+    assert run("eval", image, svg, "--report", page) == 0
+    assert "warpsplat refine" not in page.read_text("utf-8")
+
+
+@pytest.mark.parametrize("place", ["photo.png", "a.svg", "a.txt", "-", "other.html", "no/a.html"])
+def test_where_a_report_cannot_be(
+    place: str, image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "other.html").write_text("<p>mine</p>")
+    path = place if place == "-" else tmp_path / place
+    before = image.read_bytes()
+    assert run("vectorize", image, "-o", tmp_path / "a.svg", "--report", path, *QUICK) == 2
+    one_line(capfd.readouterr().err)
+    assert not (tmp_path / "a.svg").exists() and image.read_bytes() == before
+    assert (tmp_path / "other.html").read_text() == "<p>mine</p>"
+
+
+def test_a_batch_that_cannot_write_its_list(image: Path, tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("<p>mine</p>")
+    assert run("batch", image, "-o", tmp_path / "out", "--report", tmp_path, *QUICK) == 2
+    assert (tmp_path / "index.html").read_text() == "<p>mine</p>"
+
+
+def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.png"
+    other.write_bytes(image.read_bytes())
+    pages = tmp_path / "all.html"
+    assert run("vectorize", image, other, "-o", tmp_path / "out", "--report", pages, "-q", *QUICK) == 0
+    assert MARK in pages.read_text("utf-8")
+    assert sorted(path.name for path in (tmp_path / "all-pages").iterdir()) == [
+        "other.svg.html",
+        "photo.svg.html",
+    ]

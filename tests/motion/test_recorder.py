@@ -1,0 +1,168 @@
+"""A run's animation, decoded again."""
+
+from __future__ import annotations
+
+import functools
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.scenes import mixed_scene, with_gradients
+from warpsplat import Recorder, Result, Scene, UsageError
+from warpsplat.files.output import may_replace
+from warpsplat.fit.work import Progress, Snapshot
+from warpsplat.metrics import psnr
+from warpsplat.motion import films, recorder
+from warpsplat.motion.timing import HOLD, kept, showings
+from warpsplat.scene.geometry import enlarged
+from warpsplat.svg.viewer import on_white, render_own, render_svg
+
+Recorded = tuple[Recorder, Result]
+
+
+def frames_of(path: Path) -> tuple[list[np.ndarray], float]:
+    """Pictures of a film, on white, and how long it is [s]."""
+    if path.suffix == ".mp4":
+        av = pytest.importorskip("av")
+        with av.open(str(path)) as film:
+            stream = film.streams.video[0]
+            assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
+            pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(stream)]
+            return pictures, len(pictures) / float(stream.average_rate)
+    pictures, seconds = [], 0.0
+    with Image.open(path) as film:
+        for i in range(getattr(film, "n_frames", 1)):
+            film.seek(i)
+            pictures.append(on_white(film))
+            seconds += film.info["duration"] / 1000
+    return pictures, seconds
+
+
+def shown(svg: str, width: int) -> np.ndarray:
+    image = render_svg(svg, zoom=width / 48)
+    return on_white(image)
+
+
+@pytest.mark.parametrize("what", ["training", "drawing"])
+@pytest.mark.parametrize(("ending", "least"), [("gif", 28), ("webp", 28), ("mp4", 28)])
+def test_a_film_ends_with_the_file(
+    recorded: Recorded, tmp_path: Path, ending: str, least: float, what: recorder.What
+) -> None:
+    made, result = recorded
+    path = tmp_path / f"a.{ending}"
+    size = made.save(path, result, what=what, width=64, seconds=1)
+    assert size == path.stat().st_size
+    pictures, seconds = frames_of(path)
+    assert seconds == pytest.approx(1 + HOLD, abs=0.15)
+    assert {picture.shape for picture in pictures} == {(48, 64, 3)}
+    end = shown(result.svg, 64)
+    assert psnr(pictures[-1], end) > least
+    assert psnr(pictures[0], end) < psnr(pictures[len(pictures) // 4], end) < psnr(pictures[-1], end)
+    assert may_replace(path)
+    path.write_bytes(path.read_bytes()[:-20].replace(b"\xfe\x09warpsplat", b"\xfe\x09somebody."))
+    assert not may_replace(path), "somebody else's"
+
+
+def test_an_svg_turns_pages_and_is_the_file_without_them(recorded: Recorded, tmp_path: Path) -> None:
+    made, result = recorded
+    path = tmp_path / "a.svg"
+    made.save(path, result)
+    text = path.read_text()
+    assert may_replace(path)
+    assert text.count('class="p"') == len(made.scenes)
+    assert "<script" not in text and "prefers-reduced-motion" in text
+    assert np.array_equal(np.asarray(render_own(text)), np.asarray(render_own(result.svg)))
+    # A viewer that shows a page sees the scene of then.
+    page = re.sub(r"<style>.*</style>", "", text.partition('<g class="e">')[0] + "</svg>")
+    first = page.partition("</g>\n")[0] + "</g></svg>"
+    assert psnr(on_white(render_own(first)), on_white(render_own(result.svg))) < 40
+
+
+def snapshots(made: Recorder, scenes: list[Scene]) -> None:
+    image = np.zeros((4, 4, 3), np.float32)
+    for step, scene in enumerate(scenes):
+        now = Snapshot(functools.partial(replace, scene), lambda: image)
+        made(Progress(step, len(scenes), 20.0, 0.0, 0.0, True, len(scene), now))
+
+
+def test_pages_keep_their_gradients_apart(recorded: Recorded, tmp_path: Path) -> None:
+    """And those of a run on a smaller image fill the picture."""
+    scene = with_gradients(mixed_scene(48, 36))
+    small = replace(enlarged(scene, 1, 24, 18), points=scene.points / 2, frames=scene.frames / 2)
+    made = Recorder()
+    snapshots(made, [small, scene, scene])
+    made.save(tmp_path / "a.svg", replace(recorded[1], scene=scene))
+    text = (tmp_path / "a.svg").read_text()
+    names = re.findall(r'\bid="([^"]*)"', text)
+    assert len(names) > 3 and len(names) == len(set(names))
+    assert set(re.findall(r"url\(#([^)]*)\)", text)) == set(names)
+    scales = [float(scale) for scale in re.findall(r"scale\(([\d.]+)\)", text)]
+    assert scales[0] == pytest.approx(scales[1] * 2, rel=0.01) or len(set(scales)) == 1
+
+
+def test_what_is_kept_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By number and by bytes; the first and the last scenes are there, the early ones are denser."""
+    scene = mixed_scene()
+    scenes = [replace(scene, widths=np.full_like(scene.widths, i)) for i in range(250)]
+    monkeypatch.setattr(recorder, "MOST_SCENES", 60)
+    made = Recorder()
+    snapshots(made, scenes)
+    assert 30 < len(made.scenes) <= 60
+    assert [int(scene.widths[0]) for scene in made.scenes] == made.moments
+    assert (made.moments[0], made.moments[-1]) == (0, 249)
+    early, later = (sum(first <= moment < first + 50 for moment in made.moments) for first in (0, 120))
+    assert early > later
+    assert max(np.diff(made.moments)) < 20
+    monkeypatch.setattr(recorder, "MOST_BYTES", 10 * recorder._bytes_of(scene))
+    made = Recorder()
+    snapshots(made, scenes[:100])
+    assert 5 <= len(made.scenes) <= 10
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 90, 1000])
+@pytest.mark.parametrize("ticks", [2, 75])
+def test_times_add_up(count: int, ticks: int) -> None:
+    moments = list(range(count))
+    found = showings(moments, ticks, 6.0)
+    assert sum(showing.seconds for showing in found) == pytest.approx(6)
+    indices = [showing.index for showing in found]
+    assert indices == sorted(set(indices)) and max(indices) < count
+    chosen = kept(moments, max(ticks, 3))
+    assert (chosen[0], chosen[-1]) == (0, count - 1) and len(chosen) <= max(ticks, 3)
+
+
+def test_a_report_without_shapes_is_none(recorded: Recorded) -> None:
+    made = Recorder()
+    made(recorded[1].history[0])
+    assert not made.scenes
+
+
+def test_what_cannot_be_made_is_said(
+    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, result = recorded
+    with pytest.raises(UsageError, match=r"a\.avi: is no kind of animation; its name ends with \.svg, "):
+        made.save(tmp_path / "a.avi", result)
+    with pytest.raises(UsageError, match="16 to 2048 px wide, not 5"):
+        made.save(tmp_path / "a.gif", result, width=5)
+    with pytest.raises(UsageError, match=r"takes 0\.5 to 60 s, not 0\.1"):
+        made.save(tmp_path / "a.gif", result, seconds=0.1)
+    with pytest.raises(UsageError, match="training or drawing, not dance"):
+        made.save(tmp_path / "a.gif", result, what="dance")
+    with pytest.raises(UsageError, match="no training to show"):
+        Recorder().save(tmp_path / "a.gif", result, what="training")
+    monkeypatch.setattr(films, "VIDEO_PACKAGE", "no_such_package")
+    with pytest.raises(UsageError, match="pip install no_such_package, or warpsplat with its extra"):
+        made.save(tmp_path / "a.mp4", result)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_shown_where_nobody_says(recorded: Recorded) -> None:
+    made, result = recorded
+    assert made.shows(result) == "training"
+    assert made.shows(replace(result, subject="line")) == "drawing"
+    assert Recorder().shows(result) == "drawing"

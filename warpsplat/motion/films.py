@@ -1,0 +1,187 @@
+"""Pictures one after the other as a file: GIF, WebP or MP4."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import itertools
+import struct
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL import Image
+
+from warpsplat.errors import UsageError
+from warpsplat.files.output import GIF_COMMENT, MP4_MARK, WEBP_MARK
+from warpsplat.motion.timing import HOLD
+
+VIDEO_PACKAGE = "av"
+"""FFmpeg with an encoder of H.264, which browsers, QuickTime and Windows play. OpenCV has
+none: it writes MPEG-4 part 2, which plays in no browser.
+"""
+
+
+@dataclass(frozen=True)
+class Format:
+    """What a kind of film is made like."""
+
+    rate: float
+    """Pictures a second."""
+    side: int
+    """Longest side where no width is given [px]."""
+
+
+FORMATS = {".gif": Format(12.5, 480), ".webp": Format(15, 800), ".mp4": Format(25, 800)}
+"""Kinds of films by their ending: a GIF counts hundredths of a second, and grows with its area."""
+
+ENDINGS = (".svg", *FORMATS)
+"""Of names of animations."""
+
+LEAST_SIDE = 320
+"""Longest side of the film of a smaller picture [px]: shapes have no pixels."""
+
+Frame = tuple[Image.Image, float]
+"""A picture, RGBA, and how long it is shown [s]."""
+
+
+def check_format(path: Path) -> None:
+    """Whether an animation of this name can be made.
+
+    Raises:
+        UsageError: there is none of that ending, or a package is missing; the message says how it is
+            installed.
+    """
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        known = ", ".join(ENDINGS[:-1]) + " or " + ENDINGS[-1]
+        raise UsageError(f"{path}: is no kind of animation; its name ends with {known}")
+    if ending == ".mp4" and importlib.util.find_spec(VIDEO_PACKAGE) is None:
+        raise UsageError(
+            f"{path}: MP4s need a package that is not installed: "
+            f"pip install {VIDEO_PACKAGE}, or warpsplat with its extra: '.[video]'"
+        )
+
+
+def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
+    """Pixels of a film per pixel of a picture of ``size``."""
+    if width is not None:
+        return width / size[0]
+    most = FORMATS[path.suffix.lower()].side
+    return min(most, max(*size, LEAST_SIDE)) / max(size)
+
+
+MOST_PIXELS = 80_000_000
+"""Of all pictures of a film: makers of GIFs and WebPs hold them all, with four bytes a pixel."""
+
+
+def ticks_of(path: Path, size: tuple[int, int], seconds: float) -> int:
+    """Most pictures of the movement of a film of ``size``."""
+    most = MOST_PIXELS // (size[0] * size[1])
+    return max(2, min(most, round(FORMATS[path.suffix.lower()].rate * seconds)))
+
+
+def encoded(path: Path, frames: Iterable[Frame]) -> bytes:
+    """A film as the ending of ``path`` says; the last picture stays ``HOLD`` seconds longer.
+
+    GIF and WebP play again and again. GIF and MP4 have no opacity: transparency is white there.
+    """
+    make = {".gif": _gif, ".webp": _webp, ".mp4": _mp4}[path.suffix.lower()]
+    return make(_held(frames))
+
+
+def _held(frames: Iterable[Frame]) -> Iterator[Frame]:
+    """With more time for the last one."""
+    before: Frame | None = None
+    for frame in frames:
+        if before:
+            yield before
+        before = frame
+    if before:
+        yield before[0], before[1] + HOLD
+
+
+def _opaque(picture: Image.Image) -> Image.Image:
+    """On white."""
+    white = Image.new("RGBA", picture.size, "white")
+    return Image.alpha_composite(white, picture.convert("RGBA")).convert("RGB")
+
+
+COLORS = 255
+"""Of a picture of a GIF; one of 256 is left for what did not change since the picture before."""
+
+
+def _gif(frames: Iterable[Frame]) -> bytes:
+    """Each picture has colours of its own: one table for all of them shows steps in skies and skin. Without
+    dithering: its grain changes from picture to picture, which flickers and takes twice the bytes.
+    """
+    pictures, times = [], []
+    for picture, seconds in frames:
+        opaque = _opaque(picture)
+        pictures.append(opaque.quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE))
+        times.append(round(100 * seconds) * 10)
+    packed = io.BytesIO()
+    pictures[0].save(
+        packed,
+        "GIF",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=times,
+        loop=0,
+        comment=GIF_COMMENT,
+        optimize=False,
+    )
+    return packed.getvalue()
+
+
+WEBP_QUALITY = 80
+
+
+def _webp(frames: Iterable[Frame]) -> bytes:
+    pictures = list(frames)
+    packed = io.BytesIO()
+    pictures[0][0].save(
+        packed,
+        "WEBP",
+        save_all=True,
+        append_images=[picture for picture, _ in pictures[1:]],
+        duration=[round(1000 * seconds) for _, seconds in pictures],
+        loop=0,
+        quality=WEBP_QUALITY,
+        method=4,
+    )
+    data = packed.getvalue() + WEBP_MARK
+    return data[:4] + struct.pack("<I", len(data) - 8) + data[8:]
+
+
+CRF = 18
+"""Of H.264: what an eye hardly tells from the source, as its authors say."""
+
+
+def _mp4(frames: Iterable[Frame]) -> bytes:
+    # In a file: its table of contents comes to the front, for players that do not wait for all.
+    with tempfile.TemporaryDirectory(prefix="warpsplat-") as folder:
+        path = Path(folder, "film.mp4")
+        _encode_h264(path, frames)
+        return path.read_bytes() + MP4_MARK
+
+
+def _encode_h264(path: Path, frames: Iterable[Frame]) -> None:
+    """Write an MP4 as all players take it: of even sides, a constant rate, and colours at half the size."""
+    import av
+
+    rate = round(FORMATS[".mp4"].rate)
+    frames = iter(frames)
+    first = next(frames)
+    width, height = (max(2, side // 2 * 2) for side in first[0].size)
+    with av.open(str(path), "w", options={"movflags": "faststart"}) as film:
+        stream = film.add_stream("libx264", rate=rate, options={"crf": str(CRF)})
+        stream.width, stream.height = width, height
+        stream.pix_fmt = "yuv420p"
+        for picture, seconds in itertools.chain([first], frames):
+            shown = av.VideoFrame.from_image(_opaque(picture).crop((0, 0, width, height)))
+            for _ in range(max(1, round(rate * seconds))):
+                shown.pts = None
+                film.mux(stream.encode(shown))
+        film.mux(stream.encode(None))

@@ -1,0 +1,145 @@
+"""What is kept of a run for its animation: shapes now and then, no pictures."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from warpsplat.errors import UsageError
+from warpsplat.files.output import write_result
+from warpsplat.fit.work import Progress
+from warpsplat.jobs.vectorize import Result
+from warpsplat.motion import drawing, films, training
+from warpsplat.motion.timing import LONGEST, SECONDS, SHORTEST, kept
+from warpsplat.scene import Scene
+
+What = Literal["training", "drawing"]
+"""What an animation shows: how the shapes came to be, or how they are drawn one after the other."""
+
+MOST_SCENES = 240
+"""That are kept: more than any animation shows."""
+
+MOST_BYTES = 256 << 20
+"""Of all that is kept."""
+
+FEWEST = 3
+"""Scenes of which an animation of the training can be made."""
+
+NARROWEST, WIDEST = 16, 2048
+"""Of an animation [px]."""
+
+
+class Recorder:
+    """A callback of ``vectorize`` and ``refine`` that keeps what an animation of the run takes.
+
+    Example::
+
+        recorder = warpsplat.Recorder()
+        result = warpsplat.vectorize("cat.jpg", callback=recorder)
+        recorder.save("cat.gif", result)
+    """
+
+    def __init__(self) -> None:
+        self.scenes: list[Scene] = []
+        """The shapes of the run so far, in order; thinned where they became too many."""
+        self.moments: list[int] = []
+        """Of which of the run's reports they are."""
+        self._heard = self._bytes = 0
+
+    def __call__(self, progress: Progress) -> None:
+        """Keep the shapes of a report."""
+        if progress.snapshot is None:
+            return
+        self.scenes.append(progress.snapshot.scene())
+        self.moments.append(self._heard)
+        self._heard += 1
+        self._bytes += _bytes_of(self.scenes[-1])
+        while len(self.scenes) > FEWEST and (len(self.scenes) > MOST_SCENES or self._bytes > MOST_BYTES):
+            chosen = kept(self.moments, max(FEWEST, len(self.scenes) * 2 // 3))
+            self.scenes = [self.scenes[i] for i in chosen]
+            self.moments = [self.moments[i] for i in chosen]
+            self._bytes = sum(map(_bytes_of, self.scenes))
+
+    @property
+    def has_training(self) -> bool:
+        """Whether there is enough for an animation of the training."""
+        return len(self.scenes) >= FEWEST
+
+    def shows(self, result: Result) -> What:
+        """What an animation of a run shows where nobody says: the training of fitted shapes, and the order
+        in which traced ones are drawn, whose training changes little.
+        """
+        return "training" if result.subject == "photo" and self.has_training else "drawing"
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        result: Result,
+        *,
+        what: What | None = None,
+        width: int | None = None,
+        seconds: float = SECONDS,
+    ) -> int:
+        """Write the animation of the run that made ``result``; its last picture is the file's.
+
+        Args:
+            path: the ending says what it is: ``.svg``, ``.gif``, ``.webp`` or ``.mp4`` (which takes the
+                extra ``video``). An existing file is replaced in one step.
+            result: what the run returned.
+            what: ``training`` or ``drawing``, see ``What``; default: what ``shows`` says.
+            width: of the picture [px], 16 to 2048; default: that of the file, within bounds that depend on
+                the ending. An SVG is as large as the file.
+            seconds: of the movement, 0.5 to 60; then the finished picture stays.
+
+        Returns:
+            bytes of the file.
+
+        Raises:
+            UsageError: another ending, a value out of range, a package that is missing, or ``training``
+                where less than three reports had shapes.
+            OutputError: it cannot be written.
+        """
+        path = Path(path)
+        films.check_format(path)
+        check_width(width)
+        if not SHORTEST <= seconds <= LONGEST:
+            raise UsageError(f"an animation takes {SHORTEST:g} to {LONGEST:g} s, not {seconds:g}")
+        what = what or self.shows(result)
+        if what not in get_args(What):
+            raise UsageError(f"an animation shows {' or '.join(get_args(What))}, not {what}")
+        if what == "training" and not self.has_training:
+            raise UsageError(f"{path}: the run had no training to show; the order of drawing can be shown")
+        vector = path.suffix.lower() == ".svg"
+        if what == "training" and vector:
+            data = training.vector(self.scenes, self.moments, result, seconds).encode()
+        elif what == "training":
+            data = films.encoded(
+                path, training.pictures(self.scenes, self.moments, result, path, width, seconds)
+            )
+        elif vector:
+            data = drawing.vector(result.svg, seconds).encode()
+        else:
+            own = result.before is None  # of a refined SVG it may be as it was given
+            data = films.encoded(path, drawing.pictures(result.svg, path, width, seconds, own=own))
+        write_result(path, data)
+        return len(data)
+
+
+def check_width(width: int | None) -> None:
+    """Whether an animation may have this width [px].
+
+    Raises:
+        UsageError: it may not.
+    """
+    if width is not None and not NARROWEST <= width <= WIDEST:
+        raise UsageError(f"an animation is {NARROWEST} to {WIDEST} px wide, not {width}")
+
+
+def _bytes_of(scene: Scene) -> int:
+    """What a scene's arrays take."""
+    arrays = (getattr(scene, field.name) for field in fields(scene))
+    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
