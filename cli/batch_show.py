@@ -15,6 +15,7 @@ from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
 from warpsplat.jobs.batch.run import Report
 from warpsplat.jobs.batch.totals import Totals
+from warpsplat.jobs.formats import is_picture
 
 NAMED = 20
 """Most files that one message names."""
@@ -111,6 +112,7 @@ def line(report: Report) -> str:
     if report.status == "skipped":
         psnr = f", {figures['psnr']:.2f} dB" if figures.get("psnr") is not None else ""
         size = f", {figures['bytes'] / 1000:.1f} kB" if figures.get("bytes") is not None else ""
+        size += " as an SVG" if size and is_picture(output) else ""
         return f"{output}: already made with these settings{psnr}{size}"
     if report.status == "planned":
         return f"{output}: would be made of {report.job.image}"

@@ -26,6 +26,7 @@ COMMANDS = {
     "refine": "Improve an SVG against an image.",
     "eval": "Measure any SVG against an image.",
     "render": "Render an SVG to a PNG.",
+    "serve": "Open a page to vectorize images in a browser.",
     "compare": "Compare our files with another program's.",
     "bench": "Time the stages of a training step.",
     "info": "Show version and devices.",

@@ -32,6 +32,9 @@ from warpsplat.jobs.options import BY_NAME
 @overwrite_option
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @flag(BY_NAME["time-budget"])
+@click.option(
+    "--max-memory", metavar="SIZE", help="Memory to stay below, as 4GB: an image that takes more is refused."
+)
 @flag(BY_NAME["precision"])
 @flag(BY_NAME["title"])
 @flag(BY_NAME["ids"])

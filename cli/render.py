@@ -36,7 +36,8 @@ def command(
 ) -> None:
     """Render SVG (any, not only ours; - for the standard input) to a PNG, or its paths to a PDF."""
     from warpsplat.files.inputs import STANDARD, input_name
-    from warpsplat.files.output import check_output, mark_png, write_result
+    from warpsplat.files.marks import mark_png
+    from warpsplat.files.output import check_output, write_result
     from warpsplat.jobs.formats import PICTURE_ENDINGS, check_format, write_named
     from warpsplat.jobs.render import NO_GAUSSIANS, check_scale, to_png
     from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size

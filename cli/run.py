@@ -44,22 +44,22 @@ class Bar:
 
     def update(self, progress: Progress, now: float) -> str:
         """Take note of a report, and say what there is to say, at a time ``now`` [s]."""
-        self.work = max(self.work, progress.work)
+        self.work = max(self.work, progress.work)  # the share falls where a goal takes more than was thought
         if progress.fine:  # a reduced image has more decibels than the whole one
             self._best = max(self._best, progress.psnr)
-        self._first = self._first or (now, self.work)
-        left = self._seconds_left(now)
+        self._first = self._first or (now, progress.work)
+        left = self._seconds_left(progress.work, now)
         quality = f"{self._best:.2f} dB" if self._best > -math.inf else "reduced image"
         return (f"{left // 60}:{left % 60:02} left, " if left is not None else "") + quality
 
-    def _seconds_left(self, now: float) -> int | None:
+    def _seconds_left(self, work: float, now: float) -> int | None:
         """What the rest takes if work goes on as it did since the first report; None at the very start.
 
         What was before, as kernels being compiled, says nothing of the rest.
         """
         assert self._first
-        done = self.work - self._first[1]
-        return round((now - self._first[0]) / done * (1 - self.work)) if done > 0 else None
+        done = work - self._first[1]
+        return round((now - self._first[0]) / done * (1 - work)) if done > 0 else None
 
 
 @contextlib.contextmanager

@@ -63,8 +63,8 @@ def _exit(code: int) -> None:
 
 def leave_compiler(code: int) -> None:
     """End the process at once where kernels are being compiled: the compiler cannot be stopped."""
-    cache = sys.modules.get("warpsplat.rendering.kernel_cache")
-    if cache and cache.compiling():
+    compiler = sys.modules.get("warpsplat.rendering.compiler")
+    if compiler and compiler.compiling():
         _exit(code)
 
 

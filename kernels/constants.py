@@ -179,4 +179,5 @@ MODULE_OPTIONS = {
     "cpu_compiler_flags": "-march=native -mllvm=-inline-threshold=9000 -mllvm=-unroll-full-max-count=4",
 }
 """Of every kernel module. Loops over the 16 elements of a column become vector instructions only where they
-are not unrolled before; unrolled, they also take ten times as long to compile."""
+are not unrolled before; unrolled, they also take ten times as long to compile. Warp's headers are precompiled
+once for all modules whose options for the compiler are the same."""

@@ -216,7 +216,7 @@ def test_threads_do_not_disturb_each_other(device: str) -> None:
 def test_what_is_public_is_there_and_light() -> None:
     public = {
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
-        *("starting_scene", "load_image"),
+        *("starting_scene", "load_image", "report"),
         *("Result", "Score", "Progress", "Snapshot", "Settings", "Scene", "Canvas", "__version__"),
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }

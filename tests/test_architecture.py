@@ -23,7 +23,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "kernels": (),
     "scene": ("kernels.constants", "errors"),
     "files": ("errors", "native", "scene", "_version"),
-    "svg": ("errors", "scene", "files.inputs"),
+    "svg": ("errors", "native", "scene", "files.inputs"),
     "metrics": ("errors", "svg"),
     "pages": ("errors",),
     "trace": ("alpha", "errors", "scene"),
@@ -51,7 +51,20 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 """What each folder or module may import, itself and the version aside; a name stands for all that is in it.
 Those that are not named may import all but ``cli``."""
 
-HEAVY = {"numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "svgelements", "scipy", "matplotlib", "jinja2"}
+HEAVY = {
+    "numpy",
+    "warp",
+    "torch",
+    "cv2",
+    "PIL",
+    "resvg_py",
+    "svgelements",
+    "scipy",
+    "matplotlib",
+    "jinja2",
+    "starlette",
+    "uvicorn",
+}
 """What the command line imports only when a command runs: ``--help`` answers at once."""
 
 

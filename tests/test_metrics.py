@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import os
 import sys
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -149,6 +151,24 @@ def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) 
     # Another program's units need not be pixels: its files are drawn in one piece.
     foreign = text.replace("<!--warpsplat", "<!--another")
     np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
+
+
+def test_no_more_strips_are_drawn_at_once_than_the_process_has_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many the machine has."""
+    text, _ = scored_scene()
+    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 50)
+    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
+    monkeypatch.setattr(os, "cpu_count", lambda: 64)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 3}, raising=False)
+    made = []
+
+    def counted(workers: int) -> ThreadPoolExecutor:
+        made.append(workers)
+        return ThreadPoolExecutor(workers)
+
+    monkeypatch.setattr(strips, "ThreadPoolExecutor", counted)
+    strips.draw(text, 371, 357)
+    assert made == [2]
 
 
 @pytest.mark.parametrize("per_pixel", [0.5, 1.0, 5.0, 32.0])

@@ -29,6 +29,7 @@ from warpsplat.fit.texts import parse_duration
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.checkpoint import CheckpointFile
 from warpsplat.jobs.formats import write_named
+from warpsplat.jobs.memory import check_refined
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.refine import refine as refine_scene
 from warpsplat.jobs.render import RendererName, drawn
@@ -326,6 +327,7 @@ def refine(
     *,
     iterations: int = 200,
     time_budget: float | str | None = None,
+    max_memory: int | str | None = None,
     precision: int | None = None,
     title: str | None = None,
     ids: bool | None = None,
@@ -352,7 +354,9 @@ def refine(
         iterations: steps.
         keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
         name: how messages call the SVG.
-        time_budget: as for ``vectorize``, as is all that follows.
+        time_budget: as for ``vectorize``, as is all that follows but for the memory.
+        max_memory: bytes, or ``"4GB"``; without, what the machine has. An image that takes more is refused:
+            whether a result is better is for all of its pixels to say.
         precision: see there.
         title: see there.
         ids: see there.
@@ -380,6 +384,7 @@ def refine(
     settings = settings or make_settings(
         iterations=iterations,
         time_budget=time_budget,
+        max_memory=max_memory,
         precision=precision,
         title=title,
         ids=ids,
@@ -387,8 +392,10 @@ def refine(
         background=background,
     )
     name = name or _svg_name(svg)
-    text = _text(svg, name)
-    target = load_target(image, None, settings.background)
+    text, image_name = _text(svg, name), source_name(image)
+    pixels = source_bytes(image) if isinstance(image, (str, os.PathLike, bytes, Readable)) else image
+    check_refined(pixels, settings, image_name)
+    target = load_target(pixels, image_name, settings.background)
     kept = _checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     watch = _Watch(callback, stop)
     with _backend(device, threads) as backend:

@@ -35,6 +35,7 @@ EXTRAS = {
     "eyes": ("ssimulacra2", "SSIMULACRA2 in reports"),
     "compare": ("vtracer", "warpsplat compare"),
     "ray": ("ray", "warpsplat batch --executor ray"),
+    "serve": ("starlette", "warpsplat serve"),
     "remote": ("upath", "images and results behind URLs"),
 }
 """Extra -> its package, and what it is for."""
@@ -181,8 +182,7 @@ def check_devices() -> Check:
 
 def check_machine() -> Check:
     """Cores and memory."""
-    from warpsplat.native import free_memory
-    from warpsplat.rendering.backend import available_cores
+    from warpsplat.native import available_cores, free_memory
 
     values: dict[str, Any] = {"cpu_threads": available_cores(), "free_memory": free_memory()}
     text, free = f"{values['cpu_threads']} CPU threads", values["free_memory"]

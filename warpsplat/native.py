@@ -1,4 +1,4 @@
-"""Below Python: what native code prints behind its back, the memory it keeps, memory that is free."""
+"""Below Python: what native code prints behind its back, the memory it keeps; free memory, and cores."""
 
 from __future__ import annotations
 
@@ -80,3 +80,11 @@ def free_memory() -> int | None:
             if line.startswith("MemAvailable:"):
                 return int(line.split()[1]) << 10
     return None
+
+
+def available_cores() -> int:
+    """CPU cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # macOS, Windows
+        return os.cpu_count() or 1

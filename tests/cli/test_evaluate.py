@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -37,7 +38,10 @@ def test_ssimulacra2_where_it_is_installed(
     installed: bool,
 ) -> None:
     """In every report; without its package nothing else changes."""
-    package = SimpleNamespace(compute_ssimulacra2=lambda a, b: 61.256) if installed else None
+    package = None
+    if installed:
+        spec = ModuleSpec("ssimulacra2", None)
+        package = SimpleNamespace(compute_ssimulacra2=lambda a, b: 61.256, __spec__=spec)
     monkeypatch.setitem(sys.modules, "ssimulacra2", package)
     figure, shown = (61.26, ", SSIMULACRA2 61.3") if installed else (None, "")
     first, second = tmp_path / "a.svg", tmp_path / "b.svg"

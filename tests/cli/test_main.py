@@ -140,6 +140,7 @@ def test_standard_streams_that_are_full_or_closed(image: Path, streams: str, cod
     done = shell(f"$W {streams}", "vectorize", image, "-o", output, "-vv", *QUICK)
     assert done.returncode == code
     assert b"Traceback" not in done.stderr
+    assert (b"a.svg: " in done.stdout) == streams.startswith("2>")
     render_svg(output.read_text())
 
 

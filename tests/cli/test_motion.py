@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import re
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run
 from warpsplat.cli import preview as cli_preview
+from warpsplat.cli import signals
 from warpsplat.svg.viewer import render_own
 from warpsplat.terminal import detect
 
@@ -135,3 +137,16 @@ def test_the_preview_knows_of_notices(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(moved) == 1
     again = cli_preview.preview_on(sys.stderr, "blocks")
     assert again and sum(type(handler).__name__ == "_Aside" for handler in log.handlers) == 1
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_second_signal_leaves_the_cursor_to_be_seen(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A progress bar hides it, and nobody cleans up after a program that ends at once."""
+    written: list[tuple[int, bytes]] = []
+    monkeypatch.setattr(os, "isatty", lambda handle: terminal)
+    monkeypatch.setattr(os, "write", lambda handle, text: written.append((handle, text)))
+    monkeypatch.setattr(signals, "_exit", lambda code: None)
+    signals._end(2)
+    assert written == [(2, b"\x1b[?25h" * terminal + b"\nwarpsplat: interrupted\n")]

@@ -15,7 +15,8 @@ from PIL import Image
 from tests.scenes import random_scene
 from warpsplat.errors import OutputError, UsageError
 from warpsplat.files import output as files
-from warpsplat.files.output import SVG_ENDINGS, check_output, mark_png, write_atomically
+from warpsplat.files.marks import mark_png
+from warpsplat.files.output import SVG_ENDINGS, check_output, write_atomically
 from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
 

@@ -7,8 +7,9 @@ import pytest
 
 from tests.fit.pictures import picture
 from warpsplat.fit.export import export
-from warpsplat.fit.goals import AIM_FULL, _curves_for, _next
+from warpsplat.fit.goals import AIM_FULL, _next
 from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.pilots import curves_for
 from warpsplat.fit.pursuit import Change, Made
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
@@ -73,9 +74,9 @@ def test_without_more_shapes_the_grid_gets_finer(scene: Scene) -> None:
 
 
 def test_shapes_that_a_pilot_needs() -> None:
-    assert _curves_for(26.8, {256: 25.0}, 10_000) == 512, "twice the shapes for 1.8 dB"
-    assert _curves_for(24.0, {256: 25.0, 128: 23.0}, 10_000) in {181, 182}, "between two, by those"
-    assert _curves_for(60.0, {256: 25.0}, 1000) == 1000
+    assert curves_for(26.8, {256: 25.0}, 10_000) == 512, "twice the shapes for 1.8 dB"
+    assert curves_for(24.0, {256: 25.0, 128: 23.0}, 10_000) in {181, 182}, "between two, by those"
+    assert curves_for(60.0, {256: 25.0}, 1000) == 1000
 
 
 def test_a_run_can_be_entered_late(scene: Scene) -> None:

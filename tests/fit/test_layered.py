@@ -77,7 +77,7 @@ def test_each_level_is_a_picture(device: str) -> None:
         assert figure > alone.score.psnr - 1.5, f"{level} shapes"
     work = [progress.work for progress in told]
     assert work == sorted(work)
-    assert 0.5 < work[-1] < 1, "then the file is measured"
+    assert 0.05 < work[-1] < 1, "then the file is measured"
     assert {progress.steps for progress in told} == {result.iterations}
 
 

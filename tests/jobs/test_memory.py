@@ -15,13 +15,15 @@ import pytest
 from PIL import Image
 
 import warpsplat
+from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
-from warpsplat.errors import ResourceError
+from warpsplat.errors import ExitCode, ResourceError
 from warpsplat.files.image import Facts, boxed, image_facts, load_image
+from warpsplat.files.importance import load_importance
 from warpsplat.files.whole import load_whole
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs import memory
-from warpsplat.jobs.memory import container_limits, factor_for, memory_limit, need
+from warpsplat.jobs.memory import container_limits, factor_for, mask_factor, memory_limit, need
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
@@ -187,6 +189,61 @@ def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
     # As good as a run at full size, but for the luck of two steps.
     usual = warpsplat.vectorize(data, **QUICK)
     assert usual.reduced == "" and usual.score and own.psnr > usual.score.psnr - 2
+
+
+@pytest.mark.usefixtures("bare")
+def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, mask = encoded(pixels()), encoded(pixels().convert("L"))
+    facts, of_mask = image_facts(data), image_facts(mask)
+    assert facts and of_mask
+    settings = make_settings(curves=4)
+    whole = need(facts, settings, mask=of_mask)
+    assert whole.most > need(facts, settings).most
+    assert whole.reading > 16 * WIDTH * HEIGHT
+    sizes: list[tuple[int, ...]] = []
+    usual = load_importance
+
+    def noted(*given: Any) -> Any:
+        found = usual(*given)
+        sizes.append(found.shape)
+        return found
+
+    monkeypatch.setattr("warpsplat.jobs.vectorize.load_importance", noted)
+    made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most - 1, name="big.png")
+    assert sizes == [(25, 33)]
+    assert "worked on at 33x25" in made.reduced
+    warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most)
+    assert sizes[1:] == [(HEIGHT, WIDTH)]
+
+
+def test_a_small_mask_loses_nothing() -> None:
+    for width, factor in ((12_000, 4), (6000, 2), (5999, 1), (300, 1)):
+        assert mask_factor(HUGE, replace(HUGE, width=width), 4) == factor
+
+
+def test_refining_against_what_takes_too_much_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before its pixels are read."""
+    image, svg, output = tmp_path / "a.png", tmp_path / "a.svg", tmp_path / "b.svg"
+    image.write_bytes(encoded(pixels()))
+    svg.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}">'
+        '<path d="M9 9H40V30H9z" fill="#853"/></svg>'
+    )
+    arguments = ("refine", svg, image, "-o", output, "--iterations", 1, "--device", "cpu")
+    limit = memory.PROGRAM + memory.REFINED * WIDTH * HEIGHT
+    assert run(*arguments, "--max-memory", limit) == 0
+    monkeypatch.setattr("warpsplat.api.load_target", None)
+    capsys.readouterr()
+    assert run(*arguments, "--max-memory", limit - 1) == ExitCode.RESOURCES
+    error = one_line(capsys.readouterr().err)
+    assert "a.png: 65x49 pixels take about" in error
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1000)
+    with pytest.raises(
+        ResourceError, match=r"^the image: .* memory for it is 0 MB; refine against a smaller"
+    ):
+        warpsplat.refine(svg, image.read_bytes(), device="cpu")
 
 
 def test_nothing_of_a_run_is_left(monkeypatch: pytest.MonkeyPatch) -> None:

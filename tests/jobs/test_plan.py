@@ -116,7 +116,7 @@ BAD = [
     ("jobs:\n  - images: 'in/**a/[.png'\n", 2, "[.png"),
     ("jobs:\n  - images: ~nosuchuser/a.png\n", 2, "nosuchuser"),
     ("jobs:\n  - images: in/a.png\n    output: ~nosuchuser\n", 3, "nosuchuser"),
-    ("jobs:\n  - images: in/a.png\n    output: in/b.png\n", 3, "not a folder"),
+    ("jobs:\n  - images: in/a.png\n    output: in/b.jpg\n", 3, "not a folder"),
     ("jobs:\n  - images: in/a.png\n    target-psnr: true\n", 3, "target-psnr"),
     ("jobs:\n  - images: in/a.png\n    time-budget: soon\n", 3, "time-budget"),
     ("jobs:\n  - images: in/deep/../pic.svg\n", 2, "overwritten"),

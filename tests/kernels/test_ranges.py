@@ -12,8 +12,11 @@ from warpsplat.errors import CapacityError
 from warpsplat.kernels import constants
 from warpsplat.kernels.ranges import bounded_product
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.kernel_cache import load
 from warpsplat.rendering.ranges import record_ranges
 from warpsplat.scene import Kind
+
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
 
 CAPACITY = 100
 
@@ -74,5 +77,6 @@ def test_counts_do_not_wrap(device: str) -> None:
     pairs = [(3, 4), (2**20, 2**20), (2**31 - 1, 2**31 - 1), (-(2**31), 5), (0, 9)]
     a, b = (wp.array(np.array(x, np.int32), dtype=wp.int32, device=device) for x in zip(*pairs, strict=True))
     out = wp.zeros(len(pairs), dtype=wp.int32, device=device)
+    load(products, wp.get_device(device))
     wp.launch(products, len(pairs), inputs=[a, b, out], device=device)
     assert out.numpy().tolist() == [12, constants.COUNT_MAX, constants.COUNT_MAX, 0, 0]

@@ -7,7 +7,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column
 
-wp.set_module_options(constants.MODULE_OPTIONS | {"optimization_level": 1})
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
 
 TILE = wp.constant(constants.TILE)
 PARTIAL = wp.constant(constants.PARTIAL)

@@ -38,10 +38,14 @@ def inside(area: torch.Tensor, rule: Rule) -> torch.Tensor:
 
 def fill_area(contours: Lines, width: int, height: int) -> torch.Tensor:
     """Winding-weighted area of each pixel, [height, width]: over each edge, the integral by y of the part of
-    the pixel's row that lies right of the edge.
+    the pixel's row that lies right of the edge. Only rows that an edge reaches are looked at.
     """
-    a, b = ends([torch.cat([c, c[:1]]) for c in contours])
-    x0, y0 = torch.arange(width)[None, None, :], torch.arange(height)[None, :, None]
+    a, b = (end[:, 0, 0] for end in ends([torch.cat([c, c[:1]]) for c in contours]))
+    rows = torch.arange(height)
+    top, bottom = torch.minimum(a, b)[:, 1:], torch.maximum(a, b)[:, 1:]
+    edge, row = torch.nonzero((top <= rows + 1) & (bottom >= rows), as_tuple=True)
+    a, b = a[edge][:, None], b[edge][:, None]  # [edge and row, 1, 2]
+    x0, y0 = torch.arange(width)[None, :], row[:, None]
     slope = (b[..., 0] - a[..., 0]) / torch.where(
         b[..., 1] == a[..., 1], torch.ones(()), b[..., 1] - a[..., 1]
     )
@@ -53,7 +57,7 @@ def fill_area(contours: Lines, width: int, height: int) -> torch.Tensor:
     rise = torch.where(steep, torch.ones(()), ub - ua)
     sloped = (ramp_integral(ub) - ramp_integral(ua)) / rise
     share = torch.where(steep, ((ua + ub) / 2).clamp(0, 1), sloped)
-    return (share * (yb - ya)).sum(0)
+    return torch.zeros((height, width)).index_add(0, row, share * (yb - ya))
 
 
 def half_plane(x: torch.Tensor, n: torch.Tensor) -> torch.Tensor:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import torch
 
-from tests.reference.composite import pixel_centres
 from tests.reference.curves import Tensors
 from tests.reference.grid import Plan, differences, grids, runs_of
 from warpsplat.kernels import constants as k
@@ -51,8 +50,10 @@ def gaussian_values(
     )
     rs = rotation * scale[:, None, :]
     inverse = torch.linalg.inv(rs @ rs.transpose(1, 2))
-    d = pixel_centres(width, height)[None] - mean[:, None, None, :]
-    q = torch.einsum("nhwi,nij,nhwj->nhw", d, inverse, d)
+    (a, b), (c, d) = inverse.permute(1, 2, 0)[..., None, None]
+    x = torch.arange(width) + 0.5 - mean[:, 0, None, None]
+    y = (torch.arange(height) + 0.5)[:, None] - mean[:, 1, None, None]
+    q = a * x * x + (b + c) * x * y + d * y * y
     g = torch.exp(-0.5 * q).clamp(max=most)
     return torch.where(q <= cut[:, None, None], g, torch.zeros_like(g))
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import subprocess
+import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,8 +15,11 @@ import pytest
 import warp as wp
 
 from warpsplat.errors import ResourceError
+from warpsplat.kernels import constants
 from warpsplat.rendering import kernel_cache
-from warpsplat.rendering.kernel_cache import CHECKSUMS, alone_in, load
+from warpsplat.rendering.kernel_cache import CHECKSUMS, LOCK, alone_with, load
+
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
 
 
 @wp.kernel
@@ -74,7 +81,7 @@ def test_a_damaged_cache_is_made_anew(cache: Path) -> None:
         damage(find(cache, ending))
         assert doubles(), (ending, damage)
         assert find(cache, ".o").read_bytes() == good
-    assert len(list(cache.iterdir())) == 1, "what was damaged is gone"
+    assert len(list(cache.glob("wp_*"))) == 1, "what was damaged is gone"
 
 
 def test_damage_from_before_the_checksums_is_found_where_it_shows(cache: Path) -> None:
@@ -120,23 +127,50 @@ def test_without_any_place_the_message_names_the_cache(cache: Path, monkeypatch:
     assert caught.value.exit_code == 7
 
 
-def test_one_process_compiles_at_a_time(tmp_path: Path) -> None:
-    """By a lock that leaves nothing behind, and that is no obstacle where there is no cache."""
+def test_a_module_is_compiled_by_one_process(tmp_path: Path) -> None:
+    """By a lock of its own, which is no obstacle where there is no cache."""
     fcntl = pytest.importorskip("fcntl")
+    ask = f"""
+        import fcntl, os
+        handle = os.open({str(tmp_path / LOCK)!r}, os.O_RDWR)
+        for name in ("wp_one", "wp_other"):
+            try:
+                fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, zlib.crc32(name.encode()))
+            except BlockingIOError:
+                print(name)
+    """
 
-    def is_free() -> bool:
-        handle = os.open(tmp_path, os.O_RDONLY)  # as another process would
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        finally:
-            os.close(handle)
-        return True
+    def held() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", "import zlib\n" + textwrap.dedent(ask)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout
 
-    with alone_in(tmp_path):
-        assert not is_free()
-    assert is_free()
-    assert not list(tmp_path.iterdir())
-    with alone_in(tmp_path / "none"):
+    assert fcntl
+    with alone_with(tmp_path / "wp_one"):
+        assert held() == "wp_one\n"
+    assert held() == ""
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK]
+    with alone_with(tmp_path / "none" / "wp_one"):
         pass
+
+
+def test_what_another_process_compiled_meanwhile_is_only_loaded(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which is seen once the lock is held."""
+    assert doubles()
+    made, away = find(cache, ".o").parent, cache / "away"
+    made.rename(away)
+
+    @contextlib.contextmanager
+    def wait(folder: Path) -> Iterator[None]:
+        away.rename(folder)
+        yield
+
+    monkeypatch.setattr(kernel_cache, "alone_with", wait)
+    monkeypatch.setattr(kernel_cache, "compile_by", None)
+    assert doubles()

@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 import warp as wp
 
+from warpsplat.kernels import constants
 from warpsplat.rendering.program import Program, bind, capture
+
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
 
 
 @wp.kernel

@@ -107,6 +107,8 @@ def test_sixels(width: int, height: int) -> None:
     assert np.abs(read_sixels(sixels(Image.fromarray(few))) - few).max() <= 2
     many = picture(width, height, smooth=True)
     assert np.abs(read_sixels(sixels(Image.fromarray(many))) - many).mean() < 4
+    quick = sixels(Image.fromarray(many), quick=True)
+    assert np.abs(read_sixels(quick) - many).mean() < 20 and len(set(re.findall(r"#(\d+);", quick))) <= 64
 
 
 def test_long_runs_of_sixels_are_counted() -> None:

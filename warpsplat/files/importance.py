@@ -10,8 +10,11 @@ from warpsplat.files.sources import ImageSource, image_of, source_name
 from warpsplat.scene import FloatArray
 
 
-def load_importance(source: ImageSource, width: int, height: int, name: str | None = None) -> FloatArray:
-    """Read the mask of an image of ``width`` x ``height`` px: its grey values in [0, 1], at its own size.
+def load_importance(
+    source: ImageSource, width: int, height: int, name: str | None = None, factor: int = 1
+) -> FloatArray:
+    """Read the mask of an image of ``width`` x ``height`` px: its grey values in [0, 1], at its own size, or
+    ``factor`` times smaller.
 
     Any image will do, of any size of the same proportions: of colours the luma counts (ITU-R BT.601), and
     where it is transparent nothing was painted, which is black.
@@ -20,10 +23,10 @@ def load_importance(source: ImageSource, width: int, height: int, name: str | No
         ImageError: as ``image_of``, or other proportions than the image has.
     """
     name = name or source_name(source, "the mask")
-    mask = image_of(source, name, paper=0.0)
-    tall, wide = mask.shape[:2]
-    # A reduced side may be rounded to either neighbour.
-    if abs(wide - tall * width / height) >= 1 and abs(tall - wide * height / width) >= 1:
+    mask = image_of(source, name, paper=0.0, factor=factor)
+    tall, wide = factor * mask.shape[0], factor * mask.shape[1]
+    # A reduced side may be rounded to either neighbour; here, it is rounded up.
+    if min(abs(wide - tall * width / height), abs(tall - wide * height / width)) >= factor:
         raise ImageError(
             f"{name}: {wide}x{tall} pixels; a mask must have the proportions of its {width}x{height} image"
         )

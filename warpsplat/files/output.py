@@ -16,7 +16,6 @@ import platform
 import re
 import secrets
 import stat
-import struct
 import sys
 import time
 import zlib
@@ -24,6 +23,7 @@ from pathlib import Path
 
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.inputs import STANDARD
+from warpsplat.files.marks import PDF_START, PDF_TAIL, PNG_MARK, is_marked_pdf
 from warpsplat.files.remote import is_remote, read_remote, write_remote
 
 SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
@@ -34,12 +34,6 @@ SHORT_SVG = re.compile(
 )
 """How short ones begin: nobody else has the attributes in this order (``svg.write.shortened``)."""
 
-PNG_SOFTWARE = "warpsplat"
-"""Text of the ``Software`` chunk of every PNG written here."""
-
-PDF_MARK = b"\n%warpsplat\n"
-"""Comment behind the end of every PDF written here."""
-
 GIF_COMMENT = b"warpsplat"
 """Comment in the head of every GIF written here."""
 
@@ -49,7 +43,7 @@ WEBP_MARK = b"wspl\x0a\0\0\0warpsplat\n"
 MP4_MARK = b"\0\0\0\x12freewarpsplat\n"
 """Box at the end of every MP4 written here, of the kind that is there to be passed over."""
 
-MARKED_ENDS = {b"%PDF-": PDF_MARK, b"RIFF": WEBP_MARK, b"ftyp": MP4_MARK}
+MARKED_ENDS = {b"RIFF": WEBP_MARK, b"ftyp": MP4_MARK}
 """Marks at the end of files, by what stands at the beginning of their kind, or four bytes behind it."""
 
 PAGE_MARK = b"<!--warpsplat page-->"
@@ -171,6 +165,10 @@ def may_replace(path: Path) -> bool:
         else:
             with path.open("rb") as file:
                 head = file.read(HEAD)
+                if head.startswith(PDF_START):
+                    size = file.seek(0, os.SEEK_END)
+                    file.seek(max(0, size - PDF_TAIL))
+                    return is_marked_pdf(file.read())
                 for begin, mark in MARKED_ENDS.items():
                     if head.startswith(begin) or head.startswith(begin, 4):
                         size = file.seek(0, os.SEEK_END)
@@ -180,7 +178,7 @@ def may_replace(path: Path) -> bool:
         return True
     head = unpacked(head)
     gif = b"!\xfe" + bytes([len(GIF_COMMENT)]) + GIF_COMMENT
-    marks = (*SVG_MARKS, PAGE_MARK, b"tEXtSoftware\0" + PNG_SOFTWARE.encode(), gif)
+    marks = (*SVG_MARKS, PAGE_MARK, PNG_MARK, gif)
     return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
 
 
@@ -196,17 +194,6 @@ def unpacked(head: bytes) -> bytes:
 
 GZIP = b"\x1f\x8b"
 """How gzipped files begin."""
-
-
-def mark_png(png: bytes) -> bytes:
-    """A PNG with a ``Software`` chunk behind its header, by which ``may_replace`` knows it."""
-    chunk = b"tEXtSoftware\0" + PNG_SOFTWARE.encode()
-    whole = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    return png[:PNG_HEADER] + whole + png[PNG_HEADER:]
-
-
-PNG_HEADER = 33
-"""Length of a PNG's signature and header chunk [bytes]."""
 
 
 def write_svg_text(path: Path, text: str) -> None:

@@ -12,11 +12,12 @@ from dataclasses import replace
 
 from warpsplat.fit.afford import affordable_curves
 from warpsplat.fit.loop import Fit
+from warpsplat.fit.pilots import pilot, usual_rounds
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.pursuit import LAST_STEPS, Change, Made, Pursuit, Stop
+from warpsplat.fit.pursuit import Change, Made, Pursuit, Stop
 from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.rounding import finest
-from warpsplat.fit.settings import PRESETS, Settings
+from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.tiny import FEW, for_few
 from warpsplat.fit.work import Meter, Report
@@ -26,22 +27,6 @@ from warpsplat.svg.write import GRIDS
 
 MOST_CURVES = 20_000
 """Without ``--curves``."""
-
-PILOT_CURVES = 256
-"""Of the first pilot."""
-
-PILOT_GAIN = 1.5
-"""What a run of 1,000 steps has at least over a pilot with as many shapes [dB]: rather too many shapes, since
-some that go at the end cost little."""
-
-PILOT_RANGE = 2.0
-"""Factor of the number of shapes over which a pilot is believed."""
-
-PILOT_STEP = 8.0
-"""Most that the number of shapes changes by from one pilot to the next, as a factor."""
-
-PILOTS = 4
-"""At the most."""
 
 ROUNDS = 6
 """Times at the most that shapes go or come."""
@@ -79,12 +64,11 @@ GROW_MOST = 1.35
 TRIES = 3
 """Runs of a file of few shapes, with different seeds: by chance they differ by tenths of a decibel."""
 
-PILOT_TIME, MAIN_TIME = 0.15, 0.7
-"""Shares of a time budget; the rest is for the rounds."""
+MAIN_TIME = 0.7
+"""Share of a time budget that is left after the pilots; the rest is for the rounds."""
 
-USUAL_PILOTS = 2
-USUAL_ROUNDS = {"target_psnr": 4, "max_bytes": 1}
-"""How many there are in most runs, as progress is shown."""
+LAST_ROUNDS = {"target_psnr": 1.5, "max_bytes": 0.5}
+"""How many follow in the mean once the file should be right."""
 
 
 def pursue(
@@ -103,7 +87,7 @@ def pursue(
     """The smallest file that has ``target_psnr``, within ``max_bytes``; without a target the best in these.
 
     Arguments are those of ``fit``, the ``metadata`` of the file, and the work that comes ``after`` it
-    (``fit.work``). Where a goal is out of reach, the result is what comes nearest to it.
+    (``fit.costs``). Where a goal is out of reach, the result is what comes nearest to it.
     """
     most = settings.curves
     if settings.simplify:
@@ -123,10 +107,10 @@ def pursue(
         change = _next(tried, settings)
         if change is None or pursuit.over():
             break
-        cost = pursuit.cost(replace(settings, curves=len(change.base.fit.scene)), LAST_STEPS)
-        result = pursuit.changed(
-            change, pursuit.meter.stage(cost, max(_usual_rounds(settings) - turn - 1, 0) * cost)
-        )
+        shapes, later = len(change.base.fit.scene), min(rounds_left(tried, settings), ROUNDS - turn) - 1
+        cost = pursuit.round_cost(shapes, per_pixel=change.per_pixel)
+        rest = max(later, 0.0) * pursuit.round_cost(shapes, per_pixel=change.base.fit.per_pixel)
+        result = pursuit.changed(change, pursuit.meter.stage(cost, rest))
         done += result.iterations
         if result.interrupted:
             break
@@ -139,8 +123,22 @@ def pursue(
     return replace(best.fit, iterations=done, interrupted=interrupted)
 
 
-def _usual_rounds(settings: Settings) -> int:
-    return USUAL_ROUNDS["target_psnr" if settings.target_psnr else "max_bytes"]
+def rounds_left(tried: list[Made], settings: Settings) -> float:
+    """How many rounds there will be in the mean, by what has been ``tried``: for progress.
+
+    While a PSNR is missed, most take all that they may; then each leaves about half of the surplus. On the
+    way to a size, that follows the number of shapes, as far as that may change in a round.
+    """
+    best = min(tried, key=lambda made: _rank(made, settings))
+    if settings.target_psnr and _fits(best, settings):
+        surplus = best.psnr - settings.target_psnr
+        if surplus < 0:
+            return ROUNDS
+        return math.log2(max(surplus / ENOUGH_DB, 1.0)) + LAST_ROUNDS["target_psnr"]
+    assert settings.max_bytes
+    growth = math.log(AIM_FULL * settings.max_bytes / best.size)
+    step = math.log(GROW_MOST) if growth > 0 else math.log(CUT_MOST)
+    return max(growth / step, 1.0) + LAST_ROUNDS["max_bytes"]
 
 
 def _first(pursuit: Pursuit) -> tuple[int, Fit]:
@@ -150,15 +148,15 @@ def _first(pursuit: Pursuit) -> tuple[int, Fit]:
     if settings.max_bytes:
         curves = affordable_curves(settings, image.shape[1], image.shape[0])
     if settings.target_psnr:
-        done, curves, pilot = _pilot(pursuit, curves)
-        if pilot.interrupted:
-            return done, pilot
+        done, curves, last = pilot(pursuit, curves)
+        if last.interrupted:
+            return done, last
     settings = replace(settings, curves=curves)
     tries = TRIES if settings.max_bytes and curves <= FEW else 1
     results = []
     for turn in range(tries):
         seeded = replace(settings, seed=(settings.seed + turn) % 2**32)
-        cost, later = pursuit.cost(settings), _usual_rounds(settings) * pursuit.cost(settings, LAST_STEPS)
+        cost, later = pursuit.cost(settings), usual_rounds(pursuit, curves)
         report = pursuit.meter.stage(cost, (tries - turn - 1) * cost + later)
         results.append(pursuit.run(seeded, report, pursuit.seconds(MAIN_TIME / (tries - turn))))
         done += results[-1].iterations
@@ -172,45 +170,6 @@ def _first(pursuit: Pursuit) -> tuple[int, Fit]:
 def _promise(made: Made) -> float:
     """What a file of a few shapes would have at a size that is the same for all [dB]."""
     return made.psnr - DB_PER_DOUBLING * math.log2(made.size)
-
-
-def _pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
-    """Steps done, the number of shapes that the target needs, and the last pilot."""
-    settings = pursuit.settings
-    assert settings.target_psnr
-    draft = PRESETS["draft"]
-    steps = min(draft["iterations"], settings.iterations)
-    draft = {name: min(draft[name], getattr(settings, name)) for name in ("coarse_pixels", "fine_pixels")}
-    draft |= {"iterations": steps, "coarse": PRESETS["draft"]["coarse"], "max_bytes": None}
-    aim = settings.target_psnr - PILOT_GAIN * math.log(settings.iterations / steps) / math.log(5)
-    curves, done = min(PILOT_CURVES, most), 0
-    seen: dict[int, float] = {}
-    for turn in range(PILOTS):
-        chosen = replace(settings, curves=curves, **draft)
-        cost, main = pursuit.cost(chosen), replace(settings, curves=curves)
-        later = pursuit.cost(main) + _usual_rounds(settings) * pursuit.cost(main, LAST_STEPS)
-        report = pursuit.meter.stage(cost, max(USUAL_PILOTS - turn - 1, 0) * cost + later)
-        seconds = pursuit.seconds(PILOT_TIME / PILOTS)
-        pilot = pursuit.run(chosen, report, seconds)
-        done += pilot.iterations
-        seen[curves] = pursuit.made(pilot).psnr
-        used, curves = curves, _curves_for(aim, seen, most)
-        if pilot.interrupted or max(used / curves, curves / used) <= PILOT_RANGE or curves in seen:
-            break
-    return done, curves, pilot
-
-
-def _curves_for(aim: float, seen: dict[int, float], most: int) -> int:
-    """Shapes that a pilot needs for ``aim`` dB, by the PSNR of the ``seen`` numbers of shapes."""
-    nearest, *others = sorted(seen, key=lambda count: abs(seen[count] - aim))
-    slope = DB_PER_DOUBLING
-    if others:
-        slope = (seen[nearest] - seen[others[0]]) / math.log2(nearest / others[0])
-    missing = aim - seen[nearest]
-    # Pilots gain less by more shapes than whole runs do; rather too many shapes than too few.
-    doublings = missing / max(slope, (0.75 if missing > 0 else 1.0) * DB_PER_DOUBLING)
-    step = math.log2(PILOT_STEP)
-    return max(1, min(most, round(nearest * 2 ** min(max(doublings, -step), step))))
 
 
 def _fits(made: Made, settings: Settings) -> bool:

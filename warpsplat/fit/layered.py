@@ -11,10 +11,11 @@ import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
+from warpsplat.fit.costs import Course
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Stages
-from warpsplat.fit.work import Meter, Report, run_cost
+from warpsplat.fit.work import Meter, Report
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
@@ -36,7 +37,7 @@ def fit_layered(
 ) -> Fit:
     """A scene whose first ``settings.levels`` shapes are pictures of their own: its layers.
 
-    Arguments are those of ``fit``, and the work that comes ``after`` it (``fit.work``).
+    Arguments are those of ``fit``, and the work that comes ``after`` it (``fit.costs``).
     """
     below: Scene | None = None
     done = renewed = 0
@@ -44,7 +45,10 @@ def fit_layered(
     steps = sum(each.iterations for each in rounds)
     height, width = image.shape[:2]
     costs = [
-        run_cost(each, width, height, ends=settings.levels[:number]) for number, each in enumerate(rounds)
+        Course.of(
+            each, width, height, backend, ends=settings.levels[:number], finish=each is rounds[-1]
+        ).cost()
+        for number, each in enumerate(rounds)
     ]
     meter = Meter(report, after)
     for number, each in enumerate(rounds):

@@ -11,6 +11,7 @@ import numpy as np
 
 from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
+from warpsplat.fit.costs import Course, serial
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.mend import mend
 from warpsplat.fit.palette import Palette
@@ -32,7 +33,7 @@ from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
-from warpsplat.fit.work import Progress, fit_cost
+from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.arrays import from_arrays, to_arrays
@@ -223,10 +224,16 @@ class _Run:
         """For people."""
         step, task, done = self.step, self.task, self.step.state.step
         settings, spent = step.settings, time.monotonic() - task.started
-        cost, whole = (
-            fit_cost(settings, task.plan, n, task.begin, task.ends) for n in (done, settings.iterations)
+        course = Course(
+            settings,
+            task.plan,
+            task.begin,
+            task.ends,
+            finish=task.finish,
+            thrifty=task.thrifty and not task.per_pixel,
+            serial=serial(step.state.parameters.backend),
         )
-        work = min(spent / task.seconds, 1.0) if task.seconds else cost / whole
+        work = min(spent / task.seconds, 1.0) if task.seconds else course.cost(done) / course.cost()
         fine = step.target.phase is task.plan[-1]
         shapes, now = step.state.shape_count, step.snapshot()
         return Progress(done, settings.iterations, step.psnr(), spent, work, fine, shapes, now)

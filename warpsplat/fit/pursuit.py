@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.afford import STYLE_BYTES
+from warpsplat.fit.costs import PIXELS, Course, score_cost, turn_cost
 from warpsplat.fit.density import densify
 from warpsplat.fit.export import finished
 from warpsplat.fit.importance import pixel_weights
@@ -23,7 +24,7 @@ from warpsplat.fit.stages import Stages
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.tiny import FEW, grounded
-from warpsplat.fit.work import Meter, Report, run_cost, score_cost
+from warpsplat.fit.work import Meter, Report
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
@@ -33,11 +34,11 @@ from warpsplat.svg.write import path_sizes
 
 Stop = Callable[[], bool]
 
-MEASURED = 4.0
-"""Looks at files that a run takes: most are for the choice of its grid."""
-
 LAST_STEPS = 0.2
 """Share of the run that is done again where shapes went or came."""
+
+PREPARED = 2.0
+"""What comes before these steps, over what a turn of surgery costs (``fit.costs``)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +89,38 @@ class Pursuit:
         """Whether there is no time for another round, or the user wants no more."""
         return time.monotonic() > self.deadline or bool(self.stop and self.stop())
 
-    def cost(self, settings: Settings, share: float = 1.0) -> float:
-        """Of the last ``share`` of a run, and of measuring its file (``fit.work``)."""
+    def cost(self, settings: Settings) -> float:
+        """Of a run, and of measuring its file (``fit.costs``)."""
         height, width = self.image.shape[:2]
-        begin = (1 - share) * settings.iterations
-        measured = score_cost(width, height, self.backend, eyes=False)
-        return run_cost(settings, width, height, begin) + MEASURED * measured
+        measured = score_cost(width * height, settings.curves, self.backend, eyes=False)
+        return Course.of(settings, width, height, self.backend, thrifty=True).cost() + measured
+
+    def round_cost(self, shapes: int, *, per_pixel: float | None = None) -> float:
+        """Of a change to so many shapes, as ``cost``; ``per_pixel``: the grid, where it is known."""
+        height, width = self.image.shape[:2]
+        course = Course.of(
+            self.last_settings(shapes),
+            width,
+            height,
+            self.backend,
+            begin=self.last_begin(),
+            thrifty=not per_pixel,
+        )
+        size = course.plan[-1].width * course.plan[-1].height
+        prepared = PREPARED * course.serial * turn_cost(size / PIXELS, shapes)
+        measured = score_cost(width * height, shapes, self.backend, eyes=False)
+        return prepared + course.cost() + measured
+
+    def last_settings(self, shapes: int) -> Settings:
+        """Of a round, whose shapes stay."""
+        density = replace(self.settings.density, interval=0)
+        return replace(self.settings, target_psnr=None, curves=shapes, density=density)
+
+    def last_begin(self) -> int:
+        """Step at which a round begins."""
+        steps = self.settings.iterations
+        before_stages = steps - STAGES * stage_steps(self.settings) - 1
+        return max(0, min(round((1 - LAST_STEPS) * steps), before_stages))
 
     def seconds(self, share: float) -> float | None:
         """A share of the time that is left."""
@@ -140,14 +167,12 @@ class Pursuit:
                 scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
         if len(scene) <= FEW and self.image.shape[2] == 3 and self.may_choose_ground:
             scene = grounded(scene, self.image, self.backend)
-        before_stages = settings.iterations - STAGES * stage_steps(settings) - 1
-        density = replace(settings.density, interval=0)
         return fit(
             self.image,
-            replace(settings, target_psnr=None, curves=len(scene), density=density),
+            self.last_settings(len(scene)),
             self.backend,
             scene=scene,
-            begin=max(0, min(round((1 - LAST_STEPS) * settings.iterations), before_stages)),
+            begin=self.last_begin(),
             per_pixel=change.per_pixel,
             thrifty=True,
             importance=self.importance,

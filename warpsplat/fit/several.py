@@ -11,9 +11,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.settings import DENSITY_RANGES, Settings
 from warpsplat.fit.state import Past
-from warpsplat.fit.work import Progress, Report, run_cost, score_cost
+from warpsplat.fit.work import Progress, Report
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 
@@ -48,12 +49,12 @@ class Series:
         self._settings = settings
         self._numbers = sorted(numbers)
         self._kept: tuple[Scene, Past] | None = None
-        measured = score_cost(width, height, backend, eyes=True)
-        self._costs = {
-            number: measured
-            + run_cost(replace(settings, curves=number), width, height, self._expected(at, number))
-            for at, number in enumerate(self._numbers)
-        }
+        self._costs = {}
+        for at, number in enumerate(self._numbers):
+            chosen, begin = replace(settings, curves=number), self._expected(at, number)
+            course = Course.of(chosen, width, height, backend, begin=begin)
+            measured = score_cost(width * height, number, backend, eyes=True)
+            self._costs[number] = course.cost() + measured
         self._started = time.monotonic()
 
     def _expected(self, at: int, number: int) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares
+from warpsplat.fit.costs import Course
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
@@ -18,7 +19,7 @@ from warpsplat.fit.rounding import USUAL_GRID, finest
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import Past
-from warpsplat.fit.work import Meter, Progress, Report, run_cost
+from warpsplat.fit.work import Meter, Progress, Report
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
@@ -125,7 +126,10 @@ def survey(
     growing = _growing(settings, most)
     probing = _probing(settings, min(PROBED, most))
     height, width = image.shape[:2]
-    costs = run_cost(growing, width, height), run_cost(probing, width, height, PROBE_RUN - PROBE)
+    costs = [
+        Course.of(each, width, height, backend, begin=begin, finish=False).cost()
+        for each, begin in ((growing, 0), (probing, PROBE_RUN - PROBE))
+    ]
     meter, seen = Meter(report), _Seen()
     told = meter.stage(costs[0], costs[1])
 

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
+from warpsplat.fit.costs import DRAWINGS, PIXELS, serial
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
 from warpsplat.fit.nodes import CELL, Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
-from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import Settings
-from warpsplat.fit.work import Meter, Report, step_cost
+from warpsplat.fit.work import Meter, Report
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters
@@ -31,8 +30,14 @@ ROUNDS = 16
 POINTS_A_ROUND = 110
 """Of a traced drawing: how many rounds there will be, as progress is shown."""
 
-ROUND_REFITS, GRID_REFITS = 2.5, 5.0
-"""What a round, and choosing the grid, take, in times that a drawing is fitted anew."""
+REFIT_STARTED = 8
+"""What fitting a drawing anew takes besides its steps, in steps."""
+
+GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.4
+"""What choosing the grid costs: of each drawing, of ``costs.PIXELS``, of a point."""
+
+ROUND_REFITS, ROUND_GRIDS = 1.5, 0.22
+"""What a round takes, in times that a drawing is fitted anew, and that its grid is chosen."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
 """After each round."""
@@ -87,7 +92,7 @@ def finish_drawing(
         how: rates and steps of the first refinement.
         finest: most units of the view box a pixel.
         report: called every few steps.
-        after: work that comes then (``fit.work``).
+        after: work that comes then (``fit.costs``).
         stop: asked after every step and round; once true, what there is is rounded.
     """
 
@@ -102,19 +107,18 @@ def finish_drawing(
     if not len(drawing.scene):
         return Finished(drawing, min(USUAL_GRID, finest))
     how, meter = how or Refinement(), Meter(report, after)
-    refit = REFIT.steps * step_cost(Settings(), Phase(*target.shape[1::-1]), len(drawing.scene))
-    rounds, last = ROUND_REFITS * refit, (3 + GRID_REFITS) * refit
-    first = how.steps / REFIT.steps * refit
+    second, costs = replace(REFIT, steps=2 * REFIT.steps), Costs(target, drawing, backend)
+    rounds, refit = costs.round(), costs.refit(REFIT)
+    last = costs.refit(second) + costs.grid() + refit
     usual = min(len(drawing.joints) / POINTS_A_ROUND, ROUNDS)
-    drawing = refined(drawing, how, meter.stage(first, usual * rounds + last))
+    drawing = refined(drawing, how, meter.stage(costs.refit(how), usual * rounds + last))
 
     def told(later: float) -> Report | None:
         return meter.stage(rounds, later * rounds + last)
 
     drawing = tidied(target, drawing, backend, told, stop)
-    drawing = refined(
-        drawing, replace(REFIT, steps=2 * REFIT.steps), meter.stage(2 * refit, last - 2 * refit)
-    )
+    drawing = refined(drawing, second, meter.stage(costs.refit(second), costs.grid() + refit))
+    meter.stage(costs.grid(), refit)  # of which nothing shows on the way
     grid = drawing_grid(target, drawing, backend, finest)
     on, _ = drawing.links()
     held = np.zeros(len(drawing.joints), np.bool_)
@@ -122,8 +126,34 @@ def finish_drawing(
     low = rounded(drawing.scene, grid)
     points = np.where(held[:, None], low.points, drawing.scene.points)
     drawing = replace(drawing, scene=replace(drawing.scene, points=points))
-    drawing = refined(drawing, REFIT, meter.stage(last - 2 * refit, 0), held)
+    drawing = refined(drawing, REFIT, meter.stage(refit, 0), held)
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What parts of finishing a drawing cost (``fit.costs``)."""
+
+    target: FloatArray
+    drawing: Drawing
+    backend: Backend
+
+    @property
+    def _size(self) -> float:
+        return self.target[..., 0].size / PIXELS
+
+    def refit(self, how: Refinement) -> float:
+        """Of fitting it."""
+        return (how.steps + REFIT_STARTED) * DRAWINGS.cost(self._size, len(self.drawing.scene))
+
+    def grid(self) -> float:
+        """Of choosing its grid."""
+        cost = GRID + GRID_PIXELS * self._size + GRID_POINT * len(self.drawing.joints)
+        return serial(self.backend) * cost
+
+    def round(self) -> float:
+        """Of a round of ``tidied``."""
+        return ROUND_REFITS * self.refit(after_round(self.target)) + ROUND_GRIDS * self.grid()
 
 
 def tidied(
@@ -140,7 +170,7 @@ def tidied(
     by how many may come after it.
     """
     refused: set[Key] = set()
-    how = replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
+    how = after_round(target)
     judge = Judge(target, backend)
     errors = judge.errors(drawing)
 
@@ -163,12 +193,12 @@ def tidied(
         report = told(min(len(candidates) / len(edits), ROUNDS - 1 - turn))
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
-        growth = by_cell(judge.errors(applied(drawing, edits)) - errors)
+        growth = judge.errors(applied(drawing, edits)) - errors
         left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
         while left:
             made, after = refitted(left)
-            growth = by_cell(after - errors)
+            growth = after - errors
             taken = [e for e in left if within(growth, e) <= e.saved * worth]
             if len(taken) == len(left):
                 drawing, errors = made, after
@@ -179,6 +209,11 @@ def tidied(
         if sum(e.saved for e in left) < WORTHWHILE * size:
             break
     return drawing
+
+
+def after_round(target: FloatArray) -> Refinement:
+    """How a drawing is fitted anew after each round."""
+    return replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
 
 
 class Judge:
@@ -192,27 +227,28 @@ class Judge:
         """
 
     def errors(self, drawing: Drawing) -> Floats:
-        """What each pixel adds to the mean squared error, shape (height, width)."""
+        """What each cell adds to the mean squared error, as ``by_cell``."""
         parameters = Parameters(drawing.scene, self._backend)
         Keeper(Constraints.of(drawing), parameters).project()
         height, width = self._target.shape[:2]
         renderer = Renderer(parameters, Viewport(width, height), model=EXACT, capacity=self.capacity)
         renderer.forward_complete()
         self.capacity = renderer.capacity
-        errors = squares(renderer.read_image() - self._target).astype(np.float64)
-        return errors / (3 * errors.size)
+        return by_cell(squares(renderer.read_image() - self._target)) / (3 * height * width)
 
 
-def by_cell(errors: Floats) -> Floats:
-    """Sums over the cells that edits are told by, with an empty one beyond each border."""
-    height, width = errors.shape
-    padded = np.pad(errors, [(CELL, CELL + -height % CELL), (CELL, CELL + -width % CELL)])
-    rows = np.add.reduceat(padded, np.arange(0, padded.shape[0], CELL), axis=0)
-    return np.asarray(np.add.reduceat(rows, np.arange(0, padded.shape[1], CELL), axis=1))
+def by_cell(pixels: npt.NDArray[np.floating[Any]]) -> Floats:
+    """Sums over the cells by which edits are told, with one more beyond each border that is empty.
+
+    Pixels of shape (height, width) make cells of shape (rows + 2, columns + 2).
+    """
+    height, width = pixels.shape
+    rows = np.add.reduceat(pixels, np.arange(0, height, CELL), axis=0, dtype=np.float64)
+    return np.pad(np.add.reduceat(rows, np.arange(0, width, CELL), axis=1), 1)
 
 
 def within(cells: Floats, edit: Edit) -> float:
-    """Sum over the pixels that an edit may change; ``cells``: of ``by_cell``."""
+    """Sum over the cells that an edit may change; ``cells`` as of ``by_cell``."""
     columns, rows = np.array([*edit.cells]).T + 1
     height, width = cells.shape
     return float(cells[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].sum())

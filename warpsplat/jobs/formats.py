@@ -6,7 +6,8 @@ import importlib.util
 from pathlib import Path
 
 from warpsplat.errors import UsageError
-from warpsplat.files.output import PDF_MARK, SVG_ENDINGS, mark_png, write_result, write_svg_text
+from warpsplat.files.marks import mark_pdf, mark_png
+from warpsplat.files.output import SVG_ENDINGS, svg_bytes, write_result
 from warpsplat.svg.viewer import draw_pdf, draw_png
 
 PICTURE_ENDINGS = (".png", ".pdf")
@@ -32,24 +33,39 @@ def check_format(path: Path) -> None:
         )
 
 
-def write_named(path: Path, text: str, *, zoom: float = 1.0) -> None:
-    """Write an SVG, or its picture, as the name of ``path`` says; ``-``, the standard output, takes an SVG.
+def is_picture(path: Path) -> bool:
+    """Whether a result of this name is an SVG's picture."""
+    return path.suffix.lower() in PICTURE_ENDINGS
+
+
+def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> bytes:
+    """What a result's file holds, as the name of ``path`` says.
 
     Args:
-        path: the file, replaced in one step.
+        path: the file.
         text: the SVG.
+        key: of the job that made it, which a picture bears; an SVG's text has its own.
         zoom: magnification of a picture.
 
     Raises:
         UsageError: see ``check_format``.
         ImageError: an SVG that cannot be drawn.
-        OutputError: it could not be written.
     """
     ending = path.suffix.lower()
     if ending == ".png":
-        write_result(path, mark_png(draw_png(text, zoom=zoom)))
-    elif ending == ".pdf":
+        return mark_png(draw_png(text, zoom=zoom), key)
+    if ending == ".pdf":
         check_format(path)
-        write_result(path, draw_pdf(text, zoom=zoom) + PDF_MARK)
-    else:
-        write_svg_text(path, text)
+        return mark_pdf(draw_pdf(text, zoom=zoom), key)
+    return svg_bytes(path, text)
+
+
+def write_named(path: Path, text: str, *, zoom: float = 1.0) -> None:
+    """Write an SVG, or its picture, as the name of ``path`` says; ``-``, the standard output, takes an SVG.
+    The file is replaced in one step; arguments are those of ``named_bytes``.
+
+    Raises:
+        UsageError, ImageError: see ``named_bytes``.
+        OutputError: it could not be written.
+    """
+    write_result(path, named_bytes(path, text, zoom=zoom))

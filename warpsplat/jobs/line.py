@@ -8,17 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.errors import ImageError
+from warpsplat.fit.costs import LINES, PIXELS, serial
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.rounding import finest
+from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.fit.stages import Stages
-from warpsplat.fit.work import Meter, Report, run_cost
+from warpsplat.fit.work import Meter, Report
 from warpsplat.jobs.areas import filled
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.trace.ink import Ink, find_ink
 from warpsplat.trace.lines import TracedLines, rejoined, trace_ink
-from warpsplat.trace.tour import toured
+from warpsplat.trace.tour import BEGINS, FEW, LOOK_AHEAD, toured
 
 STEPS = 80
 """Of the refinement, at the most: the strokes are where they should be but for fractions of a pixel."""
@@ -29,10 +31,8 @@ POINT_RATE = 0.12
 WIDTH_RATE = 0.06
 """Of widths [px]."""
 
-THIN_WORK, TOUR_WORK = 0.25, 0.7
-"""What the refinement takes, over that of strokes as wide as a photograph's, and what their order takes over
-that (``fit.work``).
-"""
+TOUR_STROKE, TOUR_PAIR = 1.0, 0.0034
+"""What finding the order of strokes costs: of each stroke, of each pair of strokes (``fit.costs``)."""
 
 FINE_PIXELS = 1_000_000
 """Largest size of the image that the refinement sees [pixels]."""
@@ -103,7 +103,10 @@ def _fitted(
         importance = 1 - traced.areas.cover
         ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
     fitted = line_settings(settings, len(lines))
-    cost = THIN_WORK * run_cost(fitted, lines.canvas.width, lines.canvas.height)
+    plan = phases(fitted, lines.canvas.width, lines.canvas.height)
+    cost = fitted.iterations * LINES.cost(plan[-1].width * plan[-1].height / PIXELS, len(lines))
+    tours = BEGINS + 1 if len(lines) <= FEW else 1
+    order = serial(backend) * len(lines) * (TOUR_STROKE + TOUR_PAIR * tours * min(len(lines), LOOK_AHEAD))
     made = fit(
         inked(ink, lines),
         fitted,
@@ -111,7 +114,7 @@ def _fitted(
         scene=start,
         importance=importance,
         seconds=seconds,
-        report=Meter(report, after).stage(cost, TOUR_WORK * cost),
+        report=Meter(report, after).stage(cost, order),
         stop=stop,
         stages=stages,
     )

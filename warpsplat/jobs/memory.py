@@ -48,12 +48,18 @@ SHAPE = 24 << 10
 TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 """Of a pixel, by subject."""
 
+MASK_READ, MASK = 12, 4
+"""Of a pixel of a mask: while it is read, and then."""
+
 SHOWN, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
 """Of a pixel, to measure a file: its picture, both images at half the size, the same where a side is odd, and
 what a file adds that is not drawn in strips."""
 
 EYES = 500
 """Of a pixel, to measure SSIMULACRA2."""
+
+REFINED = 150
+"""Of a pixel of the image that an SVG is refined against: pictures of what was given and of what was read."""
 
 SHARE = 0.9
 """Of the machine's memory, where no limit is given: others are there."""
@@ -77,8 +83,9 @@ class Need:
         return PROGRAM + max(self.reading, self.working, self.scoring)
 
 
-def need(facts: Facts, settings: Settings, factor: int = 1) -> Need:
-    """What a run takes whose image is ``factor`` times smaller in each direction than it is.
+def need(facts: Facts, settings: Settings, factor: int = 1, mask: Facts | None = None) -> Need:
+    """What a run takes whose image is ``factor`` times smaller in each direction than it is, with a ``mask``
+    of how much errors count.
 
     An estimate from above: of photographs within a quarter, of drawings by the most that their kind took.
     """
@@ -90,7 +97,23 @@ def need(facts: Facts, settings: Settings, factor: int = 1) -> Need:
     working = image + (
         TRACED[settings.subject] * worked if settings.subject in TRACED else _fitting(facts, settings, factor)
     )
-    return Need(*(round(x) for x in (reading, working, image + _scoring(facts, settings, worked))))
+    scoring = image + _scoring(facts, settings, worked)
+    if mask:  # which is read beside the image, and held
+        masked = mask.width * mask.height / mask_factor(facts, mask, factor) ** 2
+        whole = (mask.decoded + mask.kept) * mask.width * mask.height
+        reading = max(reading, image + whole + (MASK_READ + MASK) * masked + STRIPS)
+        working, scoring = working + MASK * masked, scoring + MASK * masked
+    return Need(*(round(x) for x in (reading, working, scoring)))
+
+
+def mask_factor(facts: Facts, mask: Facts, factor: int) -> int:
+    """How many times smaller the mask of an image is read that is worked on ``factor`` times smaller: none of
+    the detail that is left there is lost.
+    """
+    found = factor
+    while found > 1 and mask.width // found < facts.width // factor:
+        found //= 2
+    return found
 
 
 def _fitting(facts: Facts, settings: Settings, factor: int) -> float:
@@ -164,20 +187,38 @@ def share_machine(processes: int) -> None:
     _Process.sharers = processes
 
 
-def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1) -> int:
-    """How many times smaller an image is to be worked on: a power of two, from ``least`` on.
+def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1, mask: Facts | None = None) -> int:
+    """How many times smaller an image is to be worked on: a power of two, from ``least`` on. Arguments are
+    those of ``need``.
 
     Raises:
         ResourceError: the limit is too small for any size; the message begins with ``name``.
     """
     limit = memory_limit(settings)
     factor = least
-    while limit is not None and (wanted := need(facts, settings, factor).most) > limit:
+    while limit is not None and (wanted := need(facts, settings, factor, mask).most) > limit:
         factor *= 2
         if min(facts.width, facts.height) < LEAST_SIDE * factor:
             given = "max-memory is" if settings.max_memory else "memory for it is"
             raise ResourceError(f"{name}: at least {in_words(wanted)} are needed, {given} {in_words(limit)}")
     return factor
+
+
+def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
+    """Whether there is memory to refine an SVG against an image. That is done at the image's own size:
+    whether a result is better is for all of its pixels to say.
+
+    Raises:
+        ResourceError: there is not; the message begins with ``name``.
+    """
+    facts, limit = facts_of(source), memory_limit(settings)
+    if facts is None or limit is None:
+        return
+    wanted = PROGRAM + REFINED * facts.width * facts.height
+    if wanted > limit:
+        given = "max-memory is" if settings.max_memory else "memory for it is"
+        size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
+        raise ResourceError(f"{name}: {size}, {given} {in_words(limit)}; refine against a smaller image")
 
 
 def in_words(size: int) -> str:

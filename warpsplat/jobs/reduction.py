@@ -12,7 +12,15 @@ from warpsplat.files.sources import ImageSource
 from warpsplat.files.whole import load_whole
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.settings import RANGES, Settings, solid_color
-from warpsplat.jobs.memory import factor_for, facts_of, in_words, memory_limit, need, whole_score
+from warpsplat.jobs.memory import (
+    factor_for,
+    facts_of,
+    in_words,
+    mask_factor,
+    memory_limit,
+    need,
+    whole_score,
+)
 from warpsplat.metrics import Rows, Score, score_svg
 from warpsplat.scene import FloatArray
 from warpsplat.scene.geometry import enlarged
@@ -66,15 +74,17 @@ class Memory:
     facts: Facts | None
     """None where nothing can be told: it is worked on as it is."""
     source: ImageSource
+    mask: Facts | None = None
+    """Of the mask, if there is one."""
 
     @staticmethod
-    def of(source: ImageSource, settings: Settings) -> Memory:
-        """``source``: bytes of a file, a Pillow image or an array."""
+    def of(source: ImageSource, settings: Settings, importance: ImageSource | None = None) -> Memory:
+        """``source`` and the mask: bytes of a file, a Pillow image or an array."""
         facts = facts_of(source)
         if facts:
             channels = {"none": 4, "auto": facts.channels}.get(settings.background, 3)
             facts = replace(facts, channels=channels)
-        return Memory(facts, source)
+        return Memory(facts, source, None if importance is None else facts_of(importance))
 
     def factor(self, name: str, settings: Settings, least: int = 1) -> int:
         """How many times smaller the image is to be worked on with ``settings``; from ``least`` on.
@@ -82,7 +92,11 @@ class Memory:
         Raises:
             ResourceError: there is too little memory at any size; the message names the image.
         """
-        return factor_for(self.facts, settings, name, least) if self.facts else 1
+        return factor_for(self.facts, settings, name, least, self.mask) if self.facts else 1
+
+    def mask_factor(self, factor: int) -> int:
+        """How many times smaller to read the mask of an image that is worked on ``factor`` times smaller."""
+        return mask_factor(self.facts, self.mask, factor) if self.facts and self.mask else 1
 
     def smaller(
         self, target: FloatArray, name: str, settings: Settings, factor: int
@@ -101,6 +115,6 @@ class Memory:
         if isinstance(source, bytes) and not facts.deep and whole_score(facts, settings, factor) <= limit:
             whole = functools.partial(load_whole, source, paper, channels)
         given = "max-memory is" if settings.max_memory else "memory for it is"
-        takes = in_words(need(facts, settings).most)
+        takes = in_words(need(facts, settings, mask=self.mask).most)
         why = f"{facts.width}x{facts.height} pixels take about {takes}, {given} {in_words(limit)}"
         return Reduction(factor, facts.width, facts.height, whole, why)

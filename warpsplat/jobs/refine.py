@@ -10,10 +10,11 @@ import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.fit.clear import clear_empty
+from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import fit
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.fit.work import Meter, Progress, run_cost, score_cost
+from warpsplat.fit.work import Meter, Progress
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, noting, training_seconds
 from warpsplat.metrics import psnr, score_svg
@@ -76,14 +77,16 @@ def refine(
     seconds = training_seconds(settings, target, started)
     history: list[Progress] = []
     height, width = target.shape[:2]
-    after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
+    eyes = has_time_for_eyes(settings, target)
+    after = score_cost(width * height, settings.curves, backend, eyes=eyes)
+    cost = Course.of(settings, width, height, backend).cost()
     made = fit(
         target,
         settings,
         backend,
         scene=scene,
         seconds=seconds,
-        report=Meter(noting(history, report), after).stage(run_cost(settings, width, height), 0),
+        report=Meter(noting(history, report), after).stage(cost, 0),
         stop=stop,
         stages=None if settings.time_budget else stages,
     )
@@ -96,7 +99,7 @@ def refine(
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
     svg = minified(svg) if settings.minify else shortened(svg)
-    eyes = has_time_for_eyes(settings, target) and not made.interrupted
+    eyes = eyes and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr
     if eyes and not better:

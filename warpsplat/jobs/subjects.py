@@ -62,7 +62,7 @@ def draw(
     stages: Stages | None = None,
 ) -> Fit:
     """Trace ``target`` as its ``settings.subject`` asks for; arguments are those of ``fit``, and the work
-    that comes ``after`` it (``fit.work``).
+    that comes ``after`` it (``fit.costs``).
     """
     deadline = math.inf if seconds is None else time.monotonic() + seconds
 

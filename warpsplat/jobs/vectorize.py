@@ -18,6 +18,7 @@ from warpsplat.errors import Stopped
 from warpsplat.files.importance import load_importance
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.clear import clear_empty
+from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.export import export, finished
 from warpsplat.fit.goals import pursue
 from warpsplat.fit.layered import fit_layered
@@ -27,7 +28,7 @@ from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
 from warpsplat.fit.several import Start
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
-from warpsplat.fit.work import Meter, Progress, run_cost, score_cost
+from warpsplat.fit.work import Meter, Progress
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
 from warpsplat.jobs.formats import write_named
 from warpsplat.jobs.memory import has_room_for_eyes
@@ -141,6 +142,10 @@ KEY_BYTES = 6
 """Of a key: it is compared with the one that a file would have, so that chance hits one in 2^48."""
 
 
+STOPPED = "stopped"
+"""In place of a key: of a result that was cut short."""
+
+
 def vectorize(
     target: FloatArray,
     settings: Settings,
@@ -179,8 +184,9 @@ def vectorize(
     seconds = training_seconds(settings, target, started)
     traced = start is None and settings.subject not in {"auto", "photo"}
     height, width = target.shape[:2]
-    after = score_cost(width, height, backend, eyes=has_time_for_eyes(settings, target))
-    after += len(settings.levels) * score_cost(width, height, backend, eyes=False)
+    pixels, eyes = width * height, has_time_for_eyes(settings, target)
+    after = score_cost(pixels, settings.curves, backend, eyes=eyes)
+    after += sum(score_cost(pixels, count, backend, eyes=False) for count in settings.levels)
     pursued = start is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
@@ -223,7 +229,7 @@ def vectorize(
             importance=importance,
             seconds=seconds,
             report=Meter(report, after).stage(
-                run_cost(settings, width, height, start.begin if start else 0), 0
+                Course.of(settings, width, height, backend, begin=start.begin if start else 0).cost(), 0
             ),
             stop=stop,
             stages=fits,
@@ -243,7 +249,7 @@ def vectorize(
     release_memory()
     # A file that was cut short must not pass for a finished one.
     svg, scene = export_within(
-        made.scene, settings, made.per_pixel, "stopped" if made.interrupted else metadata
+        made.scene, settings, made.per_pixel, STOPPED if made.interrupted else metadata
     )
     if write:
         write(svg)
@@ -502,13 +508,12 @@ def prepare(
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
     key = ""
-    source = _read(source)
+    source, importance = _read(source), None if importance is None else _read(importance)
     if keyed:
-        importance = None if importance is None else _read(importance)
         assert isinstance(source, bytes), "pixels have no key"
         assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    memory = Memory.of(source, settings)
+    memory = Memory.of(source, settings, importance)
     factor = memory.factor(name, settings)
     target = load_target(source, name, settings.background, factor)
     chosen, why = decided(target, settings)
@@ -517,7 +522,8 @@ def prepare(
     work = Prepared(target, chosen, why, None, memory.reduction(factor, target, chosen), key)
     if importance is None:
         return work
-    return replace(work, importance=load_importance(importance, *work.size, mask_name))
+    mask = load_importance(importance, *work.size, mask_name, memory.mask_factor(factor))
+    return replace(work, importance=mask)
 
 
 def make(

@@ -140,7 +140,10 @@ def _lines(points: list[tuple[float, float, bool]]) -> list[Line]:
             runs[-1].append(point)
         else:
             runs.append([point])
-    return [Line(_points([(x, y) for x, y, _ in run]), run[0][2]) for run in runs]
+    # A point alone is a line of no length, whose caps are a dot.
+    return [
+        Line(_points([(x, y) for x, y, _ in (run * 2 if len(run) == 1 else run)]), run[0][2]) for run in runs
+    ]
 
 
 def _points(points: Sequence[tuple[float, float]]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
@@ -10,6 +9,7 @@ from typing import Any, TypeVar
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.native import available_cores
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.tiles import tile_counts
 
@@ -17,14 +17,6 @@ Buffers = TypeVar("Buffers")
 
 THREADS_PER_CORE = 8
 """Most threads that a split launch is cut for: more only wait, and cost memory for pieces and stacks."""
-
-
-def available_cores() -> int:
-    """CPU cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # macOS, Windows
-        return os.cpu_count() or 1
 
 
 @dataclass(frozen=True)

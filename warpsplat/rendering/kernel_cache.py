@@ -10,7 +10,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import errno
-import functools
 import hashlib
 import json
 import logging
@@ -18,8 +17,8 @@ import os
 import shutil
 import tempfile
 import threading
-import time
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ import warp as wp
 
 from warpsplat.errors import ResourceError, explain
 from warpsplat.native import messages_hidden
+from warpsplat.rendering.compiler import compile_by
 
 log = logging.getLogger(__name__)
 
@@ -71,14 +71,12 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
             use_temporary_folder(failure)
             folder = _place() / folder.name
         try:
-            if folder.exists():
-                with messages_hidden():
-                    wp.load_module(module, device, block_dim=block_dim)
-            else:
-                with alone_in(_place()):
+            if not folder.exists():
+                with alone_with(folder):
                     if not folder.exists():
-                        _announce()
-                    _wait_for(lambda: wp.load_module(module, device, block_dim=block_dim))
+                        compile_by(lambda: wp.load_module(module, device, block_dim=block_dim))
+            with messages_hidden():
+                wp.load_module(module, device, block_dim=block_dim)
         except Exception as error:  # Warp and its compiler raise all kinds
             if explain(error)[0].startswith("not enough memory"):
                 raise
@@ -93,77 +91,28 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
     ) from failure
 
 
-@contextlib.contextmanager
-def alone_in(place: Path) -> Iterator[None]:
-    """Compile in the cache ``place`` while other processes wait: what one has made, the next ones only load.
+LOCK = "warpsplat.lock"
+"""An empty file in the cache, of which a byte is locked for each module that is being compiled."""
 
-    The folder itself is locked, which leaves nothing behind. Where that cannot be done, several compile the
-    same, each for itself, which Warp allows.
+
+@contextlib.contextmanager
+def alone_with(folder: Path) -> Iterator[None]:
+    """Compile the module of ``folder`` while other processes that need it wait: they only load it then.
+
+    Meanwhile others may compile other modules. Where nothing can be locked, several compile the same, each
+    for itself, which Warp allows: a module comes to its place whole, by renaming.
     """
     handle = None
     try:
         with contextlib.suppress(OSError, ImportError):
             import fcntl  # POSIX only
 
-            handle = os.open(place, os.O_RDONLY)
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            handle = os.open(folder.with_name(LOCK), os.O_RDWR | os.O_CREAT, 0o666)
+            fcntl.lockf(handle, fcntl.LOCK_EX, 1, zlib.crc32(folder.name.encode()))
         yield
     finally:
         if handle is not None:
             os.close(handle)
-
-
-@functools.cache
-def _announce() -> None:
-    """Say why nothing seems to happen; a process says it once for all its modules."""
-    log.info("compiling kernels, which is done once and takes up to a minute")
-
-
-COMPILER = "warpsplat compiler"
-"""Name of the thread that compiles."""
-
-
-PASSING = "passing"
-"""Attribute of records that the next one takes the place of, and that an empty one removes."""
-
-SAID_EVERY = 1.0
-"""Seconds between two of them."""
-
-
-class _Waited:
-    """How long the process has waited for the compiler [s]: it compiles module by module."""
-
-    seconds = 0.0
-
-
-def _wait_for(work: Callable[[], None]) -> None:
-    """Do ``work`` in a thread, so that Ctrl-C need not wait until the compiler is done, and say how long."""
-    errors: list[BaseException] = []
-
-    def run() -> None:
-        try:
-            work()
-        except BaseException as error:  # raised again where it is waited for
-            errors.append(error)
-
-    thread = threading.Thread(target=run, name=COMPILER, daemon=True)
-    with messages_hidden():
-        thread.start()
-        started = time.monotonic()
-        thread.join(SAID_EVERY)
-        while thread.is_alive():
-            seconds = _Waited.seconds + time.monotonic() - started
-            log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
-            thread.join(SAID_EVERY)
-        _Waited.seconds += time.monotonic() - started
-    log.info("", extra={PASSING: True})
-    if errors:
-        raise errors[0]
-
-
-def compiling() -> bool:
-    """Whether the compiler is at work: a process that ends then must not clean up under its feet."""
-    return any(thread.name == COMPILER for thread in threading.enumerate())
 
 
 def _place() -> Path:

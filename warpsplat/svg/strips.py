@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,6 +10,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from warpsplat.errors import ImageError, Stopped
+from warpsplat.native import available_cores
 from warpsplat.svg.viewer import render_own, render_svg
 from warpsplat.svg.write import OUR_HEAD, resized
 
@@ -75,7 +75,7 @@ def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: b
 
     out = np.empty((height, width, 4), np.uint8)
     strips = list(rows_of(width, height))
-    with ThreadPoolExecutor(min(DRAWERS, os.cpu_count() or 1)) as drawers:
+    with ThreadPoolExecutor(min(DRAWERS, available_cores())) as drawers:
         try:
             for rows, part in zip(strips, drawers.map(strip, strips), strict=True):
                 out[rows] = part

@@ -89,7 +89,9 @@ def joined(left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8], one: Place
     return np.concatenate([left, gap, right], axis=1)
 
 
-def drawing(terminal: Terminal, pixels: npt.NDArray[np.uint8], one: Place, name: int) -> str:
+def drawing(
+    terminal: Terminal, pixels: npt.NDArray[np.uint8], one: Place, name: int, *, quick: bool = False
+) -> str:
     """What draws a picture, or two, from the cursor on, whose column is the first one.
 
     Args:
@@ -97,13 +99,14 @@ def drawing(terminal: Terminal, pixels: npt.NDArray[np.uint8], one: Place, name:
         pixels: what ``resized`` and ``joined`` make.
         one: place of the picture, or of the first one.
         name: see ``kitty``.
+        quick: rather than well.
     """
     if terminal.protocol == "blocks":
         lines = half_blocks(pixels, true_color=terminal.true_color)
         return ("\r\x1b[1B" if terminal.live else "\n").join(lines)
     picture = Image.fromarray(pixels)
     if terminal.protocol == "sixel":
-        return _packed(terminal, sixels(picture))
+        return _packed(terminal, sixels(picture, quick=quick))
     columns = picture.width // one.cell[0]
     picture.thumbnail((2 * LARGEST_SIDE, LARGEST_SIDE))
     if terminal.protocol == "kitty":

@@ -53,7 +53,7 @@ class Preview:
             return
         terminal = self._look()
         if terminal.live:
-            self._draw(progress.snapshot.image(), None, terminal)
+            self._draw(progress.snapshot.image(), None, terminal, quick=True)
         now = self._clock()
         before, self._cost = self._cost, now - begun
         wait = min(before, self._cost) * (1 / SHARE - 1)  # one that was held up says nothing of the next one
@@ -70,7 +70,9 @@ class Preview:
         """
         self._draw(image, source, self._look())
 
-    def _draw(self, image: FloatArray, source: FloatArray | None, terminal: Terminal) -> None:
+    def _draw(
+        self, image: FloatArray, source: FloatArray | None, terminal: Terminal, *, quick: bool = False
+    ) -> None:
         if terminal != self._terminal:  # another size: where the picture was nobody knows
             self._terminal, self._place = terminal, None
         one = place(terminal, image.shape[1], image.shape[0])
@@ -79,7 +81,7 @@ class Preview:
         pixels = resized(image, one.pixels)
         if source is not None and beside(terminal, one):
             pixels = joined(resized(source, one.pixels), pixels, one)
-        text = drawing(terminal, pixels, one, self._name)
+        text = drawing(terminal, pixels, one, self._name, quick=quick)
         if not terminal.live:
             self._write(text + "\n")
             return

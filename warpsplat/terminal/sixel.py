@@ -5,21 +5,23 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import numpy.typing as npt
 from PIL import Image
 
-COLORS = 256
-"""Registers that terminals have."""
+COLORS, FEW_COLORS = 256, 64
+"""Registers that terminals have; and those of a picture that is drawn quickly."""
 
 EMPTY = 63
 """The character of a column without a pixel; a pixel adds the bit of its row, the lowest for the top one."""
 
-RUN = re.compile(r"(.)\1{3,}", re.DOTALL)
+RUN = re.compile(r"(.)\1{3,}")
 """Columns that a count makes shorter."""
 
 
-def sixels(picture: Image.Image) -> str:
+def sixels(picture: Image.Image, *, quick: bool = False) -> str:
     """An RGB picture as a terminal draws it from the cursor on, pixel for pixel."""
-    drawn = picture.quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    number, method = (FEW_COLORS, Image.Quantize.FASTOCTREE) if quick else (COLORS, Image.Quantize.MEDIANCUT)
+    drawn = picture.quantize(number, method, dither=Image.Dither.NONE)
     width, height = drawn.size
     palette = np.array(drawn.getpalette(), np.float64).reshape(-1, 3)
     indices = np.asarray(drawn)
@@ -31,12 +33,15 @@ def sixels(picture: Image.Image) -> str:
     return f'\x1bP0;1q"1;1;{width};{height}{registers}{bands}\x1b\\'
 
 
-def _band(indices: np.ndarray) -> str:
+def _band(indices: npt.NDArray[np.uint8]) -> str:
     """Six rows: colour by colour, each from the left again."""
-    bits = np.left_shift(1, np.arange(len(indices)))
-    lines = []
-    for color in np.unique(indices).tolist():
-        columns = EMPTY + bits @ (indices == color)
-        text = columns.astype(np.uint8).tobytes().decode("ascii").rstrip(chr(EMPTY))
-        lines.append(f"#{color}" + RUN.sub(lambda run: f"!{len(run[0])}{run[1]}", text))
-    return "$".join(lines)
+    used, lines = np.unique(indices, return_inverse=True)
+    columns = np.arange(indices.shape[1])
+    characters = np.full((len(used), len(columns)), EMPTY, np.uint8)
+    for row, line in enumerate(lines.reshape(indices.shape)):
+        characters[line, columns] += 1 << row
+    texts = (line.tobytes().decode("ascii").rstrip(chr(EMPTY)) for line in characters)
+    return "$".join(
+        f"#{color}" + RUN.sub(lambda run: f"!{len(run[0])}{run[1]}", text)
+        for color, text in zip(used.tolist(), texts, strict=True)
+    )

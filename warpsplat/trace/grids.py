@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import cv2
@@ -14,6 +15,11 @@ Bools = npt.NDArray[np.bool_]
 
 NOBODY = -1
 """Label of a pixel that no region has."""
+
+
+def largest(values: Floats) -> Floats:
+    """Over the last axis, the few channels of pixels: NumPy's own maximum takes ten times as long."""
+    return functools.reduce(np.maximum, np.moveaxis(values, -1, 0))
 
 
 def linked_parts(across: Bools, down: Bools, inside: Bools) -> tuple[int, Ints]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, linked_parts
+from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, largest, linked_parts
 
 FLAT = 1.0
 """Largest step between neighbours of a flat region [levels of 255], besides noise."""
@@ -45,9 +45,9 @@ def _steps(image: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     right, below = np.diff(image, axis=1), np.diff(image, axis=0)
     bend_x = np.zeros(image.shape[:2], np.float32)
     bend_y = np.zeros(image.shape[:2], np.float32)
-    bend_x[:, 1:-1] = np.abs(np.diff(right, axis=1)).max(axis=2)
-    bend_y[1:-1] = np.abs(np.diff(below, axis=0)).max(axis=2)
-    return np.abs(right).max(axis=2), np.abs(below).max(axis=2), bend_x, bend_y
+    bend_x[:, 1:-1] = largest(np.abs(np.diff(right, axis=1)))
+    bend_y[1:-1] = largest(np.abs(np.diff(below, axis=0)))
+    return largest(np.abs(right)), largest(np.abs(below)), bend_x, bend_y
 
 
 def find_seeds(image: Floats, noise: float) -> tuple[int, Ints]:

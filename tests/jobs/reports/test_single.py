@@ -107,7 +107,8 @@ def plain() -> Tags:
 def test_nasty_names_and_titles(text: str, plain: Tags) -> None:
     titled = SVG.replace('id="far"', 'id="far" data-x="&lt;/script>"')
     made = warpsplat.report(titled, grain(), name=text, svg_name=text, command=text, device="cpu")
-    assert Tags(made).tags == plain.tags
+    # Each word of the command has an element of its own, so that lines end between them.
+    assert [tag for tag in Tags(made).tags if tag != "span"] == [tag for tag in plain.tags if tag != "span"]
     assert data_of(made)["svg"] == titled
 
 
@@ -159,6 +160,9 @@ def test_a_page_has_a_limit() -> None:
     noise = np.random.default_rng(0).random((300, 300, 3), np.float32)
     assert len(encoded(noise, 2000)) < 2000 * 4 / 3 + 40
     assert len(encoded_map(straight(noise), 2000)) < 2000 * 4 / 3 + 40
+    # Of the pictures, each stands in the page once.
+    pictures = re.findall(r"data:image/webp;base64,[\w+/=]+", warpsplat.report(SVG, grain(), device="cpu"))
+    assert len(pictures) == len(set(pictures)) == 2
     small = io.BytesIO()
     Image.fromarray(grain()).save(small, "JPEG", quality=5)
     made = warpsplat.report(SVG, small.getvalue(), device="cpu")

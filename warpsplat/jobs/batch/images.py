@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from warpsplat.errors import UsageError
+from warpsplat.files.marks import is_result
+from warpsplat.files.output import HEAD
 from warpsplat.files.remote import WILD, find_remote, is_remote, is_url, remote
 
 ENDINGS = (
@@ -66,8 +68,23 @@ def _found(name: str, base: Path) -> Iterator[Found]:
 
 
 def _is_image(path: Path) -> bool:
-    """Whether a file may be meant: not one that is hidden, nor a result."""
-    return path.is_file() and not path.name.startswith(".") and path.suffix not in (".svg", ".svgz")
+    """Whether a file may be meant: not one that is hidden, nor a result, of a batch where it is a PNG."""
+    if not path.is_file() or path.name.startswith("."):
+        return False
+    ending = path.suffix.lower()
+    return ending not in RESULTS and not (ending == ".png" and _is_result(path))
+
+
+RESULTS = (".svg", ".svgz", ".pdf")
+"""Endings of names of results that are no images."""
+
+
+def _is_result(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return is_result(file.read(HEAD))
+    except OSError:  # for the run to say
+        return False
 
 
 def _normal(path: Path, root: Path) -> Found:

@@ -6,17 +6,18 @@ import errno
 import os
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from warpsplat.errors import UsageError
-from warpsplat.files.output import SVG_ENDINGS, check_folder, check_target
+from warpsplat.files.output import check_folder, check_target
 from warpsplat.files.remote import check_remote, is_remote, is_url, remote
 from warpsplat.fit.settings import DEFAULT_QUALITY, Settings
 from warpsplat.jobs.batch.images import Found
 from warpsplat.jobs.batch.layers import Place
+from warpsplat.jobs.formats import ENDINGS, check_format
 from warpsplat.jobs.options import KINDS
 
 FIELD = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
@@ -42,7 +43,7 @@ class Wanted:
 
 def is_pattern(output: str) -> bool:
     """Whether an output says the name of a file, not that of a folder."""
-    return "{" in output or "}" in output or output.lower().endswith(SVG_ENDINGS)
+    return "{" in output or "}" in output or output.lower().endswith(ENDINGS)
 
 
 def root_of(output: Path) -> Path:
@@ -62,8 +63,8 @@ def fields_of(settings: Settings, given: Mapping[str, Any]) -> dict[str, Any]:
     return {**own, "quality": DEFAULT_QUALITY, **given}
 
 
-def name_results(wanted: Sequence[Wanted]) -> list[Path]:
-    """The path of each result; no two may have one, and none that of its image.
+def name_results(wanted: Sequence[Wanted], masks: Iterable[Path] = ()) -> list[Path]:
+    """The path of each result; no two may have one, and none that of an image, or of one of the ``masks``.
 
     Where a folder is all that is said, results have the image's name: of a.png and a.jpg in one folder with
     its ending.
@@ -86,10 +87,13 @@ def name_results(wanted: Sequence[Wanted]) -> list[Path]:
             outputs.append(filled_in(item))
         else:
             outputs.append(folder / f"{path.stem if stems[folder, path.stem] == 1 else path.name}.svg")
-        if _real(outputs[-1]) == _real(path):
-            raise item.place(f"output: {path} would be overwritten by its own result; give another one")
+    inputs = {_real(path) for path in (*(item.image.path for item in wanted), *masks)}
     counts = Counter(outputs)
     for item, output in zip(wanted, outputs, strict=True):
+        if (real := _real(output)) in inputs:
+            path = item.image.path
+            by = "its own result" if real == _real(path) else f"the result of {path}"
+            raise item.place(f"output: {output} would be overwritten by {by}; give another one")
         if counts[output] > 1:
             cause = f"{counts[output]} results would be {output}; give other outputs, as {LIKELY}"
             raise item.place(f"output: {cause}")
@@ -116,8 +120,9 @@ def filled_in(item: Wanted) -> Path:
         return text if found[1] == "folder" else text.replace("/", "_").replace(os.sep, "_")
 
     name = FIELD.sub(value, str(item.output))
-    if not name.lower().endswith(SVG_ENDINGS):
-        raise item.place(f"output: {name}: names of results end with {' or '.join(SVG_ENDINGS)}")
+    if not name.lower().endswith(ENDINGS):
+        known = f"{', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"
+        raise item.place(f"output: {name}: names of results end with {known}")
     return remote(name.replace("/./", "/")) if is_url(name) else Path(os.path.normpath(name))
 
 
@@ -136,13 +141,14 @@ def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
     """Find out before the work whether every result can be written.
 
     Raises:
-        UsageError: a folder that is none, cannot be written or cannot be made, a name that is too long, or a
-            result that is a folder, a pipe, a device or a loop of links.
+        UsageError: a folder that is none, cannot be written or cannot be made, a name that is too long, a
+            result that is a folder, a pipe, a device or a loop of links, or one that needs a package.
     """
     usable: set[Path] = set()
     for place, output in zip(places, outputs, strict=True):
         folder = output.parent
         try:
+            check_format(output)
             if is_remote(folder):
                 check_remote(folder)
                 continue

@@ -196,7 +196,7 @@ def _path(key: str, item: Value) -> Path:
 
 def _jobs(planned: list[_Planned]) -> list[Job]:
     wanted = [item.wanted for item in planned]
-    outputs = name_results(wanted)
+    outputs = name_results(wanted, {item.importance for item in planned if item.importance})
     check_outputs([item.place for item in wanted], outputs)
     return [
         Job(

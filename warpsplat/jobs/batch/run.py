@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 from warpsplat.errors import ImageError, OutputError
 from warpsplat.files.inputs import MAX_INPUT, read_input
+from warpsplat.files.marks import picture_key
 from warpsplat.files.output import GZIP, HEAD, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.jobs.batch.manifest import Entry, Manifest
@@ -21,7 +22,8 @@ from warpsplat.jobs.batch.plan import Job
 from warpsplat.jobs.batch.reports import Reports
 from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, ReportWish, Source, Stop, Task
 from warpsplat.jobs.executors.work import digest, failure, make_folder
-from warpsplat.jobs.vectorize import job_key
+from warpsplat.jobs.formats import is_picture
+from warpsplat.jobs.vectorize import STOPPED, job_key
 from warpsplat.svg.inspect import svg_text
 from warpsplat.svg.write import read_metadata
 
@@ -95,7 +97,8 @@ def standing(job: Job, key: str, manifest: Manifest) -> Standing:
     data = read_result(job.output)
     if data is not None:
         sum_ = digest(data)
-        known = [entry for entry in entries if entry.digest == sum_ and entry.event == "made"]
+        # What was about to be written and is there, is made.
+        known = [e for e in entries if e.digest == sum_ and (e.event == "made" or e.figures)]
         if known:
             return Standing(True, known[-1])
         if marked(data) == key or any(entry.digest == sum_ for entry in entries):
@@ -124,7 +127,9 @@ def marked(data: bytes) -> str:
             data = svg_text(data, "").encode()
         except ImageError:
             return ""
-    return read_metadata(data[:HEAD].decode("utf-8", "replace")) if data.endswith(TAIL) else ""
+    if data.endswith(TAIL):
+        return read_metadata(data[:HEAD].decode("utf-8", "replace"))
+    return picture_key(data)
 
 
 def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
@@ -244,8 +249,9 @@ class Batch:
     def _known(self, job: Job, key: str) -> Standing | None:
         """How a result stands; None if nothing is to be done, which was reported."""
         state = standing(job, key, self.manifest)
-        if state.made and state.entry and not (self._reports and self._reports.lacks(job.output)):
-            self._hear(Report(job, "skipped", state.entry.figures))
+        reported = not (self._reports and self._reports.lacks(job.output))
+        if state.made and (is_picture(job.output) or (state.entry and reported)):  # pictures are not measured
+            self._hear(Report(job, "skipped", state.entry.figures if state.entry else {}))
             return None
         if not state.made and state.entry and not self._retry:
             self._hear(Report(job, "failed", error=state.entry.error, before=True))
@@ -264,8 +270,9 @@ class Batch:
             job.device,
             self._threads,
             self._mask(job, found),
-            # What bears no mark is known by its digest, which must be noted before it is written.
-            bring=self._carry or away or job.settings.minify,
+            # What bears no mark is known by its digest, which must be noted before it is written; a picture
+            # is drawn once, for both.
+            bring=self._carry or away or job.settings.minify or is_picture(job.output),
             measure=measure,
             result=read_result(job.output) if measure and (away or self._carry) else None,
             report=self._report_wish(number),
@@ -315,6 +322,6 @@ class Batch:
         self._hear(Report(job, status, before.figures if before else outcome.figures, error))
 
     def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
-        figures = outcome.figures if event == "made" else {}
-        name = self.manifest.name(job.output)
-        self.manifest.append(Entry(name, outcome.key, event, outcome.digest, str(job.image), figures=figures))
+        name, image = self.manifest.name(job.output), str(job.image)
+        key = STOPPED if outcome.status == "stopped" else outcome.key  # ours, and no result of the job
+        self.manifest.append(Entry(name, key, event, outcome.digest, image, figures=outcome.figures))

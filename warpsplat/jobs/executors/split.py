@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from warpsplat.fit.settings import Settings
-from warpsplat.native import free_memory
-from warpsplat.rendering.backend import available_cores
+from warpsplat.native import available_cores, free_memory
 
 WORTH = 400_000
 """Shapes times steps of a batch from which processes save more than the seconds that they take to start."""

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from warpsplat.errors import OutputError, WarpsplatError, explain, printable
 from warpsplat.files.inputs import read_input
-from warpsplat.files.output import svg_bytes
 from warpsplat.files.remote import is_remote
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
+from warpsplat.jobs.formats import named_bytes
 from warpsplat.jobs.reports.command import vectorize_command
 from warpsplat.jobs.reports.single import Facts, report_page
-from warpsplat.jobs.vectorize import job_key, load_target, vectorize_image
+from warpsplat.jobs.vectorize import STOPPED, job_key, load_target, vectorize_image
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
@@ -89,7 +89,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
         if task.report and not result.stopped:
             line = vectorize_command(task.settings, task.name, task.output)
             made = _reported(task, image, result.svg, Facts.of(result, line), backend, own=True)
-    data = svg_bytes(output, result.svg)
+    data = named_bytes(output, result.svg, key=STOPPED if result.stopped else key)
     return replace(
         made,
         status="stopped" if result.stopped else "made",

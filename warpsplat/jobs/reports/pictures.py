@@ -22,6 +22,9 @@ Bytes = npt.NDArray[np.uint8]
 PAGE_PIXELS = 2_000_000
 """Most pixels of a picture on a page; of larger images a reduced copy is shown."""
 
+SHORT_PIXELS = 500_000
+"""The same after a run for which memory was short."""
+
 ROOM, ROOM_SHARE = 190_000, 1.5
 """Bytes that the pictures of a page may take: so many, and this share of the image's file. With what base64
 adds a page weighs no more than the SVG, twice the image and 400 kB."""
@@ -55,14 +58,14 @@ class Shown:
         return self.pixels.shape[:2] != (self.height, self.width)
 
 
-def shown_image(source: ImageSource, name: str | None) -> Shown:
-    """The image, smaller by a whole factor where it has more than ``PAGE_PIXELS``.
+def shown_image(source: ImageSource, name: str | None, most: int = PAGE_PIXELS) -> Shown:
+    """The image, smaller by a whole factor where it has more than ``most`` pixels.
 
     Raises:
         ImageError, TypeError: as ``image_of``.
     """
     facts = facts_of(source)
-    factor = max(1, math.ceil(math.sqrt(facts.width * facts.height / PAGE_PIXELS))) if facts else 1
+    factor = max(1, math.ceil(math.sqrt(facts.width * facts.height / most))) if facts else 1
     pixels = image_of(source, name, factor=factor)
     height, width = pixels.shape[:2]
     return Shown(pixels, facts.width if facts else width, facts.height if facts else height)

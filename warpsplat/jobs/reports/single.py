@@ -14,8 +14,10 @@ from warpsplat.files.sources import ImageSource, Readable, source_bytes
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.reports.pictures import (
     MOST_ERROR,
+    PAGE_PIXELS,
     ROOM,
     ROOM_SHARE,
+    SHORT_PIXELS,
     Shown,
     encoded,
     encoded_map,
@@ -94,7 +96,7 @@ def report_page(
     """
     if isinstance(image, (str, os.PathLike, Readable)):
         image = source_bytes(image)
-    shown = shown_image(image, name)
+    shown = shown_image(image, name, SHORT_PIXELS if facts.figures.get("reduced") else PAGE_PIXELS)
     height, width = shown.pixels.shape[:2]
     view = picture_view(svg)
     drawn = svg if view is None else with_view(svg, view)
@@ -137,6 +139,7 @@ def report_page(
         command=facts.command,
         levels=levels(facts.figures),
         listed=listed is not None,
+        joined=listed is not None and facts.figures.get("shapes") not in (None, len(listed.kinds)),
         why_not=why_not,
         data={"svg": svg, "view": view, "listing": listed.data() if listed else None, "name": svg_name},
     )

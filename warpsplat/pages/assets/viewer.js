@@ -26,6 +26,10 @@
         plane.style.width = `${this.width}px`;
         plane.style.height = `${this.height}px`;
       }
+      // Each picture is in the file once.
+      for (const image of root.querySelectorAll('.viewer-side[data-side="left"] img[src]')) {
+        this.set(image.dataset.name, image.src);
+      }
       for (const choice of root.querySelectorAll("select[data-side]")) {
         choice.addEventListener("change", () => this.show(choice.dataset.side, choice.value));
       }
@@ -45,7 +49,7 @@
     // Pictures.
 
     set(name, url) {
-      for (const image of this.images(name)) image.src = url;
+      for (const image of this.images(name)) if (image.src !== url) image.src = url;
     }
 
     images(name) {

@@ -1,0 +1,106 @@
+"""What is expected of a run's time: only that it goes on, and counts what there is."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.fit.test_goals import made
+from warpsplat.fit.constraints import Drawing
+from warpsplat.fit.costs import Course, score_cost
+from warpsplat.fit.drawing import Refinement
+from warpsplat.fit.goals import ROUNDS, rounds_left
+from warpsplat.fit.schedule import phases
+from warpsplat.fit.settings import Density, Settings, make_settings
+from warpsplat.fit.tidy import Costs, finish_drawing
+from warpsplat.fit.work import Progress
+from warpsplat.rendering.backend import Backend
+from warpsplat.scene import Kind
+from warpsplat.trace.trace import trace
+
+
+def course(settings: Settings, **more: Any) -> Course:
+    return replace(Course(settings, phases(settings, 768, 512)), **more)
+
+
+def test_a_course_goes_on_with_its_steps() -> None:
+    settings = make_settings(curves=64)
+    whole = course(settings)
+    costs = [whole.cost(step) for step in range(0, 1001, 10)]
+    assert costs[0] == 0
+    assert all(earlier < later for earlier, later in itertools.pairwise(costs))
+    assert costs[-1] == whole.cost()
+    late = course(settings, begin=800)
+    assert late.cost(800) == 0
+    assert late.cost() == pytest.approx(whole.cost() - whole.cost(800), rel=0.05)
+
+
+def test_what_is_done_besides_steps_counts() -> None:
+    settings = make_settings(curves=64)
+    plain = replace(settings, density=Density(interval=0), viewer=False)
+    cost = course(plain, finish=False).cost()
+    assert course(plain).cost() > cost, "a grid"
+    assert course(plain, thrifty=True).cost() > course(plain).cost()
+    assert course(replace(plain, viewer=True)).cost() > course(plain).cost(), "looks"
+    turns = replace(plain, density=Density(start=1.0, surplus=1.0))
+    assert course(turns, finish=False).cost() > cost, "surgery"
+    assert course(replace(turns, paint="auto"), finish=False).cost() > course(turns, finish=False).cost()
+    assert course(turns, serial=8).cost() > course(turns).cost(), "which one thread does"
+    assert course(plain, finish=False, serial=8).cost() == cost
+    assert course(plain, finish=False, ends=(16,)).cost() > cost, "an earlier level"
+
+
+def test_kinds_of_steps_have_costs_of_their_own() -> None:
+    kinds = (
+        {},
+        {"kind": Kind.STROKE},
+        {"renderer": "splat", "iterations": 1000},
+        {"renderer": "gaussian", "iterations": 1000},
+    )
+    costs = [course(make_settings(curves=64, **kind)).cost() for kind in kinds]
+    assert len(set(costs)) == len(costs)
+    assert costs[0] == min(costs)
+
+
+def test_measuring_takes_longer_with_eyes_and_beside_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
+    one, four = Backend.on("cpu", 1), replace(Backend.on("cpu", 1), threads=4)
+    cost = score_cost(100_000, 64, one, eyes=False)
+    assert score_cost(100_000, 64, one, eyes=True) > cost
+    assert score_cost(100_000, 64, four, eyes=False) == 4 * cost
+
+
+def test_rounds_that_are_left_follow_what_is_amiss() -> None:
+    settings = make_settings(curves=100, target_psnr=27.0)
+    scene = trace(np.zeros((32, 32, 3), np.float32)).scene
+
+    def left(*psnr: float) -> float:
+        return rounds_left([made(scene, 10_000 - i, each) for i, each in enumerate(psnr)], settings)
+
+    assert left(26.5) == ROUNDS
+    assert ROUNDS > left(27.4) > left(27.1) > left(27.05) > 0
+    assert left(27.4, 26.9) == left(27.4), "the one that will do counts"
+    size = make_settings(curves=100, max_bytes=10_000)
+    assert rounds_left([made(scene, 30_000, 27)], size) > rounds_left([made(scene, 10_500, 27)], size) > 1
+    assert rounds_left([made(scene, 1_000, 27)], size) > rounds_left([made(scene, 9_500, 27)], size) > 1
+
+
+def test_a_drawing_goes_on_while_its_grid_is_chosen() -> None:
+    image = np.ones((40, 40, 3), np.float32)
+    image[8:30, 6:34] = (0.9, 0.2, 0.1)
+    image[14:22, 12:20] = (0.1, 0.3, 0.8)
+    traced = trace(image)
+    drawing, backend = Drawing(traced.scene, traced.joints, traced.same), Backend.on("cpu", 1)
+    costs, told = Costs(image, drawing, backend), list[Progress]()
+    finish_drawing(image, drawing, backend, report=told.append)
+    assert 0.9 < told[-1].work <= 1
+    # Were the grid left out, the last stage would begin where the one before it ended.
+    ends = [now.work for now, later in itertools.pairwise(told) if later.step < now.step]
+    begins = [now.work for now in told if now.step == 10]
+    assert begins[-1] - ends[-1] > costs.grid() / (
+        costs.grid() + costs.refit(Refinement()) + 9 * costs.round()
+    )

@@ -1,0 +1,136 @@
+"""The gallery's list, files and records belong together; nothing is trained."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import click
+import pytest
+from PIL import Image
+
+from tests import ROOT
+from warpsplat.cli.main import cli
+from warpsplat.jobs.options import KINDS
+from warpsplat.svg.inspect import inspect_svg
+
+DOCS = ROOT / "docs"
+pytestmark = pytest.mark.skipif(
+    not (DOCS / "gallery" / "gallery.yaml").exists(), reason="source distributions are without the gallery"
+)
+
+MOST_BYTES = 5_000_000
+"""Of all that is kept of the gallery."""
+LONGEST = 512
+"""Side of an image [px]."""
+
+
+@pytest.fixture(scope="module")
+def gallery() -> Iterator[ModuleType]:
+    """The script, imported as the site's hooks import it."""
+    sys.path.insert(0, str(DOCS))
+    yield importlib.import_module("gallery")
+    sys.path.remove(str(DOCS))
+
+
+@pytest.fixture(scope="module")
+def listed(gallery: ModuleType) -> tuple[Any, ...]:
+    found: tuple[Any, ...] = gallery.entries()
+    return found
+
+
+def test_there_are_a_dozen_of_each_subject(gallery: ModuleType, listed: tuple[Any, ...]) -> None:
+    for subject in gallery.SUBJECTS:
+        assert sum(entry.subject == subject for entry in listed) >= 12
+    assert len({entry.name for entry in listed}) == len(listed)
+
+
+def test_each_image_has_an_author_a_licence_and_a_source(
+    gallery: ModuleType, listed: tuple[Any, ...]
+) -> None:
+    known = gallery.licences()
+    notices = (gallery.FOLDER / "NOTICES.txt").read_text("utf-8")
+    for entry in listed:
+        assert entry.title and entry.what and entry.author and entry.package
+        assert entry.licence in known
+        path = entry.image.relative_to(gallery.FOLDER).as_posix()
+        assert (path in notices) == (entry.licence == "MIT")
+
+
+def test_images_are_small_and_no_file_is_without_an_entry(
+    gallery: ModuleType, listed: tuple[Any, ...]
+) -> None:
+    for entry in listed:
+        with Image.open(entry.image) as image:
+            assert max(image.size) <= LONGEST, entry.name
+    files = {path for folder in ("images", "records") for path in (gallery.FOLDER / folder).rglob("*.*")}
+    assert files == {path for entry in listed for path in (entry.image, entry.svg, entry.record)}
+    assert sum(path.stat().st_size for path in files) < MOST_BYTES
+
+
+def test_records_belong_to_the_files(gallery: ModuleType, listed: tuple[Any, ...]) -> None:
+    for entry in listed:
+        record = entry.figures()
+        svg = entry.svg.read_bytes()
+        made_of = {**entry.inputs(), "svg": gallery.digest(svg)}
+        assert {key: record["made_of"][key] for key in made_of} == made_of, entry.name
+        assert record["bytes"] == len(svg)
+        assert record["shapes"] > 0
+        lengths = {len(column) for column in record["history"].values()}
+        assert len(lengths) == 1 and max(lengths) <= gallery.MOST_POINTS
+        inspect_svg(svg.decode())
+
+
+def test_subjects_are_what_the_gallery_shows(listed: tuple[Any, ...]) -> None:
+    for entry in listed:
+        assert entry.figures()["subject"] == entry.subject, entry.name
+
+
+def test_commands_say_the_settings(gallery: ModuleType, listed: tuple[Any, ...]) -> None:
+    command = cli.get_command(click.Context(cli), "vectorize")
+    assert command
+    for entry in listed:
+        _, name, image, *words = shlex.split(entry.command)
+        assert (name, image) == ("vectorize", entry.image.name)
+        given = command.make_context("vectorize", [str(entry.image), *words]).params
+        for key, value in entry.settings.items():
+            if key in KINDS:
+                assert given["kind"] == KINDS[key], entry.name
+            else:
+                assert given[key] == type(given[key])(value), (entry.name, key)
+
+
+def test_what_is_up_to_date(gallery: ModuleType, tmp_path: Path) -> None:
+    folder = tmp_path / "gallery"
+    image = folder / "images" / "photo" / "dot.png"
+    image.parent.mkdir(parents=True)
+    Image.new("RGB", (8, 8), "red").save(image)
+    words = {"subject": "photo", "name": "dot", "title": "a", "what": "b", "author": "c", "licence": "MIT"}
+    entry = gallery.Entry(**words, package="d", settings={"curves": 4}, folder=folder)
+    assert not gallery.is_current(entry, "code")
+    entry.svg.write_text("<svg/>")
+    entry.record.parent.mkdir(parents=True)
+    made_of = {**entry.inputs(), "code": "code", "svg": gallery.digest(b"<svg/>")}
+    entry.record.write_text(json.dumps({"made_of": made_of}))
+    assert gallery.is_current(entry, "code")
+    assert not gallery.is_current(entry, "other code")
+    others = gallery.Entry(**words, package="d", settings={"curves": 5}, folder=folder)
+    assert not gallery.is_current(others, "code")
+    entry.svg.write_text("<svg></svg>")
+    assert not gallery.is_current(entry, "code")
+
+
+def test_a_command_in_words(gallery: ModuleType, tmp_path: Path) -> None:
+    image = tmp_path / "images" / "line" / "a b.png"
+    image.parent.mkdir(parents=True)
+    image.touch()
+    settings = {"max_bytes": "1KB", "mixed": True, "background": "#fff"}
+    words = {"title": "", "what": "", "author": "", "licence": "", "package": ""}
+    entry = gallery.Entry("line", "a b", settings=settings, folder=tmp_path, **words)
+    assert entry.command == "warpsplat vectorize 'a b.png' --max-bytes 1KB --mixed --background '#fff'"

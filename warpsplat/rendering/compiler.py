@@ -1,0 +1,101 @@
+"""The thread that compiles kernels, and what is said while it does."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable
+
+from warpsplat.native import messages_hidden
+
+log = logging.getLogger(__name__)
+
+PASSING = "passing"
+"""Attribute of records that the next one takes the place of, and that an empty one removes."""
+
+SAID_EVERY = 1.0
+"""Seconds between two of them."""
+
+
+class _Task:
+    """What the compiler is to do, and what became of it."""
+
+    def __init__(self, work: Callable[[], None]) -> None:
+        self.work = work
+        self.error: BaseException | None = None
+        self.done = threading.Event()
+
+
+class _Compiler:
+    """One thread for all modules of a process.
+
+    Warp precompiles its headers anew in each thread that compiles, which takes as long as a dozen small
+    modules.
+    """
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        """How long the process has waited so far: modules are compiled one by one."""
+        self._latest: _Task | None = None
+        self._tasks: queue.SimpleQueue[_Task] = queue.SimpleQueue()
+        threading.Thread(target=self._serve, name="warpsplat compiler", daemon=True).start()
+
+    def _serve(self) -> None:
+        while True:
+            task = self._tasks.get()
+            try:
+                task.work()
+            except BaseException as error:  # raised again where it is waited for
+                task.error = error
+            task.done.set()
+
+    def ask(self, work: Callable[[], None]) -> _Task:
+        """Have ``work`` done when what was asked for before is."""
+        self._latest = task = _Task(work)
+        self._tasks.put(task)
+        return task
+
+    def is_busy(self) -> bool:
+        """Whether there is something left to do, say for a caller who was interrupted."""
+        return self._latest is not None and not self._latest.done.is_set()
+
+
+@functools.cache
+def _compiler() -> _Compiler:
+    """Started when it is first needed."""
+    return _Compiler()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_compiler.cache_clear)  # threads do not survive a fork
+
+
+@functools.cache
+def _announce() -> None:
+    """Say why nothing seems to happen; a process says it once for all its modules."""
+    log.info("compiling kernels, which is done once and takes up to a minute")
+
+
+def compile_by(work: Callable[[], None]) -> None:
+    """Have the compiler do ``work``, so that Ctrl-C need not wait for it, and say how long it takes."""
+    _announce()
+    compiler = _compiler()
+    with messages_hidden():
+        started = time.monotonic()
+        task = compiler.ask(work)
+        while not task.done.wait(SAID_EVERY):
+            seconds = compiler.seconds + time.monotonic() - started
+            log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
+        compiler.seconds += time.monotonic() - started
+    log.info("", extra={PASSING: True})
+    if task.error:
+        raise task.error
+
+
+def compiling() -> bool:
+    """Whether the compiler is at work: a process that ends then must not clean up under its feet."""
+    return _compiler.cache_info().currsize > 0 and _compiler().is_busy()

@@ -1,0 +1,95 @@
+"""What there is to see of a run that goes on: how far it is, and now and then its picture."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from warpsplat.api import save_svg
+from warpsplat.fit.work import Progress, Snapshot
+
+SHARE = 0.07
+"""Of a run's time that pictures of it may take: with all the rest a page costs less than a tenth."""
+
+LEAST_PAUSE = 0.4
+"""From one picture to the next [s]."""
+
+
+class Live:
+    """The callback of a run. The worker's thread writes, others read: each field is replaced as a whole."""
+
+    def __init__(
+        self,
+        is_watched: Callable[[], bool] = lambda: True,
+        changed: Callable[[], None] = lambda: None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Nothing was heard yet.
+
+        Args:
+            is_watched: whether anybody looks: without, no picture is made.
+            changed: called when there is something new to tell.
+            clock: [s]
+        """
+        self._is_watched, self._changed, self._clock = is_watched, changed, clock
+        self._first: tuple[float, float] | None = None
+        self._next = -math.inf
+        self._started = clock()
+        self.progress: Progress | None = None
+        self.left: float | None = None
+        """What the rest takes if it goes on as it did since the first report [s]."""
+        self.picture = b""
+        """The shapes, as an SVG."""
+        self.number = 0
+        """Of pictures so far."""
+        self.note = ""
+        """What the library has to say, as that kernels are being compiled."""
+
+    def begin(self) -> None:
+        """Note that the run's turn has come."""
+        self._started = self._clock()
+
+    def __call__(self, progress: Progress) -> None:
+        """Hear a report."""
+        now = self._clock()
+        self._first = self._first or (now, progress.work)
+        done = progress.work - self._first[1]
+        self.left = (now - self._first[0]) / done * (1 - progress.work) if done > 0 else None
+        self.note = ""
+        snapshot = progress.snapshot
+        self.progress = replace(progress, snapshot=None)  # which keeps a run's arrays
+        if snapshot and now >= self._next and self._is_watched():
+            self._draw(snapshot, now)
+        self._changed()
+
+    def say(self, text: str) -> None:
+        """Hear what the library has to say."""
+        self.note = text
+        self._changed()
+
+    def _draw(self, snapshot: Snapshot, now: float) -> None:
+        """Take a picture, and find out when there is time for the next one."""
+        self.picture = save_svg(snapshot.scene()).encode()
+        self.number += 1
+        done = self._clock()
+        self._next = done + max(LEAST_PAUSE, (done - now) * (1 / SHARE - 1))
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        seconds = self._clock() - self._started
+        if self.progress is None:
+            return {"work": 0.0, "note": self.note, "seconds": round(seconds, 1)}
+        psnr = self.progress.psnr
+        return {
+            "work": round(self.progress.work, 4),
+            "psnr": round(psnr, 2) if math.isfinite(psnr) else None,
+            "fine": self.progress.fine,
+            "shapes": self.progress.shapes,
+            "seconds": round(seconds, 1),
+            "left": None if self.left is None else round(self.left, 1),
+            "pictures": self.number,
+            "note": self.note,
+        }
