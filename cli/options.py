@@ -124,7 +124,7 @@ def flag(option: Option, *, several: bool = False) -> Callable[[Function], Funct
         )
     if option.type is bool:
         return click.option(f"--{option.name}", is_flag=True, default=None, help=shown)
-    kind = click.Choice(option.choices) if option.choices else option.type
+    kind: click.ParamType | type = click.Choice(option.choices) if option.choices else option.type
     if option.name == "curves":
         kind = Numbers(several=several)
     return click.option(f"--{option.name}", type=kind, metavar=option.metavar or None, help=shown)

@@ -576,7 +576,7 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
 
 
 def report(
-    result: Result | SvgSource | Sequence[Result],
+    result: Result | SvgSource | list[Result] | tuple[Result, ...],
     image: ImageSource,
     output: str | os.PathLike[str] | None = None,
     *,
@@ -612,7 +612,7 @@ def report(
     """
     name = name or Path(source_name(image)).name
     svg_name = svg_name or Path(name).with_suffix(".svg").name
-    if isinstance(result, Sequence) and not isinstance(result, (str, bytes, bytearray, memoryview)):
+    if isinstance(result, (list, tuple)):
         versions = versions_of(result, svg_name)
         made = several_page(versions, image, name=name, command=command)
         if output is not None:

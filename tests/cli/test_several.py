@@ -15,6 +15,8 @@ from tests.cli.helpers import one_line, run
 from warpsplat.cli.main import main
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.suggest import Suggestion, suggestion
+from warpsplat.scene import FloatArray
+from warpsplat.trace.trace import Traced, trace
 
 FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
 
@@ -138,7 +140,7 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
 
 def test_the_library_names_the_function_for_several(image: Path) -> None:
     with pytest.raises(warpsplat.UsageError, match=r"vectorize_several\(image, \[3, 9\]\)"):
-        warpsplat.vectorize(image, [3, 9])  # type: ignore[arg-type]
+        warpsplat.vectorize(image, [3, 9])
     with pytest.raises(warpsplat.UsageError, match="2 numbers of shapes and 1 outputs"):
         warpsplat.vectorize_several(image, [3, 9], outputs=["a.svg"])
 
@@ -146,15 +148,17 @@ def test_the_library_names_the_function_for_several(image: Path) -> None:
 def test_a_drawing_that_has_fewer_regions_is_traced_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from warpsplat.jobs import subjects
-
     levels = np.full((48, 48, 3), 250, np.uint8)
     levels[8:30, 8:30], levels[20:40, 20:44] = (200, 30, 30), (20, 80, 160)
     path = tmp_path / "drawing.png"
     Image.fromarray(levels).save(path)
     calls: list[object] = []
-    trace = subjects.trace
-    monkeypatch.setattr(subjects, "trace", lambda *a, **k: calls.append(k) or trace(*a, **k))
+
+    def noted(image: FloatArray, *, most: int | None = None) -> Traced:
+        calls.append(most)
+        return trace(image, most=most)
+
+    monkeypatch.setattr("warpsplat.jobs.subjects.trace", noted)
     settings = warpsplat.make_settings(subject="drawing")
     few, many, most = warpsplat.vectorize_several(path, [1, 9, 99], settings=settings, device="cpu")
     assert len(calls) == 2, "what 9 limit as little as 99 do is made once"

@@ -34,8 +34,9 @@ class Start:
     """What a fit goes on from."""
 
     scene: Scene
-    past: Past
-    begin: int
+    past: Past | None = None
+    """None: the shapes are as new, and their number stays."""
+    begin: int = 0
     """Step of its schedule that it begins at."""
 
 

@@ -17,7 +17,7 @@ from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.rounding import USUAL_GRID, finest
 from warpsplat.fit.schedule import phases
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import Density, Settings
 from warpsplat.fit.state import Past
 from warpsplat.fit.work import Meter, Progress, Report
 from warpsplat.rendering.backend import Backend
@@ -179,8 +179,9 @@ def expected_gain(psnr: float, lacking: float) -> float:
 
 def _growing(settings: Settings, most: int) -> Settings:
     """A fit on the reduced image whose shapes grow all the way, geometrically, without a surplus."""
-    all_the_way = {"surplus": 1.0, "grown": 1.0, "thin": 1.0, "stop": 1.0, "interval": INTERVAL}
-    density = replace(settings.density, start=FEWEST / most, **all_the_way)
+    all_the_way = dict.fromkeys(("surplus", "grown", "thin", "stop"), 1.0)
+    density = replace(settings.density, start=FEWEST / most, interval=INTERVAL)
+    density = Density(**{**vars(density), **all_the_way})
     return replace(settings, curves=most, simplify=False, iterations=STEPS, coarse=1.0, density=density)
 
 
