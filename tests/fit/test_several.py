@@ -56,7 +56,7 @@ def test_shapes_go_on_with_their_past() -> None:
     fit(image, first, backend, report=series.watch(4, seen.append))
     assert [p.work for p in seen] == sorted(p.work for p in seen) and seen[-1].work < 0.7
     second, start = series.next(8)
-    assert start is not None
+    assert start is not None and start.past is not None
     assert start.begin == begin_of(second, 6) > 0
     assert len(start.scene) == round(1.5 * 4), "the surplus, before it is thinned"
     assert start.past.ages.max() >= 0.6 * settings.iterations
@@ -83,7 +83,7 @@ def test_without_a_past_shapes_take_large_steps() -> None:
     series = Series(settings, (4, 8), image.shape[1], image.shape[0], backend)
     fit(image, series.next(4)[0], backend, report=series.watch(4, None))
     _, start = series.next(8)
-    assert start is not None
+    assert start is not None and start.past is not None
 
     def moved(known: bool) -> float:
         chosen = make_settings(curves=6, iterations=60, density={"interval": 0}, coarse_pixels=400)
