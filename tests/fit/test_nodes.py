@@ -15,7 +15,7 @@ from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
 from warpsplat.fit.tidy import Judge, apart, by_cell, finish_drawing, tidied, within
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import Renderer, render
+from warpsplat.rendering.renderer import Capacity, Renderer, render
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
@@ -145,9 +145,12 @@ def test_a_drawing_like_the_last_one_needs_no_second_renderer(
     judge = Judge(target, backend)
     built: list[None] = []
     build = Renderer._build
-    monkeypatch.setattr(
-        Renderer, "_build", lambda self, capacity: built.append(None) or build(self, capacity)
-    )
+
+    def counted(renderer: Renderer, capacity: Capacity) -> None:
+        built.append(None)
+        build(renderer, capacity)
+
+    monkeypatch.setattr(Renderer, "_build", counted)
     first = judge.errors(made)
     before = len(built)
     np.testing.assert_array_equal(judge.errors(made), first)
