@@ -28,7 +28,7 @@ ROUNDS, FEWEST_ROUNDS = 16, 4
 """In which candidates are tried, at the most, and what is left of that for large pictures."""
 
 ROUND_PIXELS = 26_000_000
-"""Pixels that the rounds look at together: those of a larger picture take more, and the first ones find most."""
+"""Pixels that all rounds look at together: each takes as long as the picture is large, the first find most."""
 
 POINTS_A_ROUND = 110
 """Of a traced drawing: how many rounds there will be, as progress is shown."""
