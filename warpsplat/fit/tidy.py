@@ -28,7 +28,7 @@ ROUNDS, FEWEST_ROUNDS = 16, 4
 """In which candidates are tried, at the most, and what is left of that for large pictures."""
 
 ROUND_PIXELS = 26_000_000
-"""Pixels that all rounds look at together: each takes as long as the picture is large, the first find most."""
+"""Pixels that all rounds together look at: of a large picture each takes long, and the first find most."""
 
 POINTS_A_ROUND = 110
 """Of a traced drawing: how many rounds there will be, as progress is shown."""
