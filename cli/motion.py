@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -159,7 +160,12 @@ class Motion:
         if what == "training" and not self.recorder.has_training:
             say(f"warpsplat: {self.animation}: no training to show, so it shows the drawing", err=True)
             what = "drawing"
-        size = self.recorder.save(self.animation, result, what=what, width=self.width)
+        log = logging.getLogger("warpsplat")
+        log.info(f"{self.animation}: pictures of the {what} ...", extra={"passing": True})
+        try:
+            size = self.recorder.save(self.animation, result, what=what, width=self.width)
+        finally:
+            log.info("", extra={"passing": True})
         if not quiet:
             say(f"warpsplat: {self.animation}: animation of the {what}, {size:,} bytes", err=True)
 

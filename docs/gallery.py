@@ -79,6 +79,11 @@ class Entry:
         return self.folder / "records" / self.subject / f"{self.name}.json"
 
     @property
+    def report(self) -> str:
+        """Where the site has its report, below the gallery's pages."""
+        return f"reports/{self.name}.html"
+
+    @property
     def command(self) -> str:
         """The line of a shell that makes the SVG."""
         words = ["warpsplat", "vectorize", self.image.name]

@@ -23,7 +23,8 @@ LEGENDS = {
 }
 """Of each subject: its heading, and what is made of it."""
 
-PHONE_COLUMNS = 36
+PHONE_COLUMNS = 38
+"""Of a command, as wide as a phone shows it."""
 
 INTRODUCTION = """# Gallery
 
@@ -75,14 +76,13 @@ def index(listed: Sequence[Entry]) -> str:
 
 def card(entry: Entry) -> str:
     """An image beside its SVG, with the command and its figures."""
-    report = f"reports/{entry.name}.html"
     credit = f"Image: {entry.author}, [{entry.licence}]({licences()[entry.licence]})"
     return f"""<div class="card" markdown>
 ### {entry.title} {{ #{entry.name} }}
 
 <div class="pair" markdown>
-[{picture(entry, "image")}]({report}){{ title="Compare" }}
-[{picture(entry, "svg")}]({report}){{ title="Compare" }}
+[{picture(entry, "image")}]({entry.report}){{ title="Compare" }}
+[{picture(entry, "svg")}]({entry.report}){{ title="Compare" }}
 </div>
 
 {entry.what}
@@ -91,7 +91,7 @@ def card(entry: Entry) -> str:
 {folded(entry.command)}
 ```
 
-{" · ".join(figures(entry))} · [report]({report})
+{" · ".join(figures(entry))} · [report]({entry.report})
 {{ .figures }}
 
 {credit}{", " + entry.changes if entry.changes else ""}

@@ -17,12 +17,7 @@ def reports() -> dict[str, str]:
     """Pages by their names, below ``docs``."""
     start_warp()
     backend = Backend.on("cpu")
-    return {path_of(entry): report(entry, backend) for entry in entries()}
-
-
-def path_of(entry: Entry) -> str:
-    """Where the report of an entry lies, below ``docs``."""
-    return f"gallery/reports/{entry.name}.html"
+    return {f"gallery/{entry.report}": report(entry, backend) for entry in entries()}
 
 
 def report(entry: Entry, backend: Backend) -> str:
@@ -35,7 +30,7 @@ def report(entry: Entry, backend: Backend) -> str:
         Facts(figures, history(entry), entry.command),
         name=entry.image.name,
         svg_name=entry.svg.name,
-        back=f"../{entry.subject}/#{entry.name}",
+        back=f"../{entry.subject}/",
     )
     return made.text
 

@@ -89,6 +89,8 @@ def _image_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
     if rng.random() < 0.15:
         kind = rng.choice(FITS)
         fit = ("vectorize", name, "-o", "out.svg", *kind, *QUICK)
+        if rng.random() < 0.2:
+            fit = (*fit, "--report", "out.html")
         commands.append(Command(fit, (INPUT, USAGE, MISSED), "out.svg"))
     if rng.random() < 0.05:
         refine = ("refine", GOOD_SVG, name, "-o", "out2.svg", "--iterations", "1", "--device", "cpu")
@@ -108,6 +110,9 @@ def _svg_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
         Command(("eval", GOOD_IMAGE, name), (INPUT,)),
         Command(refine, (INPUT,), "out.svg"),
     )
+    if rng.random() < 0.1:
+        report = ("eval", GOOD_IMAGE, name, "--report", "out.html")
+        return (*all_of_them, Command(report, (INPUT,), "out.html"))
     return all_of_them
 
 

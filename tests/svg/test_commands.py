@@ -111,11 +111,11 @@ def test_work_for_a_ring_grows_with_its_segments(monkeypatch: pytest.MonkeyPatch
     asked: list[Segment] = []
     found = commands._ways
 
-    def counted(segment: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
-        asked.append(segment)
-        return found(segment, mirrored)
+    def noted(one: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
+        asked.append(one)
+        return found(one, mirrored)
 
-    monkeypatch.setattr(commands, "_ways", counted)
+    monkeypatch.setattr(commands, "_ways", noted)
     for count in (20, 80):
         asked.clear()
         shortest_ring(None, segments(5, count))

@@ -105,6 +105,9 @@ LINES = {
     "joins": '<g stroke="red" stroke-width="4" fill="none"><path d="M4 8l8 16 8-16"/>'
     '<path d="M22 8l3 16 3-16" stroke-linejoin="bevel"/><path d="M31 8l3 16 3-16z" '
     'stroke-miterlimit="9"/></g>',
+    "beyond float32": '<path d="M4 8l8 16 8-16" fill="none" stroke="red" stroke-width="4" '
+    'stroke-miterlimit="1e308"/><path d="M20 8l8 16 8-16" fill="none" stroke="red" stroke-width="4" '
+    'stroke-dasharray="1e39 3"/>',
     "dashes": '<path d="M4 6h30l-9 20z" fill="#ffc" stroke="red" stroke-width="3" '
     'stroke-dasharray="5%, 2 1" stroke-dashoffset="-2"/>',
     "no dashes": '<path d="M4 8h30" stroke="red" stroke-width="4" stroke-dasharray="3 -1"/>'

@@ -166,10 +166,13 @@ def _line(style: Style, place: Place) -> Line | None:
         width * scale,
         CAPS.get(style["stroke-linecap"], Cap.BUTT),
         JOINS.get(style["stroke-linejoin"], Join.MITER),
-        max(float(limit), 1.0) if NUMBER.fullmatch(limit) else 4.0,
-        tuple(scale * value for value in (offset, *dashes)) if dashes else (),
+        min(max(float(limit), 1.0), LONGEST) if NUMBER.fullmatch(limit) else 4.0,
+        tuple(min(scale * value, LONGEST) for value in (offset, *dashes)) if dashes else (),
     )
 
+
+LONGEST = 1e9
+"""Miter limits and dashes [px] beyond are as this: no miter and no outline is as long."""
 
 CAPS = {"round": Cap.ROUND, "square": Cap.SQUARE}
 JOINS = {"round": Join.ROUND, "bevel": Join.BEVEL}
