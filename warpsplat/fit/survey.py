@@ -180,7 +180,7 @@ def expected_gain(psnr: float, lacking: float) -> float:
 
 
 def share_of_gain(plan: Sequence[Phase]) -> float:
-    """How much of the gain there is where the survey's image is the first size of a run, and the last its own."""
+    """How much of the gain there is by ``plan``: of the first size is the survey, of the last the run."""
     first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
     return SMALL + (1 - SMALL) * min(math.log(last / first) / math.log(LARGE), 1.0)
 
