@@ -105,6 +105,7 @@ def run(task: Task) -> None:
     if task.moment:
         _lay_trip(task)
     if task.file_size:
+        sys.dont_write_bytecode = True  # Python itself would leave half a file in the cache of a module
         resource.setrlimit(resource.RLIMIT_FSIZE, (task.file_size, task.file_size))
     if not task.rights and os.geteuid() == 0:
         os.setgroups([])
