@@ -90,14 +90,14 @@ class Motion:
         """Take the values of ``motion_options`` out of those of a command."""
         return cls(*(given.pop(name) for name in OPTIONS))
 
-    def for_several(self) -> None:
-        """Of several images.
+    def for_several(self, takes: str = "one image") -> None:
+        """Of several images, or where there is no single run to show: messages say what the wishes take.
 
         Raises:
             UsageError: the command line has wishes.
         """
         if self.animation or self.protocol:
-            raise UsageError(f"{'--animate' if self.animation else '--preview'} takes one image")
+            raise UsageError(f"{'--animate' if self.animation else '--preview'} takes {takes}")
 
     def check(self, *files: Path, overwrite: bool) -> None:
         """Find out before the work whether the animation can be made, beside other ``files`` of the run.

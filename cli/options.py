@@ -5,6 +5,8 @@ Those that decide the result come from ``warpsplat.jobs.options``; one that is n
 
 from __future__ import annotations
 
+import functools
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -83,8 +85,37 @@ def voice_options(function: Function) -> Function:
     return function
 
 
-def flag(option: Option) -> Callable[[Function], Function]:
-    """The flag of an option of the table."""
+class Numbers(click.ParamType):
+    """A number of shapes, or several: ``512`` or ``50,200,1000``."""
+
+    name = "N[,N]"
+
+    def __init__(self, *, several: bool) -> None:
+        """``several``: whether the command takes them; else it says which one does."""
+        self._several = several
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int | tuple[int, ...]:
+        """One number is a number, several are a tuple."""
+        if isinstance(value, (int, tuple)):
+            return value
+        words = str(value).split(",")
+        if not all(re.fullmatch(r"[+-]?\d{1,18}", word.strip(), re.ASCII) for word in words):
+            self.fail(f"{value!r} is not a whole number, nor several as 50,200,1000", param, ctx)
+        numbers = tuple(int(word) for word in words)
+        if len(numbers) == 1:
+            return numbers[0]
+        if not self._several:
+            numbers_of = ", ".join(map(str, numbers))
+            self.fail(
+                f"takes one number here; in a batch file, matrix: {{curves: [{numbers_of}]}}", param, ctx
+            )
+        return numbers
+
+
+def flag(option: Option, *, several: bool = False) -> Callable[[Function], Function]:
+    """The flag of an option of the table; ``several``: whether there may be several numbers of shapes."""
     shown = f"{option.help}  [default: {option.default}]" if option.default else option.help
     if option.kind is not None:
         shown = f"{option.help}  [default]" if option.default else option.help
@@ -93,15 +124,20 @@ def flag(option: Option) -> Callable[[Function], Function]:
         )
     if option.type is bool:
         return click.option(f"--{option.name}", is_flag=True, default=None, help=shown)
-    kind = click.Choice(option.choices) if option.choices else option.type
+    kind: click.ParamType | type = click.Choice(option.choices) if option.choices else option.type
+    if option.name == "curves":
+        kind = Numbers(several=several)
     return click.option(f"--{option.name}", type=kind, metavar=option.metavar or None, help=shown)
 
 
-def quality_options(function: Function) -> Function:
-    """What decides the result."""
+def quality_options(function: Function, *, several: bool = False) -> Function:
+    """What decides the result; ``several``: see ``flag``."""
     for option in reversed(OPTIONS):
-        function = flag(option)(function)
+        function = flag(option, several=several)(function)
     return function
+
+
+several_quality_options = functools.partial(quality_options, several=True)
 
 
 def run_options(function: Function) -> Function:

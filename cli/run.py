@@ -6,13 +6,13 @@ import contextlib
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from warpsplat.api import vectorize
+from warpsplat.api import suggest, vectorize, vectorize_several
 from warpsplat.cli.motion import Motion
 from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
@@ -20,6 +20,7 @@ from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.work import Progress
+from warpsplat.jobs.suggest import Suggestion
 from warpsplat.jobs.vectorize import Result
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.scene import Kind
@@ -137,19 +138,87 @@ def run_file(
             **keeping,
         )
         motion.show(result, data)
+    if not quiet:
+        say_about(source, settings, result, verbose=verbose)
+    return result
+
+
+def run_several(
+    source: Path,
+    outputs: Sequence[Path],
+    numbers: Sequence[int],
+    settings: Settings,
+    *,
+    data: bytes,
+    device: str,
+    threads: int | None,
+    importance: Path | None = None,
+    verbose: int = 0,
+    quiet: bool = False,
+) -> tuple[Result, ...]:
+    """``warpsplat.vectorize_several`` of the bytes ``data`` of ``source``, with one bar, until Ctrl-C."""
+    start_warp()
+    chosen = choose_device(device)
+    if verbose:
+        say(f"{source}: {', '.join(map(str, numbers))} {PLURALS[settings.kind]} on {chosen}", err=True)
+    interrupt = Interrupt()
+    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
+        return vectorize_several(
+            data,
+            numbers,
+            settings=settings,
+            outputs=outputs,
+            device=device,
+            threads=threads,
+            name=input_name(source),
+            importance=importance,
+            callback=report,
+            stop=interrupt,
+        )
+
+
+def suggest_file(
+    source: Path,
+    settings: Settings,
+    *,
+    data: bytes,
+    device: str,
+    threads: int | None,
+    importance: Path | None = None,
+    verbose: int = 0,
+    quiet: bool = False,
+) -> Suggestion | None:
+    """``warpsplat.suggest`` for the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
+    start_warp()
+    choose_device(device)
+    interrupt = Interrupt()
+    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
+        return suggest(
+            data,
+            settings=settings,
+            device=device,
+            threads=threads,
+            name=input_name(source),
+            importance=importance,
+            callback=report,
+            stop=interrupt,
+        )
+
+
+def say_about(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
+    """Say what the image was taken for, and what else happened that one might not expect."""
+    pursued = settings.target_psnr or settings.max_bytes
     count = len(result.scene)
     traced = result.subject != "photo"
-    if result.why and not quiet and (traced or verbose):
+    if result.why and (traced or verbose):
         other = "; --subject photo fits translucent shapes" if traced else ""
         taken = f"taken for a {SUBJECTS[result.subject]}"
         say(f"warpsplat: {input_name(source)}: {taken}: {result.why}{other}", err=True)
-    if not traced and settings.simplify and not pursued and count < settings.curves and not quiet:
+    if not traced and settings.simplify and not pursued and count < settings.curves:
         hint = f"a simple image: {count} shapes; --curves N for another number"
         say(f"warpsplat: {input_name(source)}: {hint}", err=True)
-    if not quiet:
-        say_reduced(input_name(source), result)
-        say_renewed(input_name(source), result)
-    return result
+    say_reduced(input_name(source), result)
+    say_renewed(input_name(source), result)
 
 
 def say_reduced(name: str, result: Result) -> None:

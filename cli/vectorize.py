@@ -15,11 +15,12 @@ from warpsplat.cli.options import (
     checkpoint_options,
     importance_option,
     overwrite_option,
-    quality_options,
     run_options,
+    several_quality_options,
 )
 from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.say import say
+from warpsplat.cli.suggest import suggest_number, suggest_option
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
@@ -31,11 +32,11 @@ from warpsplat.jobs.options import settings_from
     "-o",
     "--output",
     type=FILE,
-    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder."
-    "  [default: IMAGE with .svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder, of several numbers of"
+    " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@quality_options
+@several_quality_options
 @importance_option
 @checkpoint_options
 @motion_options
@@ -45,6 +46,7 @@ from warpsplat.jobs.options import settings_from
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@suggest_option
 def command(
     images: tuple[Path, ...],
     output: Path | None,
@@ -57,6 +59,7 @@ def command(
     quiet: bool,
     as_uri: bool,
     as_json: bool,
+    suggest: bool,
     checkpoint: Path | None,
     resume: bool,
     checkpoint_every: str,
@@ -66,10 +69,32 @@ def command(
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
     against the image, number of paths, size. They go to stderr where the SVG
-    goes to stdout. Several images are made as batch makes them.
+    goes to stdout. Several images are made as batch makes them. Several numbers
+    of shapes (--curves 50,200,1000) make a file each, and share work.
     """
     motion = Motion.of(given)
+    if suggest:
+        motion.for_several("a run that makes a file")
+        if len(images) > 1 or output or report or as_uri or checkpoint or resume:
+            raise UsageError("--suggest takes one image, and writes nothing")
+        suggest_number(
+            images[0],
+            given,
+            importance=importance,
+            device=device,
+            threads=threads,
+            quiet=quiet,
+            verbose=verbose,
+            as_json=as_json,
+        )
+        return
+    numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
     if len(images) > 1:
+        if numbers:
+            raise UsageError(
+                "several images, each with several numbers of shapes: a batch file, with "
+                f"matrix: {{curves: {list(numbers)}}}"
+            )
         motion.for_several()
         device_given = None if device == "auto" else device
         several(
@@ -81,6 +106,28 @@ def command(
         )
         return
     image = images[0]
+    if numbers:
+        motion.for_several("one number of shapes")
+        if as_uri or checkpoint or resume:
+            flag = "--data-uri" if as_uri else "--checkpoint" if checkpoint else "--resume"
+            raise UsageError(f"several numbers of shapes and {flag} do not go together")
+        from warpsplat.cli.several import make_several
+
+        make_several(
+            image,
+            output,
+            numbers,
+            given,
+            importance=importance,
+            overwrite=overwrite,
+            report=report,
+            device=device,
+            threads=threads,
+            verbose=verbose,
+            quiet=quiet,
+            as_json=as_json,
+        )
+        return
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import check_output

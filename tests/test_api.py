@@ -216,8 +216,9 @@ def test_threads_do_not_disturb_each_other(device: str) -> None:
 def test_what_is_public_is_there_and_light() -> None:
     public = {
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
-        *("starting_scene", "load_image", "report"),
+        *("starting_scene", "load_image", "report", "vectorize_several", "suggest", "Recorder"),
         *("Result", "Score", "Progress", "Snapshot", "Settings", "Scene", "Canvas", "__version__"),
+        *("Suggestion", "Expected"),
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }
     assert set(warpsplat.__all__) == public == set(dir(warpsplat))

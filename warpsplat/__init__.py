@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from warpsplat.api import save_svg as save_svg
     from warpsplat.api import score as score
     from warpsplat.api import starting_scene as starting_scene
+    from warpsplat.api import suggest as suggest
     from warpsplat.api import vectorize as vectorize
+    from warpsplat.api import vectorize_several as vectorize_several
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
     from warpsplat.errors import ResourceError as ResourceError
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from warpsplat.fit.work import Progress as Progress
     from warpsplat.fit.work import Snapshot as Snapshot
     from warpsplat.jobs.render import to_pillow as to_pillow
+    from warpsplat.jobs.suggest import Expected as Expected
+    from warpsplat.jobs.suggest import Suggestion as Suggestion
     from warpsplat.jobs.vectorize import Result as Result
     from warpsplat.metrics import Score as Score
     from warpsplat.motion.recorder import Recorder as Recorder
@@ -41,7 +45,7 @@ _HOMES = {
     **dict.fromkeys(
         (
             *("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "report"),
-            "starting_scene",
+            *("starting_scene", "vectorize_several", "suggest"),
         ),
         "warpsplat.api",
     ),
@@ -55,6 +59,7 @@ _HOMES = {
     "to_pillow": "warpsplat.jobs.render",
     "Result": "warpsplat.jobs.vectorize",
     "Score": "warpsplat.metrics",
+    **dict.fromkeys(("Expected", "Suggestion"), "warpsplat.jobs.suggest"),
 }
 """Where each name comes from. They are imported when they are asked for: the command line starts light."""
 

@@ -33,7 +33,10 @@ from warpsplat.jobs.memory import check_refined
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.refine import refine as refine_scene
 from warpsplat.jobs.render import RendererName, drawn
+from warpsplat.jobs.reports.several import several_page, versions_of
 from warpsplat.jobs.reports.single import Facts, report_page
+from warpsplat.jobs.several import vectorize_several as make_several
+from warpsplat.jobs.suggest import Suggestion, suggest_curves
 from warpsplat.jobs.vectorize import Result, load_target, vectorize_image
 from warpsplat.metrics import Score, score_svg
 from warpsplat.rendering.backend import Backend, Viewport
@@ -160,6 +163,8 @@ def vectorize(
         ResourceError: memory, threads, or a place for compiled kernels are missing.
         TypeError: an image of none of these forms.
     """
+    if isinstance(curves, (list, tuple)):
+        raise UsageError(f"several numbers of shapes: vectorize_several(image, {list(curves)})")
     given = {
         "curves": curves,
         "subject": subject,
@@ -208,6 +213,111 @@ def vectorize(
             report=watch.report,
             stop=watch.stop,
             checkpoint=kept,
+        )
+
+
+def vectorize_several(
+    image: ImageSource,
+    curves: Sequence[int],
+    *,
+    settings: Settings | None = None,
+    importance: ImageSource | None = None,
+    outputs: Sequence[str | os.PathLike[str]] | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
+    stop: Callable[[], bool] | None = None,
+    ready: Callable[[Result], None] | None = None,
+    name: str | None = None,
+) -> tuple[Result, ...]:
+    """Turn an image into SVGs of several numbers of shapes, which share what work they can.
+
+    Args:
+        image: as for ``vectorize``.
+        curves: numbers of shapes; of a drawing, the most. They are made from few to many.
+        settings: all that decides the results but their numbers, made by ``make_settings``; default: those
+            of ``vectorize``.
+        importance: as for ``vectorize``.
+        outputs: a file for each number, written as soon as it is made.
+        device: as for ``vectorize``.
+        threads: see there.
+        callback: see there; ``Progress.work`` is the share of all that is to be done. One that returns True
+            ends the run.
+        stop: see there.
+        ready: called with each result as soon as there is one.
+        name: see ``vectorize``.
+
+    Returns:
+        a result for each number, in the order of ``curves``; where the run was stopped, of those that it came
+        to, the last of which is ``stopped``.
+
+    Raises:
+        UsageError: a number that is out of range or there twice; settings that say how many shapes there
+            are, as goals and levels do; line art and pixel art, which say so themselves.
+        ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``.
+    """
+    if outputs is not None and len(outputs) != len(curves):
+        raise UsageError(f"{len(curves)} numbers of shapes and {len(outputs)} outputs")
+    watch = _Watch(callback, stop)
+    with _backend(device, threads) as backend:
+        return make_several(
+            image,
+            tuple(curves),
+            settings or make_settings(),
+            backend,
+            outputs=None if outputs is None else [Path(output) for output in outputs],
+            name=name,
+            importance=importance,
+            report=watch.report,
+            stop=watch.stop,
+            ready=ready,
+        )
+
+
+def suggest(
+    image: ImageSource,
+    *,
+    settings: Settings | None = None,
+    importance: ImageSource | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
+    stop: Callable[[], bool] | None = None,
+    name: str | None = None,
+) -> Suggestion | None:
+    """How many shapes an image is worth: where its quality against shapes, and against bytes, has its knee.
+
+    A short fit on a reduced image, whose shapes grow from few to many, says what each number is expected to
+    give; it takes a fraction of what a run takes.
+
+    Args:
+        image: as for ``vectorize``.
+        settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
+        importance: as for ``vectorize``, as is all that follows.
+        device: see there.
+        threads: see there.
+        callback: see there.
+        stop: see there.
+        name: see there.
+
+    Returns:
+        the number, the reason, and what it and others are expected to give at the default effort; None where
+        it was stopped. Of images that are traced there is no number to choose, which the reason says.
+
+    Raises:
+        UsageError: settings that say how many shapes there are.
+        ImageError, ResourceError, TypeError: as for ``vectorize``.
+    """
+    watch = _Watch(callback, stop)
+    with _backend(device, threads) as backend:
+        return suggest_curves(
+            image,
+            settings or make_settings(),
+            backend,
+            name=name,
+            importance=importance,
+            report=watch.report,
+            stop=watch.stop,
         )
 
 
@@ -466,7 +576,7 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
 
 
 def report(
-    result: Result | SvgSource,
+    result: Result | SvgSource | list[Result] | tuple[Result, ...],
     image: ImageSource,
     output: str | os.PathLike[str] | None = None,
     *,
@@ -479,15 +589,17 @@ def report(
     """A page on a result, to look at in a browser: one file that needs nothing else and no network.
 
     It shows image and SVG under a slider, where they differ, the shapes with the decibels that each is worth,
-    the figures and the course of the run.
+    the figures and the course of the run. Of several results it compares these.
 
     Args:
-        result: what ``vectorize`` or ``refine`` made; or any SVG, as for ``refine``, which is measured.
+        result: what ``vectorize`` or ``refine`` made; or any SVG, as for ``refine``, which is measured; or
+            several results of one image, as ``vectorize_several`` makes them.
         image: that it shows, as for ``vectorize``.
         output: file to write the page to; an existing one is replaced in one step.
         command: what makes the result again, for people.
         name: of the image, for people; default: its file's name.
-        svg_name: that the SVG is downloaded as; default: the image's name with ``.svg``.
+        svg_name: that the SVG is downloaded as; default: the image's name with ``.svg``. Those of several
+            results have their numbers of shapes in their names.
         device: where to compute, see ``vectorize``.
         threads: see there.
 
@@ -499,6 +611,13 @@ def report(
         OutputError: ``output`` cannot be written.
     """
     name = name or Path(source_name(image)).name
+    svg_name = svg_name or Path(name).with_suffix(".svg").name
+    if isinstance(result, (list, tuple)):
+        versions = versions_of(result, svg_name)
+        made = several_page(versions, image, name=name, command=command)
+        if output is not None:
+            write_result(Path(output), made.encode())
+        return made
     if isinstance(result, Result):
         text, facts, own = result.svg, Facts.of(result, command), result.before is None
     else:
@@ -512,7 +631,7 @@ def report(
             backend,
             facts,
             name=name,
-            svg_name=svg_name or Path(name).with_suffix(".svg").name,
+            svg_name=svg_name,
             own=own,
         ).text
     if output is not None:

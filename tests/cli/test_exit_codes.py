@@ -81,6 +81,8 @@ TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
     (ExitCode.USAGE, "unknown option", "bench --nonsense", None),
     (ExitCode.USAGE, "unknown option", "info --nonsense", None),
     (ExitCode.USAGE, "unknown option", "compare photo.png --nonsense", None),
+    (ExitCode.USAGE, "unknown option", "serve --nonsense", None),
+    (ExitCode.USAGE, "unknown device", "serve --device cuda:99", None),
     (ExitCode.USAGE, "missing argument", "compare", None),
     (ExitCode.INPUT, "no image", "compare missing.png --against vtracer", None),
     (ExitCode.USAGE, "missing argument", "vectorize", None),

@@ -15,6 +15,7 @@ from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import fit
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import levels_of, make_settings
+from warpsplat.fit.several import Start
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_levels
@@ -144,7 +145,7 @@ def test_levels_are_read_back_and_refined_as_such() -> None:
     text = write_svg(scene)
     read, _ = load_scene(text, 64, 48, "x")
     np.testing.assert_array_equal(read.layer, scene.layer)
-    result = vectorize(picture(), make_settings(iterations=10), Backend.on("cpu"), scene=read)
+    result = vectorize(picture(), make_settings(iterations=10), Backend.on("cpu"), start=Start(read))
     assert re.findall('<g[^>]* id="([^"]+)"', result.svg) == ["level-2", "level-5", f"level-{len(scene)}"]
     inner = text.replace('id="level-5"', 'id="mine"')
     assert not load_scene(inner, 64, 48, "x")[0].layer.any(), "some are in no level"

@@ -10,12 +10,13 @@ import pytest
 from tests.fit.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon, seam
 from tests.fit.test_drawing import assert_clean, psnr
 from tests.fit.test_merge import halves
+from warpsplat.fit import tidy
 from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
-from warpsplat.fit.tidy import Judge, apart, by_cell, finish_drawing, tidied, within
+from warpsplat.fit.tidy import Judge, apart, by_cell, finish_drawing, rounds_for, tidied, within
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import Renderer, render
+from warpsplat.rendering.renderer import Capacity, Renderer, render
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
@@ -143,17 +144,38 @@ def test_a_drawing_like_the_last_one_needs_no_second_renderer(
 ) -> None:
     backend, made, target = Backend.on(device, 1), split(logo()), np.ones((64, 64, 3), np.float32)
     judge = Judge(target, backend)
-    built: list[None] = []
+    built: list[Capacity] = []
     build = Renderer._build
-    monkeypatch.setattr(
-        Renderer, "_build", lambda self, capacity: built.append(None) or build(self, capacity)
-    )
+
+    def counted(self: Renderer, capacity: Capacity) -> None:
+        built.append(capacity)
+        build(self, capacity)
+
+    monkeypatch.setattr(Renderer, "_build", counted)
     first = judge.errors(made)
     before = len(built)
     np.testing.assert_array_equal(judge.errors(made), first)
     step = start(target, made, backend, Refinement(), capacity=judge.capacity)
     step.render()
     assert len(built) == before + 2
+
+
+def test_large_pictures_have_fewer_rounds(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert [rounds_for(side * side) for side in (64, 1250, 2048, 10_000)] == [16, 16, 6, 4]
+    backend, made = Backend.on(device, 1), split(logo())
+    asked: list[float] = []
+    target = render(logo().scene, backend=backend)
+
+    def told(later: float) -> None:
+        asked.append(later)
+
+    for pixels in (64 * 64 * 5, 1):
+        asked.clear()
+        monkeypatch.setattr(tidy, "ROUND_PIXELS", pixels)
+        monkeypatch.setattr(tidy, "ROUNDS", 2)
+        monkeypatch.setattr(tidy, "FEWEST_ROUNDS", 1)
+        tidied(target, made, backend, told)
+        assert len(asked) == (2 if pixels > 1 else 1)
 
 
 def test_turned_outlines_are_the_same() -> None:

@@ -253,7 +253,10 @@ def _judge_output(command: Command, code: int, folder: Path) -> str:
         if path.exists() != made:
             return f"exit code {code}, and {command.output} is {'there' if path.exists() else 'missing'}"
         if made:
-            whole = _is_png(path) if path.suffix == ".png" else path.read_bytes().rstrip().endswith(b"</svg>")
+            if path.suffix == ".png":
+                whole = _is_png(path)
+            else:
+                whole = path.read_bytes().rstrip().endswith(f"</{path.suffix[1:]}>".encode())
             # Of a foreign SVG that cannot be improved, the copy ends as that does.
             if not whole and command.arguments[0] != "refine":
                 return f"{command.output} is not whole"

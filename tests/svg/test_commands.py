@@ -110,7 +110,12 @@ def test_a_ring_is_the_shortest_of_its_starts() -> None:
 def test_work_for_a_ring_grows_with_its_segments(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Segment] = []
     found = commands._ways
-    monkeypatch.setattr(commands, "_ways", lambda one, before: asked.append(one) or found(one, before))
+
+    def noted(one: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
+        asked.append(one)
+        return found(one, mirrored)
+
+    monkeypatch.setattr(commands, "_ways", noted)
     for count in (20, 80):
         asked.clear()
         shortest_ring(None, segments(5, count))

@@ -29,7 +29,7 @@ from warpsplat.fit.schedule import (
 )
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Content, Stages, real, whole
-from warpsplat.fit.state import FitState
+from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
 from warpsplat.fit.viewer_shift import look_at_file
@@ -66,6 +66,7 @@ def fit(
     scene: Scene | None = None,
     below: Scene | None = None,
     begin: int = 0,
+    past: Past | None = None,
     per_pixel: float | None = None,
     thrifty: bool = False,
     finish: bool = True,
@@ -81,10 +82,12 @@ def fit(
         image: sRGB in [0, 1], shape (height, width, 3).
         settings: all that decides the result.
         backend: where to compute.
-        scene: shapes to start from, whose number stays; without, new ones.
+        scene: shapes to start from, whose number stays unless they have a ``past``; without, new ones.
         below: shapes of earlier levels, that the settings' number of new ones are put in front of.
         finish: whether a file is made of the result; else nothing is rounded for it.
         begin: step of the schedule to start at.
+        past: what another fit's optimizer knows of the shapes of ``scene``: with it their number follows the
+            schedule, as in a fit that came to this step itself.
         per_pixel: units of the view box a pixel; without, they are chosen.
         thrifty: whether to choose those that are worth their bytes, rather than some that lose little.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size.
@@ -109,7 +112,7 @@ def fit(
     plan = phases(settings, image.shape[1], image.shape[0])
     weights = pixel_weights(Target(image, plan[-1]).image, importance, settings.texture)
     ends = (*level_ends(below), len(below)) if below else ()
-    grows = scene is None
+    grows = scene is None or past is not None
     task = _Task(
         image,
         start,
@@ -130,7 +133,7 @@ def fit(
         with stage.reading():
             run = _Run(task, step_from(stage.state, start, settings, backend, base, begin, task.target))
     else:
-        state = FitState.start(start, backend, rng, begin, base)
+        state = FitState.start(start, backend, rng, begin, base, past)
         if seconds is not None:
             budget = Budget(seconds)
             settings = budget.measure(state, settings, image)

@@ -5,13 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import warp as wp
 
 from warpsplat.fit.constraints import Keeper
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.parameters import Moments, Parameters
 from warpsplat.scene import Scene
 from warpsplat.svg.write import GRIDS
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """What the optimizer knows of shapes. Without it they would begin anew, with steps as large as they can
+    be: that undoes what they had come to (docs/experiments.md).
+    """
+
+    moments: Moments
+    """Adam's."""
+    ages: npt.NDArray[np.int32]
+    """Steps since each was placed, shape (shape,)."""
 
 
 @dataclass
@@ -42,12 +55,18 @@ class FitState:
 
     @staticmethod
     def start(
-        scene: Scene, backend: Backend, rng: np.random.Generator, step: int = 0, base: int = 0
+        scene: Scene,
+        backend: Backend,
+        rng: np.random.Generator,
+        step: int = 0,
+        base: int = 0,
+        past: Past | None = None,
     ) -> FitState:
-        """Before the first step; ``step``: those that count as done."""
+        """Before the first step; ``step``: those that count as done. Without a ``past`` shapes are new."""
         clock = backend.array(wp.int32, 1)
         clock.fill_(step)
-        return FitState(Parameters(scene, backend), clock, rng, step, base=base)
+        known = (past.moments, past.ages) if past else (None, None)
+        return FitState(Parameters(scene, backend, *known), clock, rng, step, base=base)
 
     @property
     def shape_count(self) -> int:
@@ -57,3 +76,7 @@ class FitState:
     def scene(self) -> Scene:
         """The current scene, on the host."""
         return self.parameters.scene()
+
+    def past(self) -> Past:
+        """Of the current scene, on the host."""
+        return Past(self.parameters.moments(), self.parameters.arrays["ages"].numpy().copy())

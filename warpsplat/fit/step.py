@@ -219,4 +219,4 @@ class Step:
 
     def snapshot(self) -> Snapshot:
         """What there is now, for people to look at."""
-        return Snapshot(self.state.scene, self.renderer.read_image)
+        return Snapshot(self.state.scene, self.renderer.read_image, self.state.past)

@@ -24,8 +24,11 @@ from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
-ROUNDS = 16
-"""In which candidates are tried, at the most."""
+ROUNDS, FEWEST_ROUNDS = 16, 4
+"""In which candidates are tried, at the most, and what is left of that for large pictures."""
+
+ROUND_PIXELS = 26_000_000
+"""Pixels that all rounds together look at: of a large picture each takes long, and the first find most."""
 
 POINTS_A_ROUND = 110
 """Of a traced drawing: how many rounds there will be, as progress is shown."""
@@ -110,7 +113,7 @@ def finish_drawing(
     second, costs = replace(REFIT, steps=2 * REFIT.steps), Costs(target, drawing, backend)
     rounds, refit = costs.round(), costs.refit(REFIT)
     last = costs.refit(second) + costs.grid() + refit
-    usual = min(len(drawing.joints) / POINTS_A_ROUND, ROUNDS)
+    usual = min(len(drawing.joints) / POINTS_A_ROUND, rounds_for(target[..., 0].size))
     drawing = refined(drawing, how, meter.stage(costs.refit(how), usual * rounds + last))
 
     def told(later: float) -> Report | None:
@@ -185,12 +188,13 @@ def tidied(
         made = replace(made, scene=scene)
         return made, judge.errors(made)
 
-    for turn in range(ROUNDS):
+    most = rounds_for(target[..., 0].size)
+    for turn in range(most):
         candidates = Outlines(drawing).edits(refused)
         edits = apart(candidates)
         if not edits or (stop and stop()):
             break
-        report = told(min(len(candidates) / len(edits), ROUNDS - 1 - turn))
+        report = told(min(len(candidates) / len(edits), most - 1 - turn))
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
         growth = judge.errors(applied(drawing, edits)) - errors
@@ -214,6 +218,11 @@ def tidied(
 def after_round(target: FloatArray) -> Refinement:
     """How a drawing is fitted anew after each round."""
     return replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
+
+
+def rounds_for(pixels: int) -> int:
+    """The most rounds for a picture of so many pixels."""
+    return max(FEWEST_ROUNDS, min(ROUNDS, ROUND_PIXELS // pixels))
 
 
 class Judge:

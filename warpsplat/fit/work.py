@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from warpsplat.fit.state import Past
 from warpsplat.scene import FloatArray, Scene
 
 
@@ -21,6 +22,8 @@ class Snapshot:
     """The render of the step before, sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity,
     shape (height, width, 4); of the size that the training has come to.
     """
+    past: Callable[[], Past] | None = None
+    """What the optimizer knows of the shapes, for a fit that goes on from them."""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.settings import Renderer, Settings, Subject, solid_color
+from warpsplat.fit.several import Start
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.step import model_for
 from warpsplat.fit.work import Meter, Progress
@@ -151,7 +152,7 @@ def vectorize(
     backend: Backend,
     *,
     metadata: str = "",
-    scene: Scene | None = None,
+    start: Start | None = None,
     importance: FloatArray | None = None,
     report: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -167,7 +168,7 @@ def vectorize(
         settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
         backend: where to compute; does not change the result.
         metadata: text for the file's metadata; that of a run that was stopped says so instead.
-        scene: shapes to start from; without, new ones.
+        start: how to begin, in place of with new shapes.
         importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
             those of the whole image all the same.
         report: called every few steps.
@@ -181,12 +182,12 @@ def vectorize(
     started = time.monotonic()
     fits = None if settings.time_budget else stages
     seconds = training_seconds(settings, target, started)
-    traced = scene is None and settings.subject not in {"auto", "photo"}
+    traced = start is None and settings.subject not in {"auto", "photo"}
     height, width = target.shape[:2]
     pixels, eyes = width * height, has_time_for_eyes(settings, target)
     after = score_cost(pixels, settings.curves, backend, eyes=eyes)
     after += sum(score_cost(pixels, count, backend, eyes=False) for count in settings.levels)
-    pursued = scene is None and not traced and (settings.target_psnr or settings.max_bytes)
+    pursued = start is None and not traced and (settings.target_psnr or settings.max_bytes)
     if pursued:
         made = pursue(
             target,
@@ -204,7 +205,7 @@ def vectorize(
         made = draw(
             target, settings, backend, seconds=seconds, report=report, after=after, stop=stop, stages=fits
         )
-    elif scene is None and settings.levels:
+    elif start is None and settings.levels:
         made = fit_layered(
             target,
             settings,
@@ -216,16 +217,20 @@ def vectorize(
             stages=fits,
         )
     else:
-        if settings.simplify and scene is None:
+        if settings.simplify and start is None:
             settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
         made = fit(
             target,
             settings,
             backend,
-            scene=scene,
+            scene=start.scene if start else None,
+            past=start.past if start else None,
+            begin=start.begin if start else 0,
             importance=importance,
             seconds=seconds,
-            report=Meter(report, after).stage(Course.of(settings, width, height, backend).cost(), 0),
+            report=Meter(report, after).stage(
+                Course.of(settings, width, height, backend, begin=start.begin if start else 0).cost(), 0
+            ),
             stop=stop,
             stages=fits,
         )
@@ -454,6 +459,52 @@ def vectorize_image(
         CheckpointError, UsageError: see ``CheckpointFile``.
         ResourceError: the limit of memory is too low for any size.
     """
+    work = prepare(source, settings, name=name, importance=importance, keyed=keyed)
+    stages = None
+    if checkpoint:
+        identified = identity("vectorize", settings, work.target, work.importance)
+        stages = checkpoint.stages(identified, backend)
+    result = make(work, backend, output=output, report=report, stop=stop, stages=stages)
+    if checkpoint and not result.stopped:
+        checkpoint.remove()
+    return result
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """An image that was read, and all that a run on it needs to know."""
+
+    target: FloatArray
+    """What shapes are fitted to, see ``vectorize``."""
+    settings: Settings
+    """With a subject."""
+    why: str
+    """The subject; empty where it was given."""
+    importance: FloatArray | None
+    reduction: Reduction | None
+    key: str = ""
+    """Of the job, where the file is to name it."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image [px]."""
+        if self.reduction:
+            return self.reduction.width, self.reduction.height
+        return self.target.shape[1], self.target.shape[0]
+
+
+def prepare(
+    source: ImageSource,
+    settings: Settings,
+    *,
+    name: str | None = None,
+    importance: ImageSource | None = None,
+    keyed: bool = False,
+) -> Prepared:
+    """Read an image and its mask, at a size that memory has room for, and see what it shows.
+
+    Arguments and errors are those of ``vectorize_image``.
+    """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
     key = ""
@@ -468,37 +519,48 @@ def vectorize_image(
     chosen, why = decided(target, settings)
     target, factor = memory.smaller(target, name, chosen, factor)
     release_memory()
-    reduction = memory.reduction(factor, target, chosen)
-    height, width = target.shape[:2]
-    if reduction:
-        height, width = reduction.height, reduction.width
-    mask = None
-    if importance is not None:
-        mask = load_importance(importance, width, height, mask_name, memory.mask_factor(factor))
-    stages = None
-    if checkpoint:
-        stages = checkpoint.stages(identity("vectorize", settings, target, mask), backend)
-    history: list[Progress] = []
+    work = Prepared(target, chosen, why, None, memory.reduction(factor, target, chosen), key)
+    if importance is None:
+        return work
+    mask = load_importance(importance, *work.size, mask_name, memory.mask_factor(factor))
+    return replace(work, importance=mask)
+
+
+def make(
+    work: Prepared,
+    backend: Backend,
+    *,
+    start: Start | None = None,
+    output: Path | None = None,
+    report: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    stages: Stages | None = None,
+) -> Result:
+    """A run on what was prepared, and its file; arguments are those of ``vectorize_image``, ``start`` that of
+    ``vectorize``.
+    """
+    settings, history = work.settings, list[Progress]()
 
     def on_paper(svg: str) -> str:
         return placed(svg, settings.size, settings.page, settings.units)
 
     result = vectorize(
-        target,
-        chosen,
+        work.target,
+        settings,
         backend,
-        metadata=key,
-        importance=mask,
+        metadata=work.key,
+        start=start,
+        importance=work.importance,
         report=noting(history, report),
         stop=stop,
         write=None if output is None else lambda svg: write_named(output, on_paper(svg)),
         stages=stages,
-        reduction=reduction,
+        reduction=work.reduction,
     )
-    if checkpoint and not result.stopped:
-        checkpoint.remove()
     release_memory()
-    return replace(result, svg=on_paper(result.svg), subject=chosen.subject, why=why, history=tuple(history))
+    return replace(
+        result, svg=on_paper(result.svg), subject=settings.subject, why=work.why, history=tuple(history)
+    )
 
 
 def _read(source: ImageSource) -> ImageSource:

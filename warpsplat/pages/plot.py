@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 WIDTH, HEIGHT = 420, 190
 """Of a plot [units of its view box]."""
@@ -35,6 +35,17 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A point of a curve that is drawn as a dot, with a text; to be placed, in the curve's own units."""
+
+    x: float
+    y: float
+    text: str
+    strong: bool = False
+    """Whether it stands out."""
+
+
+@dataclass(frozen=True)
 class Plot:
     """What is drawn, in units of its view box."""
 
@@ -44,6 +55,8 @@ class Plot:
     up: tuple[Tick, ...]
     across_label: str
     up_label: str
+    marks: tuple[Mark, ...] = ()
+    """In units of the view box."""
     area: str = ""
     """What lies below the lines, as ``polygon`` takes it; empty: nothing is filled."""
     width: int = WIDTH
@@ -61,6 +74,7 @@ def plot(
     faint: Sequence[bool] = (),
     from_zero: bool = False,
     filled: bool = False,
+    marks: Sequence[Mark] = (),
 ) -> Plot | None:
     """A curve; None where there are fewer than two points that are numbers.
 
@@ -72,6 +86,7 @@ def plot(
         faint: which points are of another kind, drawn weaker.
         from_zero: whether the axis that goes up begins at 0.
         filled: whether the area below is.
+        marks: points of it to be marked.
     """
     flags = list(faint) or [False] * len(xs)
     found = [
@@ -105,7 +120,8 @@ def plot(
         tuple(Tick(x_of(value), number(value)) for value in across if value <= end * 1.0001),
         tuple(Tick(y_of(value), number(value)) for value in up),
         *labels,
-        area,
+        marks=tuple(replace(mark, x=x_of(mark.x), y=y_of(mark.y)) for mark in marks),
+        area=area,
     )
 
 

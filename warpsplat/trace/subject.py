@@ -220,7 +220,7 @@ def _few_colors(levels: Ints, edges: Bools, calmed: int = 1) -> float:
     """
     calm = np.ascontiguousarray(levels.astype(np.uint8))
     for _ in range(calmed):
-        calm = cv2.medianBlur(calm, 5)
+        calm = np.asarray(cv2.medianBlur(calm, 5), np.uint8)
     rest: Floats = calm[~edges].astype(np.float32)
     rest = rest[:: max(1, len(rest) // SAMPLES)]
     if not len(rest):

@@ -47,6 +47,7 @@ def settings_of(line: str) -> Settings:
         "verbose",
         "quiet",
         "as_json",
+        "suggest",
     }
     others |= {"as_uri", "checkpoint", "resume", "checkpoint_every", "report"}
     return settings_from({key: value for key, value in given.items() if key not in others})

@@ -62,7 +62,8 @@ def layer_of(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict
 def _single(file: BatchFile, key: str, line: int, node: yaml.Node) -> Value:
     value = file.value(node)
     if not isinstance(node, yaml.ScalarNode):
-        raise file.error(line, f"{key}: must be one value, not a list or mapping")
+        hint = f"; for one job with each, {MATRIX}: {{{key}: [...]}}" if key in BY_NAME else ""
+        raise file.error(line, f"{key}: must be one value, not a list or mapping{hint}")
     if key in TEXT_KEYS or (key in BY_NAME and BY_NAME[key].choices):
         file.text(line, key, value)
     checked(key, value, file.place(line))

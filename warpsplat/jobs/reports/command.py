@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shlex
-from collections.abc import Iterator
-from dataclasses import fields
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 from warpsplat.errors import UsageError
@@ -31,6 +32,16 @@ def vectorize_command(settings: Settings, image: str, output: str, *further: str
     quality, given = flags_of(settings)
     line = shlex.join(["warpsplat", "vectorize", image, *_words(quality, given), *further, "-o", output])
     return line if _settings(quality, given) == settings else f"{line}  # and settings that no flag says"
+
+
+def several_command(
+    settings: Settings, numbers: Sequence[int], image: str, output: os.PathLike[str] | None, *further: str
+) -> str:
+    """The line that makes the files of several ``numbers`` of shapes; without an ``output``, here."""
+    quality, given = flags_of(replace(settings, curves=max(numbers), simplify=False))
+    words = _words(quality, {**given, "curves": ",".join(map(str, numbers))})
+    where = () if output is None else ("-o", os.fspath(output))
+    return shlex.join(["warpsplat", "vectorize", image, *words, *further, *where])
 
 
 def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:

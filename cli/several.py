@@ -1,0 +1,169 @@
+"""One image in several numbers of shapes: names, the run, a table."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from warpsplat.cli.report import check_report
+from warpsplat.cli.run import run_several, say_about
+from warpsplat.cli.say import say
+from warpsplat.errors import UsageError
+from warpsplat.files.inputs import STANDARD, read_input
+from warpsplat.files.output import check_output, write_result
+from warpsplat.fit.settings import Settings
+from warpsplat.jobs.batch.images import Found
+from warpsplat.jobs.batch.names import Wanted, fields_of, name_results
+from warpsplat.jobs.formats import ENDINGS, check_format
+from warpsplat.jobs.options import settings_from
+from warpsplat.jobs.reports.command import several_command
+from warpsplat.jobs.reports.several import Version, several_page
+from warpsplat.jobs.several import check_several
+from warpsplat.jobs.vectorize import Result
+
+COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
+"""Of the table."""
+
+
+def make_several(
+    image: Path,
+    output: Path | None,
+    numbers: Sequence[int],
+    given: dict[str, Any],
+    *,
+    importance: Path | None,
+    overwrite: bool,
+    report: Path | None,
+    device: str,
+    threads: int | None,
+    verbose: int,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Make a file for each number of shapes, and say how good each is.
+
+    Raises:
+        WarpsplatError: what cannot be done is found before the work, as far as it can be.
+    """
+    if image == importance == STANDARD:
+        raise UsageError("only one of image and mask can come from the standard input")
+    settings = settings_from({**given, "curves": max(numbers)})
+    check_several(settings, numbers)
+    outputs = named(image, output, numbers, settings)
+    data = read_input(image)
+    inputs = (image,) if importance is None else (image, importance)
+    for path in outputs:
+        check_output(path, *inputs, endings=ENDINGS, overwrite=overwrite)
+        check_format(path)
+        check_report(report, inputs, path, overwrite=overwrite)
+    results = run_several(
+        image,
+        outputs,
+        numbers,
+        settings,
+        data=data,
+        device=device,
+        threads=threads,
+        importance=importance,
+        verbose=verbose,
+        quiet=quiet,
+    )
+    made = list(zip(outputs, results, strict=False))
+    if not quiet and results:
+        say_about(image, settings, results[-1], verbose=verbose)
+    if as_json:
+        each = [
+            {"image": str(image), "output": str(path), "device": device, **result.as_dict()}
+            for path, result in made
+        ]
+        say(json.dumps(each))
+    elif not quiet:
+        say(table(made))
+    if report and made:
+        _write_report(report, made, image, data, settings, output, numbers, importance)
+
+
+def _write_report(
+    report: Path,
+    made: Sequence[tuple[Path, Result]],
+    image: Path,
+    data: bytes,
+    settings: Settings,
+    output: Path | None,
+    numbers: Sequence[int],
+    importance: Path | None,
+) -> None:
+    """Write the page that compares what was made."""
+    further = () if importance is None else ("--importance", str(importance))
+    line = several_command(settings, numbers, str(image), output, *further)
+    versions = [Version(result, f"{path.stem}.svg") for path, result in made]  # a result may be its picture
+    versions.sort(key=lambda version: version.shapes)
+    name = "image" if image == STANDARD else image.name
+    write_result(report, several_page(versions, data, name=name, command=line).encode())
+
+
+def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Settings) -> list[Path]:
+    """The file of each number: ``photo-50.svg`` here or in the folder that is given, or by its pattern.
+
+    Raises:
+        UsageError: files that would lie in one place, or none that could be written.
+    """
+    if STANDARD in (output, image) and (output is None or output == STANDARD):
+        raise UsageError("several numbers of shapes make several files: give -o 'NAME-{curves}.svg'")
+    pattern = output or Path()
+    if pattern.suffix.lower() not in ENDINGS:
+        try:
+            pattern.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"{pattern}: cannot be made: {error.strerror or error}") from error
+        pattern = Path(_literal(str(pattern)), _literal(image.stem) + "-{curves}.svg")
+    elif not re.search(r"(?<!\{)\{[^{}]", str(pattern)):
+        pattern = pattern.with_name(f"{pattern.stem}-{{curves}}{pattern.suffix}")
+
+    def place(message: str) -> UsageError:
+        return UsageError(f"-o {output}: {message.removeprefix('output: ')}")
+
+    found = Found(image, image.parent)
+    return name_results(
+        [
+            Wanted(found, pattern, settings, {**fields_of(settings, {}), "curves": number}, place)
+            for number in numbers
+        ]
+    )
+
+
+def _literal(text: str) -> str:
+    """A text that means itself in a pattern of names."""
+    return text.replace("{", "{{").replace("}", "}}")
+
+
+def table(made: Sequence[tuple[Path, Result]]) -> str:
+    """Lines that compare results."""
+    rows = [("", *COLUMNS), *((str(path), *_figures(result)) for path, result in made)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for first, *others in rows:
+        cells = (text.rjust(width) for text, width in zip(others, widths[1:], strict=True))
+        lines.append("  ".join([first.ljust(widths[0]), *cells]))
+    stopped = [path for path, result in made if result.stopped]
+    return "\n".join(lines + [f"{path}: stopped, not finished" for path in stopped])
+
+
+def _figures(result: Result) -> tuple[str, ...]:
+    values = result.as_dict()
+
+    def shown(name: str, digits: int, factor: float = 1.0, missing: str = "-") -> str:
+        value = values[name]
+        return missing if value is None else f"{factor * value:.{digits}f}"
+
+    return (
+        str(values["shapes"]),
+        shown("psnr", 2, missing="-" if values["paths"] is None else "exact"),
+        shown("ssim", 3),
+        shown("bytes", 1, 1e-3),
+        shown("gzip_bytes", 1, 1e-3),
+        shown("seconds", 1),
+    )

@@ -1,0 +1,109 @@
+"""``--suggest``: how many shapes an image is worth."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from warpsplat.cli.say import say
+from warpsplat.errors import UsageError
+
+if TYPE_CHECKING:
+    from warpsplat.fit.settings import Settings
+    from warpsplat.jobs.suggest import Suggestion
+
+suggest_option = click.option(
+    "--suggest",
+    is_flag=True,
+    help="Say how many shapes the image is worth, and why, in place of making a file.",
+)
+
+
+def suggest_number(
+    image: Path,
+    given: dict[str, Any],
+    *,
+    importance: Path | None,
+    device: str,
+    threads: int | None,
+    quiet: bool,
+    verbose: int,
+    as_json: bool,
+) -> None:
+    """Print a suggestion, its reasons, and the command that follows it.
+
+    Raises:
+        UsageError: settings that say how many shapes there are.
+    """
+    if given["curves"] is not None:
+        raise UsageError("--suggest and --curves do not go together")
+    from warpsplat.cli.run import suggest_file
+    from warpsplat.files.inputs import STANDARD, input_name, read_input
+    from warpsplat.jobs.options import settings_from
+    from warpsplat.jobs.suggest import check_suggesting
+
+    if image == importance == STANDARD:
+        raise UsageError("only one of image and mask can come from the standard input")
+    settings = settings_from(given)
+    check_suggesting(settings)
+    made = suggest_file(
+        image,
+        settings,
+        data=read_input(image),
+        device=device,
+        threads=threads,
+        importance=importance,
+        verbose=verbose,
+        quiet=quiet,
+    )
+    if made is None:
+        return
+    command = _command(image, settings, made, importance)
+    if as_json:
+        say(json.dumps({"image": str(image), "command": command, **made.as_dict()}))
+    else:
+        say("\n".join([*_lines(input_name(image), made), f"  {command}"]))
+
+
+def _command(image: Path, settings: Settings, made: Suggestion, importance: Path | None) -> str:
+    """The line that follows the suggestion."""
+    from dataclasses import replace
+
+    from warpsplat.files.inputs import STANDARD
+    from warpsplat.jobs.reports.command import vectorize_command
+
+    output = "FILE.svg" if image == STANDARD else str(Path(image.name).with_suffix(".svg"))
+    mask = () if importance is None else ("--importance", str(importance))
+    if made.curves is None:
+        return shlex.join(["warpsplat", "vectorize", str(image), "-o", output])
+    chosen = replace(settings, curves=made.curves, simplify=False)
+    return vectorize_command(chosen, str(image), output, *mask)
+
+
+def _lines(name: str, made: Suggestion) -> list[str]:
+    """A suggestion for people."""
+    if made.curves is None:
+        return [f"{name}: {made.why}"]
+    lines = [f"{name}: {made.curves} shapes", "    shapes     dB      kB   twice as many buy"]
+    for i, one in enumerate(made.expected):
+        more = made.expected[i + 1] if i + 1 < len(made.expected) else None
+        buys = ""
+        if more and more.shapes >= TWICE * one.shapes:
+            buys = f"{more.psnr - one.psnr:+.1f} dB for {(more.bytes - one.bytes) / 1000:.0f} kB more"
+        mark = "->" if one.shapes == made.curves else "  "
+        lines.append(f"  {mark}{one.shapes:6}  {one.psnr:5.1f}  {one.bytes / 1000:6.1f}   {buys}".rstrip())
+    return [*lines, *(f"  {sentence}" for sentence in _wrapped(made.why))]
+
+
+TWICE = 1.9
+"""Shapes of a row over those of the row before, from which on they are about twice as many."""
+
+
+def _wrapped(text: str) -> list[str]:
+    import textwrap
+
+    return textwrap.wrap(text, 76)

@@ -1,0 +1,216 @@
+"""Several numbers of shapes on the command line, and how many are suggested."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import warpsplat
+from tests.cli.helpers import one_line, run
+from warpsplat.cli.main import main
+from warpsplat.fit.work import Progress
+from warpsplat.jobs.suggest import Suggestion, suggestion
+from warpsplat.scene import FloatArray
+from warpsplat.trace.trace import Traced, trace
+
+FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
+
+
+def test_a_file_for_each_number(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of few steps begin anew: they are what single runs make."""
+    monkeypatch.chdir(tmp_path)
+    assert run("vectorize", image, "--curves", "9,3", "--report", "both.html", *FEW) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["shapes", "dB", "SSIM", "kB", "gzip", "kB", "seconds"]
+    assert [line.split()[:2] for line in lines[1:]] == [["photo-9.svg", "9"], ["photo-3.svg", "3"]]
+    page = Path("both.html").read_text()
+    assert page.count('class="card version') == 2 and "--curves 9,3" in page
+    assert run("vectorize", image, "--curves", "3", "-o", "alone.svg", "-q", *FEW) == 0
+    assert Path("alone.svg").read_bytes() == Path("photo-3.svg").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("output", "names"),
+    [
+        ("out.svg", {"out-2.svg", "out-5.svg"}),
+        ("f{o/x", {"f{o/x/photo-2.svg", "f{o/x/photo-5.svg"}),
+        ("{stem}_{curves}_{seed}.svgz", {"photo_2_0.svgz", "photo_5_0.svgz"}),
+    ],
+)
+def test_names(
+    image: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    output: str,
+    names: set[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    quick = ["--iterations", "1", "--device", "cpu"]
+    assert run("vectorize", image, "--curves", "2,5", "-o", output, "--json", *quick) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert [one["shapes"] for one in values] == [2, 5]
+    assert {one["output"] for one in values} == names and all(map(os.path.isfile, names))
+
+
+REFUSED = [
+    (["--curves", "5,5"], "5 is there twice"),
+    (["--curves", "0,5"], "curves must be a whole number from 1"),
+    (["--curves", "5,x"], "not a whole number, nor several"),
+    (["--curves", "5,9", "-o", "-"], "several files: give -o 'NAME-{curves}.svg'"),
+    (["--curves", "5,9", "-o", "same-{stem}.svg"], "2 results would be same-photo.svg"),
+    (["--curves", "5,9", "--target-psnr", "20"], "and target-psnr do not go together"),
+    (["--curves", "5,9", "--max-bytes", "2KB"], "and max-bytes do not go together"),
+    (["--curves", "5,9", "--time-budget", "9s"], "and time-budget do not go together"),
+    (["--curves", "8,9", "--layered"], "and levels do not go together"),
+    (["--curves", "5,9", "--checkpoint", "a.ckpt"], "and --checkpoint do not go together"),
+    (["--curves", "5,9", "--data-uri"], "and --data-uri do not go together"),
+    (["--curves", "5,9", "--animate", "a.gif"], "--animate takes one number of shapes"),
+    (["--curves", "5,9", "--subject", "pixel"], "has a number of shapes of its own"),
+    (["--curves", "5,9", "photo.png"], "matrix: {curves: [5, 9]}"),
+    (["--suggest", "--curves", "5"], "--suggest and --curves do not go together"),
+    (["--suggest", "--max-bytes", "5KB"], "max-bytes as well"),
+    (["--suggest", "-o", "a.svg"], "writes nothing"),
+]
+
+
+@pytest.mark.parametrize(("flags", "words"), REFUSED)
+def test_what_does_not_go_together_is_found_before_the_work(
+    image: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    flags: list[str],
+    words: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("vectorize", image, *flags) == 2
+    assert words in one_line(capsys.readouterr().err)
+    assert os.listdir(tmp_path) == ["photo.png"]
+
+
+def test_files_of_others_stay(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("photo-9.svg").write_text("<svg/>")
+    assert run("vectorize", image, "--curves", "3,9", *FEW) == 2
+    assert "photo-9.svg: exists and was not written by warpsplat" in one_line(capsys.readouterr().err)
+    assert not os.path.exists("photo-3.svg")
+
+
+def test_batches_say_what_to_use(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("batch", image, "--curves", "5,9") == 2
+    assert "matrix: {curves: [5, 9]}" in one_line(capsys.readouterr().err)
+    jobs = tmp_path / "jobs.yaml"
+    jobs.write_text("jobs:\n  - images: photo.png\n    curves: [5, 9]\n")
+    assert run("batch", jobs) == 2
+    assert "matrix: {curves: [...]}" in one_line(capsys.readouterr().err)
+
+
+def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> None:
+    """The second run is stopped: its file is there as it was then, the third is none."""
+    outputs = [tmp_path / f"{number}.svg" for number in (3, 6, 9)]
+    done: list[warpsplat.Result] = []
+
+    def callback(now: Progress) -> bool:
+        return len(done) == 1
+
+    settings = warpsplat.make_settings(iterations=12)
+    results = warpsplat.vectorize_several(
+        image,
+        [3, 6, 9],
+        settings=settings,
+        outputs=outputs,
+        device="cpu",
+        callback=callback,
+        ready=done.append,
+    )
+    assert [result.stopped for result in results] == [False, True]
+    assert [output.exists() for output in outputs] == [True, True, False]
+    assert outputs[0].read_text() == results[0].svg
+
+
+def test_the_library_names_the_function_for_several(image: Path) -> None:
+    with pytest.raises(warpsplat.UsageError, match=r"vectorize_several\(image, \[3, 9\]\)"):
+        warpsplat.vectorize(image, [3, 9])
+    with pytest.raises(warpsplat.UsageError, match="2 numbers of shapes and 1 outputs"):
+        warpsplat.vectorize_several(image, [3, 9], outputs=["a.svg"])
+
+
+def test_a_drawing_that_has_fewer_regions_is_traced_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    levels = np.full((48, 48, 3), 250, np.uint8)
+    levels[8:30, 8:30], levels[20:40, 20:44] = (200, 30, 30), (20, 80, 160)
+    path = tmp_path / "drawing.png"
+    Image.fromarray(levels).save(path)
+    calls: list[object] = []
+
+    def noted(image: FloatArray, *, most: int | None = None) -> Traced:
+        calls.append(most)
+        return trace(image, most=most)
+
+    monkeypatch.setattr("warpsplat.jobs.subjects.trace", noted)
+    settings = warpsplat.make_settings(subject="drawing")
+    few, many, most = warpsplat.vectorize_several(path, [1, 9, 99], settings=settings, device="cpu")
+    assert len(calls) == 2, "what 9 limit as little as 99 do is made once"
+    assert many.svg == most.svg and len(few.scene) < len(many.scene) <= 9
+
+
+@pytest.fixture
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpsplat.fit.survey.STEPS", 60)
+    monkeypatch.setattr("warpsplat.fit.survey.INTERVAL", 10)
+
+
+@pytest.mark.usefixtures("quickly")
+def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = os.listdir(image.parent)
+    assert run("vectorize", image, "--suggest", "--open", "--json", "--device", "cpu") == 0
+    values = json.loads(capsys.readouterr().out)
+    assert 16 <= values["curves"] <= 300
+    assert values["command"] == f"warpsplat vectorize {image} --curves {values['curves']} --open -o photo.svg"
+    assert values["curves"] in [row["shapes"] for row in values["expected"]]
+    assert "twice as many buy" in values["why"]
+    assert os.listdir(image.parent) == before
+
+
+def test_a_suggestion_in_words(
+    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from warpsplat.cli import run as runs
+    from warpsplat.fit.survey import Worth
+
+    made = suggestion(Worth(16, 1024, (0.0, 2.0, 10.0), (1.0, 6.0), 0.1))
+    monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
+    with pytest.raises(SystemExit):
+        main(["vectorize", str(image), "--suggest"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"{image}: {made.curves} shapes"
+    assert any(line.startswith("  ->") and "+2.0 dB for" in line for line in lines)
+    assert lines[-1].strip() == f"warpsplat vectorize {image} --curves {made.curves} -o photo.svg"
+
+
+def test_the_suggestion_is_the_knee() -> None:
+    from warpsplat.fit.survey import Worth
+
+    made = suggestion(Worth(16, 1024, (0.0, 2.0, 10.0), (1.0, 6.0), 0.1))
+    assert made.by_shapes == made.by_bytes == made.curves == 240
+    straight = suggestion(Worth(16, 17, (0.0, 0.0, 20.0), (1.0, 6.0), 0.0))
+    assert isinstance(straight, Suggestion) and straight.curves == 17
+
+
+def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "cells.png"
+    Image.fromarray(np.kron(np.eye(8, dtype=np.uint8) * 255, np.ones((4, 4), np.uint8))).save(path)
+    assert run("vectorize", path, "--suggest") == 0
+    said = capsys.readouterr().out
+    assert "the picture says how many shapes there are; --subject photo fits them" in said

@@ -1,0 +1,170 @@
+"""How many shapes an image is worth: the knee of its quality against shapes and bytes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from warpsplat.errors import UsageError
+from warpsplat.files.sources import ImageSource
+from warpsplat.fit.knee import knee
+from warpsplat.fit.settings import Settings, Subject
+from warpsplat.fit.survey import Worth, survey
+from warpsplat.fit.work import Report
+from warpsplat.jobs.vectorize import prepare
+from warpsplat.rendering.backend import Backend
+
+TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""Shapes of the rows of a table, over those suggested."""
+
+SAMPLES = 513
+"""Numbers of shapes among which the knee is looked for."""
+
+FINE = 0.05
+"""Steps that a suggestion is rounded to, at the most, over itself: it is no more exact than that."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a number of shapes is expected to give."""
+
+    shapes: int
+    psnr: float
+    """[dB]"""
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A number of shapes, and why."""
+
+    curves: int | None
+    """Shapes; None where the image itself says how many there are."""
+    subject: Subject
+    """What the image was taken for ..."""
+    why: str
+    """The reason, in sentences."""
+    expected: tuple[Expected, ...]
+    """Of the suggested number and of others around it, ascending, of runs of the default effort."""
+    by_shapes: int | None
+    """The knee of quality against shapes ..."""
+    by_bytes: int | None
+    """... and against bytes, in shapes."""
+    misfit: float
+    """How far measured decibels lie from the parabola, root of the mean square [dB]."""
+    seconds: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            **{name: value for name, value in vars(self).items() if name != "expected"},
+            "expected": [asdict(one) for one in self.expected],
+            "misfit": round(self.misfit, 3),
+            "seconds": round(self.seconds, 2),
+        }
+
+
+def check_suggesting(settings: Settings) -> None:
+    """Find out whether there is anything to suggest.
+
+    Raises:
+        UsageError: the settings say how many shapes there are to be.
+    """
+    others = {
+        "curves": not settings.simplify and not settings.levels,
+        "levels": settings.levels,
+        "target-psnr": settings.target_psnr,
+        "max-bytes": settings.max_bytes,
+        "time-budget": settings.time_budget,
+    }
+    for name, value in others.items():
+        if value:
+            raise UsageError(
+                f"suggest says how many shapes are worth it, and {name} as well: give one of them"
+            )
+
+
+def suggest_curves(
+    source: ImageSource,
+    settings: Settings,
+    backend: Backend,
+    *,
+    name: str | None = None,
+    importance: ImageSource | None = None,
+    report: Report | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Suggestion | None:
+    """Suggest a number of shapes for an image; None where it was stopped. Arguments are those of
+    ``jobs.vectorize.vectorize_image``.
+
+    Raises:
+        UsageError: see ``check_suggesting``.
+        ImageError, ResourceError: see ``vectorize_image``.
+    """
+    check_suggesting(settings)
+    started = time.monotonic()
+    work = prepare(source, settings, name=name, importance=importance)
+    subject = work.settings.subject
+    if subject != "photo":
+        reason = f"{work.why}. " if work.why else ""
+        why = f"{reason}It is traced: the picture says how many shapes there are; --subject photo fits them."
+        return Suggestion(None, subject, why, (), None, None, 0.0, time.monotonic() - started)
+    worth = survey(work.target, work.settings, backend, importance=work.importance, report=report, stop=stop)
+    if worth is None:
+        return None
+    return replace(suggestion(worth), seconds=time.monotonic() - started)
+
+
+def suggestion(worth: Worth) -> Suggestion:
+    """What is suggested: the fewer shapes of its two knees."""
+    shapes = np.geomspace(worth.fewest, worth.most, SAMPLES)
+    quality, sizes = worth.psnr(shapes), worth.size(shapes)
+    found = [knee(cost, quality) for cost in (shapes, sizes)]
+    by_shapes, by_bytes = (None if at is None else rounded(float(shapes[at])) for at in found)
+    known = [number for number in (by_shapes, by_bytes) if number is not None]
+    chosen = min(known) if known else worth.most
+    rows = sorted({round(share * chosen) for share in TABLE})
+    expected = tuple(expect(worth, row) for row in rows if worth.fewest <= row <= worth.most)
+    return Suggestion(
+        chosen,
+        "photo",
+        reason(worth, chosen, is_knee=bool(known)),
+        expected,
+        by_shapes,
+        by_bytes,
+        worth.misfit,
+        0.0,
+    )
+
+
+def expect(worth: Worth, shapes: int) -> Expected:
+    """What ``shapes`` are expected to give."""
+    return Expected(shapes, round(float(worth.psnr(shapes)), 2), round(float(worth.size(shapes))))
+
+
+def reason(worth: Worth, chosen: int, *, is_knee: bool) -> str:
+    """Why it is this number."""
+    one, two = expect(worth, chosen), expect(worth, 2 * chosen)
+    first = f"{chosen} shapes: {one.psnr:.1f} dB, {one.bytes / 1000:.0f} kB"
+    more = (two.bytes - one.bytes) / 1000
+    first += f"; twice as many buy {two.psnr - one.psnr:.1f} dB for {more:.0f} kB more."
+    if not is_knee:
+        return f"{first} Up to {worth.most} shapes each further one buys as much as those before."
+    fewest, most = expect(worth, worth.fewest), expect(worth, worth.most)
+    average = (most.psnr - fewest.psnr) / ((most.bytes - fewest.bytes) / 1000)
+    return (
+        f"{first} Up to there a kB buys more than the {average:.2g} dB that it buys on the average from "
+        f"{worth.fewest} to {worth.most:,} shapes, beyond it less: this is the knee."
+    )
+
+
+def rounded(number: float) -> int:
+    """A number that is easily said, near another one."""
+    unit = 10.0 ** math.floor(math.log10(max(FINE * number, 1.0)))
+    step = max(unit * factor for factor in (1, 2, 5) if unit * factor <= max(FINE * number, 1.0))
+    return max(1, round(step * round(number / step)))
