@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -16,7 +16,7 @@ from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.rounding import USUAL_GRID, finest
-from warpsplat.fit.schedule import phases
+from warpsplat.fit.schedule import Phase, phases
 from warpsplat.fit.settings import Density, Settings
 from warpsplat.fit.state import Past
 from warpsplat.fit.work import Meter, Progress, Report
@@ -53,8 +53,10 @@ MOST_GAIN, HARD = 5.0, 4.0
 image has [dB squared]: where that is much, there are details that shapes are too few for.
 """
 
-SMALL = 0.5
-"""Of that gain, where the image is so small that it was not reduced: the survey has seen all of it."""
+SMALL, LARGE = 0.5, 3.5
+"""Share of that gain where the image is so small that it was not reduced, as the survey has seen all of it;
+and from how many times fewer pixels on it is all of the gain.
+"""
 
 LATER_BYTES = 0.92
 """Bytes of a run's shapes over those of the survey's: they lose points and opacities."""
@@ -165,7 +167,7 @@ def survey(
         return None
     psnr = probe.render_psnr
     gain = expected_gain(psnr, -10 * math.log10(float(worth.reduced(len(scene)))) - psnr)
-    psnr += gain if len(phases(probing, width, height)) > 1 else SMALL * gain
+    psnr += gain * share_of_gain(phases(growing, width, height))
     return worth.through(len(scene), psnr, lost_detail(image, probing))
 
 
@@ -175,6 +177,12 @@ def expected_gain(psnr: float, lacking: float) -> float:
     """
     most = HARD / lacking if lacking > 0 else MOST_GAIN
     return float(min(2 ** ((psnr - GAIN_AT) / GAIN_DOUBLES), most, MOST_GAIN))
+
+
+def share_of_gain(plan: Sequence[Phase]) -> float:
+    """How much of the gain there is by ``plan``: of the first size is the survey, of the last the run."""
+    first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
+    return SMALL + (1 - SMALL) * min(math.log(last / first) / math.log(LARGE), 1.0)
 
 
 def _growing(settings: Settings, most: int) -> Settings:
