@@ -9,7 +9,7 @@ import functools
 import gzip
 import io
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 import cv2
@@ -217,6 +217,10 @@ class Score:
     bytes: int
     gzip_bytes: int
 
+    def of_file(self, text: str) -> Score:
+        """The same figures of the file ``text``, which shows the same elsewhere or larger."""
+        return replace(self, **_sizes(text))
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON; rounded to what the measurement is worth."""
         values = asdict(self)
@@ -261,7 +265,6 @@ def score_svg(
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check(stop)
     seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None
-    data = text.encode()
     facts = inspect_svg(text)
     return Score(
         psnr=fidelity,
@@ -270,9 +273,14 @@ def score_svg(
         ssimulacra2=seen,
         paths=facts.paths,
         nodes=facts.nodes,
-        bytes=len(data),
-        gzip_bytes=len(gzip.compress(data, 9, mtime=0)),
+        **_sizes(text),
     )
+
+
+def _sizes(text: str) -> dict[str, int]:
+    """Fields of ``Score``."""
+    data = text.encode()
+    return {"bytes": len(data), "gzip_bytes": len(gzip.compress(data, 9, mtime=0))}
 
 
 def _error(shown: Bytes, target: Rows, paper: int) -> float:

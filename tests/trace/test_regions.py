@@ -47,6 +47,29 @@ def test_thin_lines_are_regions(width: float) -> None:
     assert np.ptp(np.nonzero(found.labels == line)[1]) > 74, "in one piece"
 
 
+def test_a_dot_of_its_grounds_colour_is_no_mixture() -> None:
+    """Beyond the ring around it there is its colour as well."""
+    body = '<circle cx="32" cy="32" r="24" fill="#ff0" stroke="#000" stroke-width="1.5"/>'
+    body += '<circle cx="32" cy="32" r="4" fill="#ff0" stroke="#000"/>'
+    found = find_regions(levels(draw(body, 64, 64)))
+    shown = found.paint[found.labels]
+    assert shown[32, 32] == shown[20, 32] != shown[28, 32], "dot, ground, ring"
+
+
+def test_thin_bars_and_their_outlines_are_two_colours() -> None:
+    """All outlines are one thin part, and so is what is thin between them."""
+    bars = '<path d="M14 14L40 60M24 10L60 20" stroke'
+    body = f'{bars}="#000" stroke-width="5"/>{bars}="#ff0" stroke-width="3"/>'
+    body += '<rect x="4" y="4" width="20" height="20" fill="#ff0" stroke="#000" stroke-width="2"/>'
+    body += '<rect x="6" y="50" width="10" height="10"/>'
+    image = levels(draw(body, 64, 64))
+    found = find_regions(image)
+    assert colors_of(found) == {(0, 0, 0, 0), (255, 255, 0, 255), (0, 0, 0, 255)}
+    bright = (image[..., :2].min(axis=2) > 240) & (np.arange(64)[:, None] > 26)
+    assert bright.sum() > 8
+    assert all(found.colorings[p].color[0] == 255 for p in found.paint[found.labels[bright]])
+
+
 def test_a_ramp_is_one_region() -> None:
     body = (
         '<defs><linearGradient id="a"><stop stop-color="#f80"/><stop offset="1" stop-color="#80f"/>'

@@ -14,7 +14,8 @@ from warpsplat.kernels import constraints as kernels
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
-from warpsplat.scene import Basis, Canvas, FloatArray, Scene
+from warpsplat.scene import Basis, Canvas, FloatArray, IndexArray, Scene
+from warpsplat.scene.scene import ranges
 
 Ints = npt.NDArray[np.int32]
 Links = npt.NDArray[np.intp]
@@ -67,6 +68,11 @@ class Drawing:
                 raise ValueError(f"{name} has shape {values.shape}, not ({count},)")
         if (self.scene.basis != Basis.CUBIC).any() or not self.scene.closed.all():
             raise ValueError("a drawing has closed outlines of cubics")
+
+    def take(self, index: IndexArray) -> Drawing:
+        """The shapes ``index``, in that order."""
+        points = ranges(self.scene.first[:-1][index], self.scene.point_counts()[index])
+        return Drawing(self.scene.take(index), self.joints[points], self.same[points])
 
     def links(self) -> tuple[Links, Links]:
         """The points on the outlines, in order, and for each the next one of its contour; shape (cubic,)."""

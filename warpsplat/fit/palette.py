@@ -25,7 +25,7 @@ UNSEEN = 1e-6
 """Pixels, by the squares of their shares, below which a shape asks for no colour."""
 
 SOLID = 0.5
-"""Opacity from which on a pixel's colour counts."""
+"""Opacity from which on a pixel's colour counts, and a shape that may not be translucent is painted."""
 
 
 Floats = npt.NDArray[np.floating]
@@ -91,7 +91,7 @@ class Palette:
         step.state.colored = parameters.revision
 
     def limited(self, scene: Scene) -> Scene:
-        """A scene in these colours, without gradients."""
+        """A scene in these colours, without gradients and opaque (see ``solid_shapes``)."""
         flat = replace(
             scene,
             paint=np.zeros_like(scene.paint),
@@ -134,13 +134,22 @@ def best_colors(step: Step, scene: Scene) -> FloatArray:
 
 def mean_colors(scene: Scene) -> FloatArray:
     """Of each shape; of a gradient, the mean of its stops. Shape (shape, 3)."""
-    colors = scene.colors.copy()
+    channels = [_mean(scene, scene.colors[:, c], scene.stop_colors[:, c]) for c in range(3)]
+    return np.stack(channels, axis=1)
+
+
+def solid_shapes(scene: Scene) -> IndexArray:
+    """Those that are more opaque than not, gradients in the mean of their stops."""
+    stops = scene.stop_opacities * np.repeat(scene.opacities, np.diff(scene.stop_first))
+    return np.flatnonzero(_mean(scene, scene.opacities, stops) >= SOLID)
+
+
+def _mean(scene: Scene, flat: FloatArray, stops: FloatArray) -> FloatArray:
+    """Of each shape, its own value, or the mean of those of its stops; shape (shape,)."""
     counts = np.diff(scene.stop_first)
     owner = np.repeat(np.arange(len(scene)), counts)
-    for channel in range(3):
-        total = np.bincount(owner, weights=scene.stop_colors[:, channel], minlength=len(scene))
-        colors[:, channel] = np.where(counts > 0, total / np.maximum(counts, 1), colors[:, channel])
-    return colors
+    total = np.bincount(owner, weights=stops, minlength=len(scene))
+    return np.where(counts > 0, total / np.maximum(counts, 1), flat).astype(np.float32)
 
 
 def main_colors(colors: FloatArray, often: IndexArray, count: int) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import gzip
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -57,9 +56,7 @@ class Reduction:
         # Of the pixels whose squares lie in the picture wholly.
         wide, tall = self.width // self.factor, self.height // self.factor
         small = resized(svg, wide, tall, 1 / self.factor)
-        score = score_svg(small, target[:tall, :wide], own=True, eyes=False, stop=stop)
-        data = svg.encode()
-        return replace(score, bytes=len(data), gzip_bytes=len(gzip.compress(data, 9, mtime=0)))
+        return score_svg(small, target[:tall, :wide], own=True, eyes=False, stop=stop).of_file(svg)
 
     def words(self) -> str:
         """What was done, for people."""

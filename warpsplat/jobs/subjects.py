@@ -13,7 +13,7 @@ from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import Refinement, matching
 from warpsplat.fit.export import finished
 from warpsplat.fit.loop import Fit
-from warpsplat.fit.palette import Palette
+from warpsplat.fit.palette import Palette, solid_shapes
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.stages import Stages
@@ -71,7 +71,8 @@ def draw(
 
     if settings.subject == "pixel":
         scene, per_pixel = trace_pixels(target, solid_color(settings.background))
-        scene = limited(scene, settings)
+        if settings.is_limited:
+            scene = limited(scene.take(solid_shapes(scene)), settings)
         return _made(scene, per_pixel, target, backend, interrupted=False)
     if settings.subject == "line":
         return draw_lines(
@@ -125,10 +126,13 @@ def _drawn(
     size, whole = enlargement(target), (target.shape[1], target.shape[0])
     shown, target = target, np.ascontiguousarray(target[::size, ::size])
     traced = trace(target, most=most)
-    scene = limited(traced.scene, settings)
+    drawing = Drawing(traced.scene, traced.joints, traced.same)
+    if settings.is_limited:
+        drawing = drawing.take(solid_shapes(drawing.scene))
+        drawing = replace(drawing, scene=limited(drawing.scene, settings))
     done = finish_drawing(
         target,
-        Drawing(scene, traced.joints, traced.same),
+        drawing,
         backend,
         Refinement(),
         finest=finest(settings),

@@ -174,7 +174,7 @@ def vectorize(
         report: called every few steps.
         stop: asked after every step; once true, the shapes as they are make the file. True later, the score
             is given up.
-        write: called with the SVG before it is scored, so that nothing that goes wrong then can lose it.
+        write: called with the file before it is scored, so that nothing that goes wrong then can lose it.
         stages: what the run goes on from, and is told of its state. A run within a time budget, and tracing,
             begin again: the one has no two runs alike, the other has no state but its beginning.
         reduction: of a larger image to ``target``; the file is of that one's size.
@@ -251,9 +251,12 @@ def vectorize(
     svg, scene = export_within(
         made.scene, settings, made.per_pixel, STOPPED if made.interrupted else metadata
     )
+    file = on_paper(svg, settings)
     if write:
-        write(svg)
+        write(file)
     score = _score(svg, target, settings, stop, reduction, interrupted=made.interrupted)
+    if score:
+        score = score.of_file(file)
     render_psnr, render_ssim = made.render_psnr, None
     fine = not reduction and target.shape[0] * target.shape[1] <= settings.fine_pixels
     if settings.renderer == "gaussian" and fine:
@@ -266,7 +269,7 @@ def vectorize(
         return score_svg(text, target, own=True, eyes=False)
 
     return Result(
-        svg=svg,
+        svg=file,
         scene=scene,
         score=score,
         render_psnr=render_psnr,
@@ -294,17 +297,23 @@ def training_seconds(settings: Settings, target: FloatArray, started: float) -> 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
     """The SVG, and the shapes in it: all, or those that show most where ``max_bytes`` has room for few."""
 
-    def made() -> str:
-        return finished(scene, settings, per_pixel, metadata)
+    def made() -> tuple[str, int]:
+        text = finished(scene, settings, per_pixel, metadata)
+        return text, len(on_paper(text, settings).encode())
 
-    svg = made()
-    while settings.max_bytes and len(svg.encode()) > settings.max_bytes and len(scene) > 1:
-        excess = 1 - settings.max_bytes / len(svg.encode())
+    svg, size = made()
+    while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
+        excess = 1 - settings.max_bytes / size
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
         seen = areas(scene) * scene.opacities
         scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg = made()
+        svg, size = made()
     return svg, scene
+
+
+def on_paper(svg: str, settings: Settings) -> str:
+    """The file that is delivered: ``svg`` on the sheet that ``settings`` ask for, if they do."""
+    return placed(svg, settings.size, settings.page, settings.units)
 
 
 def render_figures(
@@ -541,9 +550,6 @@ def make(
     """
     settings, history = work.settings, list[Progress]()
 
-    def on_paper(svg: str) -> str:
-        return placed(svg, settings.size, settings.page, settings.units)
-
     result = vectorize(
         work.target,
         settings,
@@ -553,14 +559,12 @@ def make(
         importance=work.importance,
         report=noting(history, report),
         stop=stop,
-        write=None if output is None else lambda svg: write_named(output, on_paper(svg)),
+        write=None if output is None else lambda file: write_named(output, file),
         stages=stages,
         reduction=work.reduction,
     )
     release_memory()
-    return replace(
-        result, svg=on_paper(result.svg), subject=settings.subject, why=work.why, history=tuple(history)
-    )
+    return replace(result, subject=settings.subject, why=work.why, history=tuple(history))
 
 
 def _read(source: ImageSource) -> ImageSource:

@@ -46,6 +46,12 @@ FAINT = 24.0
 THIN = 0.35
 """Share of a thin line in a pixel from which on it is the line's."""
 
+OTHER = 64.0
+"""How far a pixel of a thin part is from what its colour explains, to be of another colour [levels]."""
+
+COLORS_OF_A_PART = 4
+"""At the most."""
+
 SPECK = 8
 """Pixels of a part that may be where several regions meet."""
 
@@ -315,7 +321,7 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> Bools:
     """Give up small regions that are seen as little more than mixtures of what is around them.
 
     Returns:
-        the pixels of these, shape (height, width).
+        the pixels of these, shape (height, width), but for those that are of their own colour all the same.
     """
     given_up = np.zeros(painted.shape, np.bool_)
     for most, reach in SMALL if noise == 0 else (SMALL[0], *SMALL):
@@ -336,16 +342,55 @@ def _prune(image: Floats, painted: Ints, pure: Floats, noise: float) -> Bools:
             tinted = np.bincount(owner, seen == 0, len(small)) >= MOSTLY * pixels
             gone |= tinted[owner] & (seen == 0)
         rows, columns = rows[gone], columns[gone]
+        # What is not mixed at all is no chance, though its colour is found across a line as well.
+        off = np.abs(image[rows, columns] - pure[rows, columns]).max(axis=1)
+        own = (result.label[gone] == painted[rows, columns]) & (off <= MIXED + noise)
         painted[rows, columns], pure[rows, columns] = result.label[gone], result.color[gone]
-        given_up[rows, columns] = True
+        given_up[rows[~own], columns[~own]] = True
     return given_up
 
 
 def _thin_parts(
     image: Floats, labels: Ints, pure: Floats, paint: Ints, colorings: list[Coloring], noise: float
 ) -> tuple[Ints, Ints, list[Coloring]]:
-    """Seeds in lines and dots that are too thin to have any: pixels that no mixture explains."""
-    rows, columns = np.nonzero(labels == NOBODY)
+    """Seeds in lines and dots that are too thin to have any: pixels that no mixture explains.
+
+    A part may be of several colours, as a thin bar and its outline: those pixels that are not between one
+    colour and what is beside the part are parts of the next round, and keep that colour where no other of the
+    picture's is theirs.
+    """
+    waiting = labels == NOBODY
+    for turn in range(COLORS_OF_A_PART):
+        before = labels, pure.copy()
+        labels = np.where(waiting, NOBODY, labels).astype(np.int32)
+        labels, paint, colorings, odd, waiting = _thin_round(
+            image, labels, pure, paint, colorings, noise, waiting, first=turn == 0
+        )
+        stay = odd & (labels == NOBODY)
+        labels[stay], pure[stay] = before[0][stay], before[1][stay]
+        if not waiting.any():
+            break
+    return labels, paint, colorings
+
+
+def _thin_round(
+    image: Floats,
+    labels: Ints,
+    pure: Floats,
+    paint: Ints,
+    colorings: list[Coloring],
+    noise: float,
+    waiting: Bools,
+    *,
+    first: bool,
+) -> tuple[Ints, Ints, list[Coloring], Bools, Bools]:
+    """One colour for each part of the pixels that are ``waiting``, new ones in the ``first`` round only.
+
+    Returns:
+        labels, paint, colorings; the pixels of the parts; those of them that seem to be of another colour.
+    """
+    others = np.zeros_like(waiting)
+    rows, columns = np.nonzero(waiting)
     result = explain(image, labels, pure, rows, columns, _slack(noise))
     limit = MIXED + noise
     strange = np.zeros(labels.shape, np.float32)
@@ -355,7 +400,7 @@ def _thin_parts(
     odd = strange > limit
     count, parts = cv2.connectedComponents(odd.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
     if count <= 1:
-        return labels, paint, colorings
+        return labels, paint, colorings, odd, others
     rows, columns = np.nonzero(odd)
     owner = parts[rows, columns] - 1
     order = np.argsort(owner, kind="stable")
@@ -373,18 +418,20 @@ def _thin_parts(
         if len(y) <= SPECK and strange[y, x].max() < FAINT:
             continue
         chosen = _thin_color(image[y, x], strange[y, x], bases[y, x], colorings, near, limit)
-        if chosen == NOBODY:
+        if chosen == NOBODY or (chosen == len(colorings) and not first):
             continue
         if chosen == len(colorings):
             colorings.append(Coloring(_extreme(image[y, x], strange[y, x])))
         color = colorings[chosen].color
         toward = color - bases[y, x]
         share = ((image[y, x] - bases[y, x]) * toward).sum(axis=1) / np.maximum((toward**2).sum(axis=1), 1)
+        off = np.abs(image[y, x] - bases[y, x] - np.clip(share, 0, 1)[:, None] * toward).max(axis=1)
         mine = share >= min(THIN, 0.8 * float(share.max()))
+        others[y, x] = mine & (off > OTHER)
         labels[y[mine], x[mine]] = len(paint_list)
         pure[y[mine], x[mine]] = color
         paint_list.append(chosen)
-    return labels, np.asarray(paint_list, np.int32), colorings
+    return labels, np.asarray(paint_list, np.int32), colorings, odd, others
 
 
 def _extreme(pixels: Floats, strange: Floats) -> Floats:

@@ -213,6 +213,7 @@ def _scene(canvas: Canvas, shapes: list[_Shape]) -> Traced:
     points = [contour.cubics[:, :3].reshape(-1, 2) for contour in contours]
     by_shape = np.array([sum(3 * len(c.cubics) for c in shape.contours) for shape in shapes], np.int64)
     colors = np.array([shape.coloring.color for shape in shapes]).reshape(-1, 4)
+    ramps = np.array([shape.coloring.ramp is not None for shape in shapes], np.bool_)
     joints = [_joints(contour) for contour in contours]
     total = int(counts.sum())
     scene = Scene.of(
@@ -224,7 +225,8 @@ def _scene(canvas: Canvas, shapes: list[_Shape]) -> Traced:
         starts=starts_of(counts),
         closed=np.ones(len(counts), np.int32),
         colors=straight_color((colors / 255).astype(np.float32)),
-        opacities=np.where(colors[:, 3] >= OPAQUE, 1, colors[:, 3] / 255).astype(np.float32),
+        # That of a gradient is its stops'.
+        opacities=np.where(ramps | (colors[:, 3] >= OPAQUE), 1, colors[:, 3] / 255).astype(np.float32),
         **_paints(shapes),
     )
     return Traced(
