@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat.cli.report import check_report
+from warpsplat.cli.request import Request
 from warpsplat.cli.run import run_several, say_about
 from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
@@ -28,77 +29,42 @@ COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Of the table."""
 
 
-def make_several(
-    image: Path,
-    output: Path | None,
-    numbers: Sequence[int],
-    given: dict[str, Any],
-    *,
-    importance: Path | None,
-    overwrite: bool,
-    report: Path | None,
-    device: str,
-    threads: int | None,
-    verbose: int,
-    quiet: bool,
-    as_json: bool,
-) -> None:
+def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]) -> None:
     """Make a file for each number of shapes, and say how good each is.
 
     Raises:
         WarpsplatError: what cannot be done is found before the work, as far as it can be.
     """
-    if image == importance == STANDARD:
-        raise UsageError("only one of image and mask can come from the standard input")
+    inputs, image = request.inputs, request.image
     settings = settings_from({**given, "curves": max(numbers)})
     check_several(settings, numbers)
-    outputs = named(image, output, numbers, settings)
+    outputs = named(image, request.output, numbers, settings)
     data = read_input(image)
-    inputs = (image,) if importance is None else (image, importance)
     for path in outputs:
-        check_output(path, *inputs, endings=ENDINGS, overwrite=overwrite)
+        check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
         check_format(path)
-        check_report(report, inputs, path, overwrite=overwrite)
-    results = run_several(
-        image,
-        outputs,
-        numbers,
-        settings,
-        data=data,
-        device=device,
-        threads=threads,
-        importance=importance,
-        verbose=verbose,
-        quiet=quiet,
-    )
+        check_report(request.report, inputs, path, overwrite=request.overwrite)
+    results = run_several(image, outputs, numbers, settings, data=data, **request.manner)
     made = list(zip(outputs, results, strict=False))
-    if not quiet and results:
-        say_about(image, settings, results[-1], verbose=verbose)
-    if as_json:
+    if not request.quiet and results:
+        say_about(image, settings, results[-1], verbose=request.verbose)
+    if request.as_json:
         each = [
-            {"image": str(image), "output": str(path), "device": device, **result.as_dict()}
+            {"image": str(image), "output": str(path), "device": request.device, **result.as_dict()}
             for path, result in made
         ]
         say(json.dumps(each))
-    elif not quiet:
+    elif not request.quiet:
         say(table(made))
-    if report and made:
-        _write_report(report, made, image, data, settings, output, numbers, importance)
+    if request.report and made:
+        line = several_command(settings, numbers, str(image), request.output, *request.flags)
+        _write_report(request.report, made, image, data, line)
 
 
 def _write_report(
-    report: Path,
-    made: Sequence[tuple[Path, Result]],
-    image: Path,
-    data: bytes,
-    settings: Settings,
-    output: Path | None,
-    numbers: Sequence[int],
-    importance: Path | None,
+    report: Path, made: Sequence[tuple[Path, Result]], image: Path, data: bytes, line: str
 ) -> None:
-    """Write the page that compares what was made."""
-    further = () if importance is None else ("--importance", str(importance))
-    line = several_command(settings, numbers, str(image), output, *further)
+    """Write the page that compares what ``line``, a command, made of ``image``, whose bytes are ``data``."""
     versions = [Version(result, f"{path.stem}.svg") for path, result in made]  # a result may be its picture
     versions.sort(key=lambda version: version.shapes)
     name = "image" if image == STANDARD else image.name

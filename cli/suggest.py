@@ -13,6 +13,7 @@ from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
+    from warpsplat.cli.request import Request
     from warpsplat.fit.settings import Settings
     from warpsplat.jobs.suggest import Suggestion
 
@@ -23,65 +24,50 @@ suggest_option = click.option(
 )
 
 
-def suggest_number(
-    image: Path,
-    given: dict[str, Any],
-    *,
-    importance: Path | None,
-    device: str,
-    threads: int | None,
-    quiet: bool,
-    verbose: int,
-    as_json: bool,
-) -> None:
+def suggest_number(request: Request, given: dict[str, Any]) -> None:
     """Print a suggestion, its reasons, and the command that follows it.
 
     Raises:
-        UsageError: settings that say how many shapes there are.
+        UsageError: settings that say how many shapes there are, or an output.
     """
+    if request.output or request.report:
+        raise UsageError(NOTHING_ELSE)
     if given["curves"] is not None:
         raise UsageError("--suggest and --curves do not go together")
     from warpsplat.cli.run import suggest_file
-    from warpsplat.files.inputs import STANDARD, input_name, read_input
+    from warpsplat.files.inputs import input_name, read_input
     from warpsplat.jobs.options import settings_from
     from warpsplat.jobs.suggest import check_suggesting
 
-    if image == importance == STANDARD:
-        raise UsageError("only one of image and mask can come from the standard input")
+    image, _ = request.image, request.inputs
     settings = settings_from(given)
     check_suggesting(settings)
-    made = suggest_file(
-        image,
-        settings,
-        data=read_input(image),
-        device=device,
-        threads=threads,
-        importance=importance,
-        verbose=verbose,
-        quiet=quiet,
-    )
+    made = suggest_file(image, settings, data=read_input(image), **request.manner)
     if made is None:
         return
-    command = _command(image, settings, made, importance)
-    if as_json:
+    command = _command(request, settings, made)
+    if request.as_json:
         say(json.dumps({"image": str(image), "command": command, **made.as_dict()}))
     else:
         say("\n".join([*_lines(input_name(image), made), f"  {command}"]))
 
 
-def _command(image: Path, settings: Settings, made: Suggestion, importance: Path | None) -> str:
+NOTHING_ELSE = "--suggest takes one image, and writes nothing"
+
+
+def _command(request: Request, settings: Settings, made: Suggestion) -> str:
     """The line that follows the suggestion."""
     from dataclasses import replace
 
     from warpsplat.files.inputs import STANDARD
     from warpsplat.jobs.reports.command import vectorize_command
 
+    image = request.image
     output = "FILE.svg" if image == STANDARD else str(Path(image.name).with_suffix(".svg"))
-    mask = () if importance is None else ("--importance", str(importance))
     if made.curves is None:
         return shlex.join(["warpsplat", "vectorize", str(image), "-o", output])
     chosen = replace(settings, curves=made.curves, simplify=False)
-    return vectorize_command(chosen, str(image), output, *mask)
+    return vectorize_command(chosen, str(image), output, *request.flags)
 
 
 def _lines(name: str, made: Suggestion) -> list[str]:

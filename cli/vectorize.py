@@ -19,8 +19,9 @@ from warpsplat.cli.options import (
     several_quality_options,
 )
 from warpsplat.cli.report import check_report, report_option, write_report
+from warpsplat.cli.request import Request
 from warpsplat.cli.say import say
-from warpsplat.cli.suggest import suggest_number, suggest_option
+from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
 from warpsplat.jobs.options import settings_from
@@ -73,23 +74,16 @@ def command(
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
     motion = Motion.of(given)
+    numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
+    request = Request(
+        images[0], output, importance, overwrite, report, device, threads, verbose, quiet, as_json
+    )
     if suggest:
         motion.for_several("a run that makes a file")
-        if len(images) > 1 or output or report or as_uri or checkpoint or resume:
-            raise UsageError("--suggest takes one image, and writes nothing")
-        suggest_number(
-            images[0],
-            given,
-            importance=importance,
-            device=device,
-            threads=threads,
-            quiet=quiet,
-            verbose=verbose,
-            as_json=as_json,
-        )
-        return
-    numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
-    if len(images) > 1:
+        if len(images) > 1 or as_uri or checkpoint or resume:
+            raise UsageError(NOTHING_ELSE)
+        suggest_number(request, given)
+    elif len(images) > 1:
         if numbers:
             raise UsageError(
                 "several images, each with several numbers of shapes: a batch file, with "
@@ -104,49 +98,53 @@ def command(
             Manner(overwrite=overwrite, threads=threads, report=report, quiet=quiet, as_json=as_json),
             as_uri=as_uri,
         )
-        return
-    image = images[0]
-    if numbers:
+    elif numbers:
         motion.for_several("one number of shapes")
         if as_uri or checkpoint or resume:
             flag = "--data-uri" if as_uri else "--checkpoint" if checkpoint else "--resume"
             raise UsageError(f"several numbers of shapes and {flag} do not go together")
         from warpsplat.cli.several import make_several
 
-        make_several(
-            image,
-            output,
-            numbers,
-            given,
-            importance=importance,
-            overwrite=overwrite,
-            report=report,
-            device=device,
-            threads=threads,
-            verbose=verbose,
-            quiet=quiet,
-            as_json=as_json,
-        )
-        return
+        make_several(request, numbers, given)
+    else:
+        keeping = {"checkpoint": checkpoint, "resume": resume, "checkpoint_every": checkpoint_every}
+        single(request, given, motion, keeping, as_uri=as_uri)
+
+
+def single(
+    request: Request, given: dict[str, Any], motion: Motion, keeping: dict[str, Any], *, as_uri: bool
+) -> None:
+    """Make a file of one image, and all that is asked for besides.
+
+    Args:
+        request: what is to be done.
+        given: settings.
+        motion: what shows the run.
+        keeping: how its state is kept: ``checkpoint`` and what goes with it, see ``warpsplat.vectorize``.
+        as_uri: whether the file is printed.
+
+    Raises:
+        WarpsplatError: what cannot be done is found before the work, as far as it can be.
+    """
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import check_output
     from warpsplat.jobs.formats import ENDINGS, check_format
 
-    if output is None and image == STANDARD:
+    image, overwrite, report = request.image, request.overwrite, request.report
+    if request.output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
-    if as_uri and output == STANDARD:
+    if as_uri and request.output == STANDARD:
         raise UsageError("the standard output takes one thing: -o - or --data-uri")
-    if image == importance == STANDARD:
-        raise UsageError("only one of image and mask can come from the standard input")
+    inputs = request.inputs
     data = read_input(image)
-    output = output or Path(image.name).with_suffix(".svg")
-    inputs = (image,) if importance is None else (image, importance)
+    output = request.output or Path(image.name).with_suffix(".svg")
     check_output(output, *inputs, endings=ENDINGS, overwrite=overwrite)
     check_format(output)
-    if checkpoint:
-        check_output(checkpoint, *inputs)
-    motion.check(*inputs, output, *filter(None, [checkpoint]), overwrite=overwrite)
+    kept = [path for path in (keeping["checkpoint"],) if path]
+    for path in kept:
+        check_output(path, *inputs)
+    motion.check(*inputs, output, *kept, overwrite=overwrite)
     check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
@@ -155,36 +153,31 @@ def command(
         output,
         settings,
         data=data,
-        device=device,
-        threads=threads,
-        importance=importance,
-        verbose=verbose,
-        quiet=quiet,
-        checkpoint=checkpoint,
-        resume=resume,
-        checkpoint_every=checkpoint_every,
         overwrite=overwrite,
         motion=motion,
+        **request.manner,
+        **keeping,
     )
-    motion.finish(result, quiet=quiet)
+    motion.finish(result, quiet=request.quiet)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 
         say(data_uri(result.svg))
-    values = {"image": str(image), "output": str(output), "device": device, **result.as_dict()}
+    values = {"image": str(image), "output": str(output), "device": request.device, **result.as_dict()}
     if report:
         values["report"] = str(report)
     aside = as_uri or output == STANDARD
-    if as_json:
+    if request.as_json:
         say(json.dumps(values), err=aside)
-    elif not quiet:
+    elif not request.quiet:
         say(summary(output, values), err=aside)
     if report:
         from warpsplat.jobs.reports.command import vectorize_command
 
-        further = () if importance is None else ("--importance", str(importance))
-        line = vectorize_command(settings, str(image), str(output), *further)
-        write_report(report, result, image, data, output, line, device=device, threads=threads)
+        line = vectorize_command(settings, str(image), str(output), *request.flags)
+        write_report(
+            report, result, image, data, output, line, device=request.device, threads=request.threads
+        )
     leave(result)
 
 

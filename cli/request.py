@@ -1,0 +1,50 @@
+"""What a command line asks for of one image, besides the settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from warpsplat.errors import UsageError
+from warpsplat.files.inputs import STANDARD
+
+
+@dataclass(frozen=True)
+class Request:
+    """One image, and how it is to be done and told of."""
+
+    image: Path
+    output: Path | None
+    importance: Path | None
+    """File of a mask."""
+    overwrite: bool
+    report: Path | None
+    """Page on the result."""
+    device: str
+    threads: int | None
+    verbose: int
+    quiet: bool
+    as_json: bool
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """All that is read.
+
+        Raises:
+            UsageError: more than one of them is the standard input.
+        """
+        if self.image == self.importance == STANDARD:
+            raise UsageError("only one of image and mask can come from the standard input")
+        return (self.image,) if self.importance is None else (self.image, self.importance)
+
+    @property
+    def manner(self) -> dict[str, Any]:
+        """What the runs of ``cli.run`` take besides image and settings."""
+        names = ("device", "threads", "importance", "verbose", "quiet")
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Words of a command that does the same again, besides those of settings."""
+        return () if self.importance is None else ("--importance", str(self.importance))
