@@ -190,7 +190,8 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
         executor, threads = executor_for(jobs, manner, interrupt)
         reports = None
         if manner.report and not manner.dry_run:
-            reports = Reports.at(manner.report, home, overwrite=manner.overwrite)
+            taken = [notes.path, *(path for job in jobs for path in (job.output, job.image))]
+            reports = Reports.at(manner.report, home, taken=taken, overwrite=manner.overwrite)
         index = Index(planned, reports) if reports else None
 
         def hear(report: Report) -> None:

@@ -13,6 +13,7 @@ import click
 from warpsplat.cli.run import SUBJECTS
 from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
+from warpsplat.errors import printable
 from warpsplat.jobs.batch.run import Report
 from warpsplat.jobs.batch.totals import Totals
 from warpsplat.jobs.formats import is_picture
@@ -109,15 +110,16 @@ class Show:
 def line(report: Report) -> str:
     """One line on a job that did not fail, for people."""
     output, figures = report.job.output, report.figures
+    name = printable(str(output))
     if report.status == "skipped":
         psnr = f", {figures['psnr']:.2f} dB" if figures.get("psnr") is not None else ""
         size = f", {figures['bytes'] / 1000:.1f} kB" if figures.get("bytes") is not None else ""
         size += " as an SVG" if size and is_picture(output) else ""
-        return f"{output}: already made with these settings{psnr}{size}"
+        return f"{name}: already made with these settings{psnr}{size}"
     if report.status == "planned":
-        return f"{output}: would be made of {report.job.image}"
+        return f"{name}: would be made of {printable(str(report.job.image))}"
     if not figures:
-        return f"{output}: stopped, not made"
+        return f"{name}: stopped, not made"
     subject = figures["subject"]
     taken = f", taken for a {SUBJECTS[subject]}" if figures["why"] and subject != "photo" else ""
     return summary(output, dict(figures)) + taken

@@ -12,7 +12,7 @@ from warpsplat.cli.report import check_report
 from warpsplat.cli.request import Request
 from warpsplat.cli.run import run_several, say_about
 from warpsplat.cli.say import say
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, printable
 from warpsplat.files.inputs import STANDARD, read_input
 from warpsplat.files.output import check_output, write_result
 from warpsplat.fit.settings import Settings
@@ -108,7 +108,7 @@ def _literal(text: str) -> str:
 
 def table(made: Sequence[tuple[Path, Result]]) -> str:
     """Lines that compare results."""
-    rows = [("", *COLUMNS), *((str(path), *_figures(result)) for path, result in made)]
+    rows = [("", *COLUMNS), *((printable(str(path)), *_figures(result)) for path, result in made)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first, *others in rows:

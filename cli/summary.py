@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from warpsplat.errors import printable
+
 
 def summary(output: Path, values: dict[str, Any]) -> str:
     """One line on the result, for people."""
     from warpsplat.jobs.formats import PICTURE_ENDINGS
 
-    name = "standard output" if str(output) == "-" else output
+    name = "standard output" if str(output) == "-" else printable(str(output))
     note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
     picture = " as an SVG" if output.suffix.lower() in PICTURE_ENDINGS else ""
     if values["paths"] is None:

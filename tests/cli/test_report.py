@@ -58,3 +58,25 @@ def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
         "other.svg.html",
         "photo.svg.html",
     ]
+
+
+@pytest.mark.parametrize(
+    ("report", "said"),
+    [
+        ("m.html", "is another file of this batch"),
+        ("out/photo.svg", "is another file of this batch"),
+        ("photo.png", "is another file of this batch"),
+        ("notes.txt", "is a file, not a folder"),
+    ],
+)
+def test_a_batch_s_report_takes_no_other_file_s_place(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], report: str, said: str
+) -> None:
+    notes = tmp_path / "notes.txt"
+    notes.write_text("mine")
+    before = sorted(tmp_path.rglob("*"))
+    manifest = ("--manifest", tmp_path / "m.html")
+    assert run("batch", image, "-o", tmp_path / "out", "--report", tmp_path / report, *manifest, *QUICK) == 2
+    assert said in one_line(capsys.readouterr().err)
+    assert sorted(tmp_path.rglob("*")) == before
+    assert notes.read_text() == "mine"

@@ -10,7 +10,7 @@ import pytest
 from warpsplat.cli.main import cli
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.options import settings_from
-from warpsplat.jobs.reports.command import refine_command, vectorize_command
+from warpsplat.jobs.reports.command import refine_command, several_command, vectorize_command
 from warpsplat.scene import Kind
 
 CASES: list[dict[str, Any]] = [
@@ -77,3 +77,11 @@ def test_refine() -> None:
     settings = make_settings(iterations=30, title="x y")
     line = refine_command(settings, "a.svg", "a.png", "b.svg", "--keep")
     assert line == "warpsplat refine a.svg a.png --iterations 30 --title 'x y' --keep -o b.svg"
+
+
+def test_names_that_begin_as_flags_do_are_paths() -> None:
+    settings = make_settings()
+    assert " ./-a.png " in vectorize_command(settings, "-a.png", "a.svg")
+    assert " ./-a.png " in several_command(settings, (8, 16), "-a.png", None) + " "
+    assert " ./-a.svg ./-a.png " in refine_command(settings, "-a.svg", "-a.png", "b.svg")
+    assert " - " in vectorize_command(settings, "-", "a.svg")

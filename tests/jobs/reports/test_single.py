@@ -194,6 +194,18 @@ def test_of_a_sheet_the_picture_is_shown(tmp_path: Path) -> None:
     assert values["listing"]["kinds"] == ["stroke"] * len(result.scene)
 
 
+@pytest.mark.parametrize("placing", [{"size": "50x40mm"}, {"page": "a4"}, {"size": "3x100mm"}])
+def test_the_picture_on_a_sheet_has_the_proportions_of_the_image(
+    tmp_path: Path, placing: dict[str, str]
+) -> None:
+    """On a coarse grid as well, of which margins in whole units say too little."""
+    image = grain()[:23, :32]
+    result = warpsplat.vectorize(image, 3, subject="photo", iterations=3, device="cpu", **placing)
+    view = data_of(warpsplat.report(result, image, tmp_path / "x.html", device="cpu"))["view"]
+    across, down = (float(side) for side in view.split()[2:])
+    assert across / down == pytest.approx(32 / 23, rel=1e-6)
+
+
 def test_by_the_library_and_back(tmp_path: Path) -> None:
     backend = Backend.on("cpu", 1)
     made = report_page(SVG, grain(), backend, Facts(), name="a", svg_name="a.svg", back="../index.html")

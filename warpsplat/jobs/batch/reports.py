@@ -8,10 +8,11 @@ import html
 import logging
 import os
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from warpsplat.errors import OutputError, printable
+from warpsplat.errors import OutputError, UsageError, printable
 from warpsplat.files.output import check_output, may_replace, write_result
 from warpsplat.files.remote import is_remote
 from warpsplat.jobs.executors.tasks import Outcome
@@ -42,14 +43,18 @@ class Reports:
     """Whether files of others may be replaced."""
 
     @staticmethod
-    def at(place: Path, home: Path, *, overwrite: bool) -> Reports:
-        """Pages in the folder ``place``, or with the list of that name.
+    def at(place: Path, home: Path, *, taken: Iterable[Path] = (), overwrite: bool) -> Reports:
+        """Pages in the folder ``place``, or with the list of that name; ``taken``: other files of the batch.
 
         Raises:
-            UsageError: the list cannot be written.
+            UsageError: the list cannot be written, or is one of these files.
             OutputError: the folder cannot be made.
         """
         index = place if place.suffix.lower() in ENDINGS else place / INDEX_NAME
+        if os.path.realpath(place) in {os.path.realpath(path) for path in taken if not is_remote(path)}:
+            raise UsageError(f"{place}: is another file of this batch; give the report another name")
+        if place != index and place.exists() and not place.is_dir():
+            raise UsageError(f"{place}: is a file, not a folder; name a page .html")
         make_folder(index.parent)
         check_output(index, overwrite=overwrite)
         return Reports(index, home, overwrite)

@@ -30,7 +30,9 @@ def vectorize_command(settings: Settings, image: str, output: str, *further: str
     Where no flags say the same, as of settings that only batch files have, a comment tells so.
     """
     quality, given = flags_of(settings)
-    line = shlex.join(["warpsplat", "vectorize", image, *_words(quality, given), *further, "-o", output])
+    line = shlex.join(
+        ["warpsplat", "vectorize", as_path(image), *_words(quality, given), *further, "-o", output]
+    )
     return line if _settings(quality, given) == settings else f"{line}  # and settings that no flag says"
 
 
@@ -41,7 +43,7 @@ def several_command(
     quality, given = flags_of(replace(settings, curves=max(numbers), simplify=False))
     words = _words(quality, {**given, "curves": ",".join(map(str, numbers))})
     where = () if output is None else ("-o", os.fspath(output))
-    return shlex.join(["warpsplat", "vectorize", image, *words, *further, *where])
+    return shlex.join(["warpsplat", "vectorize", as_path(image), *words, *further, *where])
 
 
 def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:
@@ -54,7 +56,12 @@ def refine_command(settings: Settings, svg: str, image: str, output: str, *furth
         if getattr(settings, name) != getattr(default, name) and getattr(settings, name) is not None
     }
     words = _words(DEFAULT_QUALITY, given)
-    return shlex.join(["warpsplat", "refine", svg, image, *words, *further, "-o", output])
+    return shlex.join(["warpsplat", "refine", as_path(svg), as_path(image), *words, *further, "-o", output])
+
+
+def as_path(name: str) -> str:
+    """A file's name that no command takes for a flag."""
+    return f"./{name}" if name.startswith("-") and name != "-" else name
 
 
 def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:

@@ -86,7 +86,8 @@ def several_page(results: Sequence[Version], image: ImageSource, *, name: str, c
         knee=_words(results, at),
         command=command,
         data={
-            card["key"]: _shown(version.result.svg) for card, version in zip(versions, results, strict=True)
+            card["key"]: _shown(version.result.svg, shown.width, shown.height)
+            for card, version in zip(versions, results, strict=True)
         },
     )
 
@@ -116,10 +117,10 @@ def _card(version: Version, number: int, *, is_knee: bool) -> dict[str, Any]:
     }
 
 
-def _shown(svg: str) -> str:
+def _shown(svg: str, width: int, height: int) -> str:
     """A file as it is shown and downloaded; one on a sheet as its picture alone."""
-    view = picture_view(svg)
-    return svg if view is None else with_view(svg, view)
+    view = picture_view(svg, width, height)
+    return svg if view is None else with_view(svg, view, width, height)
 
 
 def plots(results: Sequence[Version], at: int | None) -> list[Plot | None]:

@@ -34,6 +34,7 @@ from warpsplat.pages.plot import Plot, plot
 from warpsplat.rendering.backend import Backend
 from warpsplat.svg.read_kept import load_kept
 from warpsplat.svg.strips import draw
+from warpsplat.svg.write import GRIDS
 
 ASSETS = ("viewer.css", "report.css", "viewer.js", "report.js")
 
@@ -98,8 +99,8 @@ def report_page(
         image = source_bytes(image)
     shown = shown_image(image, name, SHORT_PIXELS if facts.figures.get("reduced") else PAGE_PIXELS)
     height, width = shown.pixels.shape[:2]
-    view = picture_view(svg)
-    drawn = svg if view is None else with_view(svg, view)
+    view = picture_view(svg, shown.width, shown.height)
+    drawn = svg if view is None else with_view(svg, view, shown.width, shown.height)
     own = own and view is None
     base, target, why_not = None, shown.pixels, ""
     try:
@@ -153,18 +154,27 @@ VIEW = re.compile(
 """How a file written here begins that lies on a sheet (``svg.page``)."""
 
 
-def picture_view(svg: str) -> str | None:
-    """The view box of the picture alone, of one that lies in the middle of a sheet; None: of any other."""
+def picture_view(svg: str, width: int, height: int) -> str | None:
+    """The view box of the picture alone, of one that lies in the middle of a sheet; None: of any other.
+
+    ``width``, ``height``: of the image [px]. Margins are in whole units, so that what they leave is up to a
+    unit more or less than the picture, whose pixels have a number of units that files know (``GRIDS``).
+    """
     found = VIEW.match(svg)
     if not found:
         return None
     left, top, across, down = (float(found[i]) for i in range(2, 6))
-    return f"0 0 {across + 2 * left:g} {down + 2 * top:g}" if left < 0 or top < 0 else None
+    rooms = ((across + 2 * left) / width, (down + 2 * top) / height)
+    low = max(room - 1 / side for room, side in zip(rooms, (width, height), strict=True))
+    high = min(room + 1 / side for room, side in zip(rooms, (width, height), strict=True))
+    middle = (low + high) / 2
+    known = [grid for grid in GRIDS if low <= grid <= high]
+    units = min(known, key=lambda grid: abs(grid - middle)) if known else middle
+    return f"0 0 {units * width:.10g} {units * height:.10g}"
 
 
-def with_view(svg: str, view: str) -> str:
-    """A file on a sheet with the view box ``view``, which says its size in pixels."""
-    _, _, width, height = view.split()
+def with_view(svg: str, view: str, width: int, height: int) -> str:
+    """A file on a sheet with the view box ``view``, as large as the image [px]."""
     return VIEW.sub(rf'\g<1>width="{width}" height="{height}" viewBox="{view}"', svg, count=1)
 
 
