@@ -65,11 +65,13 @@ def check_format(path: Path) -> None:
 
 
 def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
-    """Pixels of a film per pixel of a picture of ``size``."""
+    """Pixels of a film per pixel of a picture of ``size``, whose shorter side keeps a pixel."""
     if width is not None:
-        return width / size[0]
-    most = FORMATS[path.suffix.lower()].side
-    return min(most, max(*size, LEAST_SIDE)) / max(size)
+        zoom = width / size[0]
+    else:
+        most = FORMATS[path.suffix.lower()].side
+        zoom = min(most, max(*size, LEAST_SIDE)) / max(size)
+    return max(zoom, 1 / min(size))
 
 
 MOST_PIXELS = 80_000_000
