@@ -121,3 +121,13 @@ def test_soft_gaussians_are_in_no_file(tmp_path: Path, capsys: pytest.CaptureFix
     assert run("render", svg, "-o", png, "--renderer", "gaussian") == 2
     assert "vectorize --renderer gaussian" in one_line(capsys.readouterr().err)
     assert not png.exists()
+
+
+def test_an_svg_of_very_many_pixels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whose fault it is, the SVG's or the scale's, says the exit code."""
+    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
+    svg.write_text('<svg xmlns="http://www.w3.org/2000/svg" width="1e9" height="1e-9" viewBox="0 0 4 2"/>')
+    assert run("render", svg, "-o", png) == 3
+    assert "a.svg: has more than 200 million pixels" in one_line(capsys.readouterr().err)
+    assert run("render", svg, "-o", png, "--scale", "2") == 2
+    assert "scale 2.0 makes" in one_line(capsys.readouterr().err)

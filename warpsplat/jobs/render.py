@@ -71,11 +71,16 @@ def check_scale(size: tuple[float, float], scale: float) -> None:
 
     Raises:
         UsageError: it has not.
+        ImageError: it has too many by itself.
     """
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
-    if max(size[0], 1.0) * scale * max(size[1], 1.0) * scale > MAX_PIXELS:
-        raise UsageError(f"scale {scale} makes more than {MAX_PIXELS // 1_000_000} million pixels")
+    pixels = max(size[0], 1.0) * max(size[1], 1.0)
+    if pixels * scale**2 > MAX_PIXELS:
+        most = f"more than {MAX_PIXELS // 1_000_000} million pixels"
+        if pixels > MAX_PIXELS and scale == 1:
+            raise ImageError(f"has {most}")
+        raise UsageError(f"scale {scale} makes {most}")
     if min(max(1.0, side) for side in size) * scale < 0.5:
         raise UsageError(f"scale {scale} leaves no pixel of {size[0]:g}x{size[1]:g}")
 
