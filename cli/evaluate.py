@@ -43,7 +43,8 @@ def command(image: Path, svg: Path, report: Path | None, overwrite: bool, as_jso
         svg_named = "image.svg" if svg == STANDARD else f"{svg.stem}.svg"
         api.report(text, shown, report, name=named, svg_name=svg_named)
     if as_json:
-        say(json.dumps({"image": str(image), "svg": str(svg), **values}))
+        page = {"report": str(report)} if report else {}
+        say(json.dumps({"image": str(image), "svg": str(svg), **values, **page}))
         return
     for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):
         unit = " dB" if name == "psnr" else ""

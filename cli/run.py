@@ -19,7 +19,7 @@ from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.work import Progress
+from warpsplat.fit.work import Progress, TimeLeft
 from warpsplat.jobs.suggest import Suggestion
 from warpsplat.jobs.vectorize import Result
 from warpsplat.rendering.device import choose_device, start_warp
@@ -38,7 +38,7 @@ class Bar:
     """What a bar shows of a run's reports: nothing of it goes back."""
 
     def __init__(self) -> None:
-        self._first: tuple[float, float] | None = None
+        self._time = TimeLeft()
         self._best = -math.inf
         self.work = 0.0
 
@@ -47,19 +47,10 @@ class Bar:
         self.work = max(self.work, progress.work)  # the share falls where a goal takes more than was thought
         if progress.fine:  # a reduced image has more decibels than the whole one
             self._best = max(self._best, progress.psnr)
-        self._first = self._first or (now, progress.work)
-        left = self._seconds_left(progress.work, now)
+        seconds = self._time.update(progress.work, now)
+        left = None if seconds is None else round(seconds)
         quality = f"{self._best:.2f} dB" if self._best > -math.inf else "reduced image"
         return (f"{left // 60}:{left % 60:02} left, " if left is not None else "") + quality
-
-    def _seconds_left(self, work: float, now: float) -> int | None:
-        """What the rest takes if work goes on as it did since the first report; None at the very start.
-
-        What was before, as kernels being compiled, says nothing of the rest.
-        """
-        assert self._first
-        done = work - self._first[1]
-        return round((now - self._first[0]) / done * (1 - work)) if done > 0 else None
 
 
 @contextlib.contextmanager

@@ -25,7 +25,9 @@ def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, capfd: pytest.Ca
     arguments = ("-o", better, "--iterations", "5", "--device", "cpu", "--report", page, "-q")
     assert run("refine", svg, image, *arguments) == 0  # our page may be replaced
     assert "<span>refine</span>" in page.read_text("utf-8") and "PSNR before" in page.read_text("utf-8")
-    assert run("eval", image, svg, "--report", page) == 0
+    capfd.readouterr()
+    assert run("eval", image, svg, "--report", page, "--json") == 0
+    assert json.loads(capfd.readouterr().out)["report"] == str(page)
     assert "<span>refine</span>" not in page.read_text("utf-8")
 
 

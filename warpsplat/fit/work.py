@@ -51,6 +51,23 @@ class Progress:
     """What there is now: to be used while the report is heard, and None in a run's history."""
 
 
+class TimeLeft:
+    """What the rest of a run takes if work goes on as it did since the first report.
+
+    What was before, as kernels being compiled, says nothing of the rest.
+    """
+
+    def __init__(self) -> None:
+        self._first: tuple[float, float] | None = None
+
+    def update(self, work: float, now: float) -> float | None:
+        """Take note of a share of the work at a time ``now`` [s]: the seconds; None at the very start."""
+        self._first = self._first or (now, work)
+        began, before = self._first
+        done = work - before
+        return (now - began) / done * (1 - work) if done > 0 else None
+
+
 Report = Callable[[Progress], None]
 
 

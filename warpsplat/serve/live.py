@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpsplat.api import save_svg
-from warpsplat.fit.work import Progress, Snapshot
+from warpsplat.fit.work import Progress, Snapshot, TimeLeft
 
 SHARE = 0.07
 """Of a run's time that pictures of it may take: with all the rest a page costs less than a tenth."""
@@ -35,12 +35,12 @@ class Live:
             clock: [s]
         """
         self._is_watched, self._changed, self._clock = is_watched, changed, clock
-        self._first: tuple[float, float] | None = None
+        self._time = TimeLeft()
         self._next = -math.inf
         self._started = clock()
         self.progress: Progress | None = None
         self.left: float | None = None
-        """What the rest takes if it goes on as it did since the first report [s]."""
+        """[s]"""
         self.picture = b""
         """The shapes, as an SVG."""
         self.number = 0
@@ -55,9 +55,7 @@ class Live:
     def __call__(self, progress: Progress) -> None:
         """Hear a report."""
         now = self._clock()
-        self._first = self._first or (now, progress.work)
-        done = progress.work - self._first[1]
-        self.left = (now - self._first[0]) / done * (1 - progress.work) if done > 0 else None
+        self.left = self._time.update(progress.work, now)
         self.note = ""
         snapshot = progress.snapshot
         self.progress = replace(progress, snapshot=None)  # which keeps a run's arrays

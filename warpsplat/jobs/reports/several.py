@@ -20,7 +20,7 @@ from warpsplat.jobs.vectorize import Result
 from warpsplat.pages import page
 from warpsplat.pages.plot import Mark, Plot, plot
 
-ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "several.js")
+ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "copy.js", "several.js")
 
 FIGURES = ("PSNR", "SSIM", "SSIMULACRA2", "Size", "Shapes", "Time")
 """Of a version, that its card shows."""

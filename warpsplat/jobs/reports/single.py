@@ -36,7 +36,7 @@ from warpsplat.svg.read_kept import load_kept
 from warpsplat.svg.strips import draw
 from warpsplat.svg.write import GRIDS
 
-ASSETS = ("viewer.css", "report.css", "viewer.js", "report.js")
+ASSETS = ("viewer.css", "report.css", "viewer.js", "copy.js", "report.js")
 
 
 @dataclass(frozen=True)

@@ -43,19 +43,6 @@
     byId("legend").hidden = viewer.shown("left") !== "error" && viewer.shown("right") !== "error";
   });
 
-  const command = byId("command");
-  byId("copy")?.addEventListener("click", async (event) => {
-    const button = event.currentTarget;
-    try {
-      await navigator.clipboard.writeText(command.textContent);
-      button.textContent = "Copied";
-    } catch {
-      getSelection().selectAllChildren(command);
-      button.textContent = "Selected";
-    }
-    setTimeout(() => (button.textContent = "Copy"), 1500);
-  });
-
   if (!listing) return;
 
   const count = listing.kinds.length;
