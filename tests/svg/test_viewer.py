@@ -140,6 +140,13 @@ def test_absurd_sizes_are_refused_before_drawing(attributes: str, monkeypatch: p
         draw_png(f"{HEAD}{attributes}>{PATH}</svg>")
 
 
+@pytest.mark.parametrize("zoom", [1e9, 1e308, float("inf")])
+def test_absurd_zooms_are_refused_before_drawing(zoom: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpsplat.svg.viewer.subprocess.run", None)
+    with pytest.raises(ImageError, match="million"):
+        draw_png(f"{SMALL}{PATH}</svg>", zoom=zoom)
+
+
 def test_pillows_limit_is_not_that_of_our_pictures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert render_svg(f"{SMALL}{PATH}</svg>").size == (40, 30)

@@ -76,7 +76,8 @@ def check_scale(size: tuple[float, float], scale: float) -> None:
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
     pixels = max(size[0], 1.0) * max(size[1], 1.0)
-    if pixels * scale**2 > MAX_PIXELS:
+    # Products grow to infinity; a power of a float raises OverflowError.
+    if pixels * scale * scale > MAX_PIXELS:
         most = f"more than {MAX_PIXELS // 1_000_000} million pixels"
         if pixels > MAX_PIXELS and scale == 1:
             raise ImageError(f"has {most}")

@@ -153,7 +153,9 @@ def shown_pixels(text: str, width: int | None, height: int | None, zoom: float |
     elif width or height:
         raise ValueError("width and height go together")
     else:
-        pixels = max(own[0], 1.0) * max(own[1], 1.0) * (zoom or 1.0) ** 2 if own else 0.0
+        factor = zoom or 1.0
+        # Products grow to infinity; a power of a float raises OverflowError.
+        pixels = max(own[0], 1.0) * max(own[1], 1.0) * factor * factor if own else 0.0
     if not pixels <= MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
     return pixels
