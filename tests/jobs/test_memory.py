@@ -232,7 +232,9 @@ def test_refining_against_what_takes_too_much_is_refused(
         '<path d="M9 9H40V30H9z" fill="#853"/></svg>'
     )
     arguments = ("refine", svg, image, "-o", output, "--iterations", 1, "--device", "cpu")
-    limit = memory.PROGRAM + memory.REFINED * WIDTH * HEIGHT
+    facts = image_facts(image.read_bytes())
+    assert facts
+    limit = memory.need_refined(facts, make_settings())
     assert run(*arguments, "--max-memory", limit) == 0
     monkeypatch.setattr("warpsplat.api.refine.load_target", None)
     capsys.readouterr()
