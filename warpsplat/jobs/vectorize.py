@@ -185,9 +185,10 @@ def vectorize(
     traced = start is None and settings.subject not in {"auto", "photo"}
     height, width = target.shape[:2]
     pixels, eyes = width * height, has_time_for_eyes(settings, target)
-    after = score_cost(pixels, settings.curves, backend, eyes=eyes)
-    after += sum(score_cost(pixels, count, backend, eyes=False) for count in settings.levels)
     pursued = start is None and not traced and (settings.target_psnr or settings.max_bytes)
+    known = 0 if traced or pursued else settings.curves  # of how many shapes there will be
+    after = score_cost(pixels, known, backend, eyes=eyes)
+    after += sum(score_cost(pixels, count, backend, eyes=False) for count in settings.levels)
     if pursued:
         made = pursue(
             target,
