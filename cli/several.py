@@ -22,8 +22,8 @@ from warpsplat.jobs.formats import ENDINGS, check_format
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.reports.command import several_command
 from warpsplat.jobs.reports.several import Version, several_page
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.several import check_several
-from warpsplat.jobs.vectorize import Result
 
 COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Of the table."""
@@ -44,7 +44,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
         check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
         check_format(path)
         check_report(request.report, inputs, path, overwrite=request.overwrite)
-    results = run_several(image, outputs, numbers, settings, data=data, **request.manner)
+    results = run_several(request, outputs, numbers, settings, data)
     made = list(zip(outputs, results, strict=False))
     if not request.quiet and results:
         say_about(image, settings, results[-1], verbose=request.verbose)

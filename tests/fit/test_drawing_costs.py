@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from tests.fit.drawings import logo
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import PATIENCE, Refinement
-from warpsplat.fit.drawing_costs import DONE, FITS, Costs, Ending, RoundsWatch, rounds_left
+from warpsplat.fit.drawing_costs import DONE, FITS, Costs, Ending, RoundsWatch, rounds_left, worthwhile_rounds
 from warpsplat.fit.nodes import Edit
 from warpsplat.fit.work import Meter, Progress
 from warpsplat.rendering.backend import Backend
@@ -69,7 +70,7 @@ def test_rounds_go_with_candidates_and_how_many_of_them_meet() -> None:
 
 def test_rounds_end_as_their_candidates_do() -> None:
     told: list[Progress] = []
-    watch = RoundsWatch(Meter(told.append), costs(), HOW, last=1000.0)
+    watch = RoundsWatch(Meter(told.append), costs(), HOW, least=0.004, last=1000.0)
     assert watch.ahead([], [], 16) == 1000, "none at all"
     many, few = (watch.ahead(edits(count), edits(10), 16) for count in (100, 20))
     assert many > few > 1000 + FITS * costs().refit(HOW)
@@ -85,6 +86,21 @@ def test_rounds_end_as_their_candidates_do() -> None:
     assert first < again, "a second fit of a round is work as well"
     watch.found(edits(20), edits(10), 15)
     assert again < report(), "and there are fewer rounds to come than there were"
+
+
+def test_rounds_end_where_they_spare_too_little() -> None:
+    assert worthwhile_rounds([], 0.004) == math.inf
+    assert worthwhile_rounds([0.001], 0.004) == 1
+    assert worthwhile_rounds([0.06], 0.004) > worthwhile_rounds([0.01], 0.004) > 1
+    assert worthwhile_rounds([0.064, 0.032], 0.004) == pytest.approx(3), "0.016, 0.008, 0.004"
+    assert worthwhile_rounds([0.128, 0.01, 0.032], 0.004) == pytest.approx(3), "half as much in the mean"
+    assert 20 < worthwhile_rounds([0.03, 0.032], 0.004) < 100, "it rises now and then"
+    told: list[Progress] = []
+    watch = RoundsWatch(Meter(told.append), costs(), HOW, least=0.004, last=1000.0)
+    before = watch.ahead(edits(90), edits(10), 16)
+    watch.spared(0.03)
+    watch.spared(0.01)
+    assert watch.ahead(edits(90), edits(10), 16) < before
 
 
 def test_a_fit_that_gains_nothing_is_about_to_end() -> None:

@@ -168,7 +168,7 @@ def test_large_pictures_have_fewer_rounds(device: str, monkeypatch: pytest.Monke
     backend, made = Backend.on(device, 1), split(logo())
     asked: list[int] = []
     target = render(logo().scene, backend=backend)
-    watch = RoundsWatch(Meter(None), Costs(target, made, backend), Refinement(), 0.0)
+    watch = RoundsWatch(Meter(None), Costs(target, made, backend), Refinement(), 0.0, 0.0)
 
     def found(candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> None:
         asked.append(most)

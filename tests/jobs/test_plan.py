@@ -19,8 +19,8 @@ from warpsplat.jobs.batch.file import MAX_FILE
 from warpsplat.jobs.batch.layers import KEYS
 from warpsplat.jobs.batch.plan import load_jobs
 from warpsplat.jobs.batch.run import marked
+from warpsplat.jobs.keys import job_key
 from warpsplat.jobs.research import UNSET
-from warpsplat.jobs.vectorize import job_key
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import write_svg
 

@@ -33,17 +33,20 @@ DONE = 0.75
 NEAR_END = 0.5
 """Share of ``drawing.PATIENCE`` after which a fit that gains nothing is expected to end by it."""
 
-GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.2
+GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.15
 """Of choosing the grid: of each drawing, of ``costs.PIXELS``, of a point."""
 
 FITS = 1.5
 """How often a drawing is fitted anew in a round, in the mean."""
 
-LOOK, LOOK_PIXELS, CANDIDATE = 25.0, 8.0, 0.32
-"""What else a round costs: each, of ``costs.PIXELS``, of a candidate."""
+LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 8.0, 0.03, 0.2
+"""What else a round costs: each, of ``costs.PIXELS``, of a point, of a candidate."""
 
 ROUNDS_LEFT = 0.33
 """See ``rounds_left``."""
+
+FALL, SLOWEST_FALL = 0.75, 0.95
+"""What a round spares over what the one before it did: in the mean, and the most that is expected."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,8 @@ class Costs:
 
     def look(self, candidates: float) -> float:
         """Of a round of ``tidy.tidied`` that finds so many candidates, besides fitting."""
-        cost = LOOK + LOOK_PIXELS * self._size + CANDIDATE * candidates
+        cost = LOOK + LOOK_PIXELS * self._size + LOOK_POINT * len(self.drawing.joints)
+        cost += LOOK_CANDIDATE * candidates
         return serial(self.backend) * cost
 
 
@@ -101,15 +105,24 @@ class Ending:
 class RoundsWatch:
     """The progress of the rounds in which a drawing loses nodes, of which nobody knows how many there are."""
 
-    def __init__(self, meter: Meter, costs: Costs, how: Refinement, last: float) -> None:
-        """``how``: it is fitted after a round. ``last``: what is to be done after the rounds."""
-        self._meter, self._costs, self._how, self._last = meter, costs, how, last
+    def __init__(self, meter: Meter, costs: Costs, how: Refinement, least: float, last: float) -> None:
+        """Nothing was found yet.
+
+        Args:
+            meter: of all stages.
+            costs: of the drawing.
+            how: it is fitted after a round.
+            least: share of the file's bytes that a round spares, or is the last.
+            last: what is to be done after the rounds.
+        """
+        self._meter, self._costs, self._how, self._least, self._last = meter, costs, how, least, last
+        self._spared: list[float] = []
         self._rest = 0.0
 
     def ahead(self, candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> float:
         """What rounds from one with these candidates on cost, and what comes then; see ``rounds_left``."""
         fits, number = FITS * self._costs.refit(self._how), len(candidates)
-        rounds = rounds_left(candidates, edits, most)
+        rounds = rounds_left(candidates, edits, min(most, worthwhile_rounds(self._spared, self._least)))
         # There are fewer candidates from round to round.
         self._rest = max(rounds - 1, 0.0) * (fits + self._costs.look(number / 2)) + self._last
         return min(rounds, 1.0) * (fits + self._costs.look(number)) + self._rest
@@ -119,20 +132,33 @@ class RoundsWatch:
         self.ahead(candidates, edits, most)
         self._meter.stage(self._costs.look(len(candidates)), self._rest)  # of which nothing shows
 
+    def spared(self, share: float) -> None:
+        """Take note of the share of the file's bytes that a round spared."""
+        self._spared.append(share)
+
     def refit(self) -> Report | None:
         """What is reported to while a drawing is fitted anew: maybe not for the last time in this round."""
         cost = self._costs.refit(self._how)
         return self._meter.stage(cost, (FITS - 1) * cost + self._rest)
 
 
-def rounds_left(candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> float:
+def rounds_left(candidates: Sequence[Edit], edits: Sequence[Edit], most: float) -> float:
     """How many rounds there will be, the one that found ``candidates`` and tries ``edits`` of them included.
 
     A round disposes of about those that it tries, so that the number of candidates falls by a factor, and
-    rounds go with its logarithm. The last of them are few and lie far apart, and a round that spares little
-    is the last, whence ``ROUNDS_LEFT``.
+    rounds go with its logarithm. The last of them are few and lie far apart, whence ``ROUNDS_LEFT``.
     """
     if not edits:
         return 0.0
     rounds = ROUNDS_LEFT * math.log1p(len(candidates)) * len(candidates) / len(edits)
-    return min(max(rounds, 1.0), float(most))
+    return min(max(rounds, 1.0), most)
+
+
+def worthwhile_rounds(spared: Sequence[float], least: float) -> float:
+    """How many rounds follow until one spares less than ``least``, by what those so far ``spared``: a share
+    that falls geometrically.
+    """
+    if not spared or spared[-1] <= least:
+        return math.inf if not spared else 1.0
+    fall = FALL if len(spared) < 2 else (spared[-1] / spared[0]) ** (1 / (len(spared) - 1))
+    return max(math.log(least / spared[-1]) / math.log(min(fall, SLOWEST_FALL)), 1.0)

@@ -101,7 +101,7 @@ def finish_drawing(
     second, costs = replace(REFIT, steps=2 * REFIT.steps), Costs(target, drawing, backend)
     refit = costs.refit(REFIT)
     last = DONE * costs.refit(second) + costs.grid() + refit
-    watch = RoundsWatch(meter, costs, after_round(target), last)
+    watch = RoundsWatch(meter, costs, after_round(target), WORTHWHILE, last)
     found = Outlines(drawing).edits() if report else []
     later = watch.ahead(found, apart(found), rounds_for(target[..., 0].size))
     drawing = refined(drawing, how, meter.stage(costs.refit(how), later, likely=Ending()))
@@ -169,7 +169,10 @@ def tidied(
             refused |= {e.key for e in left} - {e.key for e in taken}
             left = taken
         drawing = turned(drawing)
-        if sum(e.saved for e in left) < WORTHWHILE * size:
+        spared = sum(e.saved for e in left)
+        if watch:
+            watch.spared(spared / size)
+        if spared < WORTHWHILE * size:
             break
     return drawing
 

@@ -16,7 +16,7 @@ from warpsplat.fit.knee import knee
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
-from warpsplat.jobs.vectorize import prepare
+from warpsplat.jobs.prepare import prepare
 from warpsplat.rendering.backend import Backend
 
 TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from warpsplat.fit.export import export
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.motion.films import Frame, ticks_of, zoom_of
 from warpsplat.motion.shown import picture, screen, size_of
 from warpsplat.motion.timing import showings

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.serve.limits import Limits, Refused
 from warpsplat.serve.live import Live
 from warpsplat.serve.pictures import Picture
