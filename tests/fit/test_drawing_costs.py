@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,16 @@ import pytest
 from tests.fit.drawings import logo
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.drawing import PATIENCE, Refinement
-from warpsplat.fit.drawing_costs import DONE, FITS, Costs, Ending, RoundsWatch, rounds_left, worthwhile_rounds
+from warpsplat.fit.drawing_costs import (
+    DONE,
+    FITS,
+    UNKNOWN,
+    Costs,
+    Ending,
+    RoundsWatch,
+    rounds_left,
+    worthwhile_rounds,
+)
 from warpsplat.fit.nodes import Edit
 from warpsplat.fit.work import Meter, Progress
 from warpsplat.rendering.backend import Backend
@@ -89,7 +97,7 @@ def test_rounds_end_as_their_candidates_do() -> None:
 
 
 def test_rounds_end_where_they_spare_too_little() -> None:
-    assert worthwhile_rounds([], 0.004) == math.inf
+    assert worthwhile_rounds([], 0.004) == UNKNOWN
     assert worthwhile_rounds([0.001], 0.004) == 1
     assert worthwhile_rounds([0.06], 0.004) > worthwhile_rounds([0.01], 0.004) > 1
     assert worthwhile_rounds([0.064, 0.032], 0.004) == pytest.approx(3), "0.016, 0.008, 0.004"

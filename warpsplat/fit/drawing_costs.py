@@ -45,8 +45,11 @@ LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 8.0, 0.03, 0.2
 ROUNDS_LEFT = 0.33
 """See ``rounds_left``."""
 
-FALL, SLOWEST_FALL = 0.75, 0.95
-"""What a round spares over what the one before it did: in the mean, and the most that is expected."""
+UNKNOWN = 9.0
+"""Most rounds that are expected before two have shown what they spare: some drawings take no more."""
+
+FALL, SLOWEST_FALL = 0.9, 0.95
+"""What a round spares over the one before it: before that is known, and the most that is expected."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,11 @@ def worthwhile_rounds(spared: Sequence[float], least: float) -> float:
     """How many rounds follow until one spares less than ``least``, by what those so far ``spared``: a share
     that falls geometrically.
     """
-    if not spared or spared[-1] <= least:
-        return math.inf if not spared else 1.0
-    fall = FALL if len(spared) < 2 else (spared[-1] / spared[0]) ** (1 / (len(spared) - 1))
-    return max(math.log(least / spared[-1]) / math.log(min(fall, SLOWEST_FALL)), 1.0)
+    if not spared:
+        return UNKNOWN
+    if spared[-1] <= least:
+        return 1.0
+    fall, most = FALL, UNKNOWN
+    if len(spared) > 1:
+        fall, most = (spared[-1] / spared[0]) ** (1 / (len(spared) - 1)), math.inf
+    return max(min(math.log(least / spared[-1]) / math.log(min(fall, SLOWEST_FALL)), most), 1.0)
