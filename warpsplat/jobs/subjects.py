@@ -138,8 +138,8 @@ class Tries:
 
 
 FINISHED, SMALLER = 0.8, 0.7
-"""Bytes of a drawing over those as it was traced, and work on one of the right size over that on the first: in
-the mean, for progress."""
+"""Bytes of a drawing over those as it was traced; work on one of the right size over that on the first. For
+progress: in the mean."""
 
 
 def _drawn(
