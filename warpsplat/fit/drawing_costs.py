@@ -21,7 +21,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Paint
 from warpsplat.scene.geometry import areas
 
-STEP_PIXELS, STEP_LENGTH, STEP_PAINTED = 0.88, 0.2, 9.1
+STEP_PIXELS, STEP_LENGTH, STEP_PAINTED = 0.88, 0.2, 1.7
 """Of a step: of ``costs.PIXELS``, of a thousand pixels of outlines, of ``costs.PIXELS`` under gradients."""
 
 STARTED = 8
@@ -39,13 +39,13 @@ GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.15
 FITS = 1.5
 """How often a drawing is fitted anew in a round, in the mean."""
 
-LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 8.0, 0.03, 0.2
+LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 8.0, 0.025, 0.03
 """What else a round costs: each, of ``costs.PIXELS``, of a point, of a candidate."""
 
 ROUNDS_LEFT = 0.33
 """See ``rounds_left``."""
 
-UNKNOWN = 9.0
+UNKNOWN = 12.0
 """Most rounds that are expected before two have shown what they spare: some drawings take no more."""
 
 FALL, SLOWEST_FALL = 0.9, 0.95
