@@ -45,7 +45,7 @@ LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 8.0, 0.025, 0.03
 ROUNDS_LEFT = 0.33
 """See ``rounds_left``."""
 
-UNKNOWN = 12.0
+UNKNOWN = 10.0
 """Most rounds that are expected before two have shown what they spare: some drawings take no more."""
 
 FALL, SLOWEST_FALL = 0.9, 0.95
