@@ -21,7 +21,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Paint
 from warpsplat.scene.geometry import areas
 
-STEP_PIXELS, STEP_LENGTH, STEP_PAINTED = 0.88, 0.2, 1.7
+STEP_PIXELS, STEP_LENGTH, STEP_PAINTED = 0.8, 0.23, 1.7
 """Of a step: of ``costs.PIXELS``, of a thousand pixels of outlines, of ``costs.PIXELS`` under gradients."""
 
 STARTED = 8
