@@ -145,18 +145,13 @@ def is_ramp(
 
 
 @wp.func
-def is_chain(
-    spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
-) -> wp.bool:
-    """Whether a gradient is one of those that ``stops`` has a shorter way for: a ramp, but for more stops."""
+def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) -> wp.bool:
+    """Whether a gradient is one of those that ``stops`` has a shorter way for: a ramp, but for more stops, in
+    any order.
+    """
     if spread != PAD or last - first < 3:
         return False
-    if focus[0] != 0.0 or focus[1] != 0.0 or focus[2] != 0.0:
-        return False
-    for i in range(first + 1, last):
-        if offsets[i] <= offsets[i - 1]:
-            return False
-    return True
+    return focus[0] == 0.0 and focus[1] == 0.0 and focus[2] == 0.0
 
 
 @wp.func
@@ -166,7 +161,7 @@ def is_columnwise(
     """Whether one of the two has it."""
     if is_ramp(spread, focus, offsets, first, last):
         return True
-    return is_chain(spread, focus, offsets, first, last)
+    return is_chain(spread, focus, first, last)
 
 
 @wp.func

@@ -1,8 +1,8 @@
 """Padded gradients of three stops or more, column by column: linear ones and those of a circle's centre.
 
-What ``gradient`` computes of these, as vector arithmetic like ``ramp``. The colour at t is that of a stop and,
-for each interval from there on, the clamped share of its second stop times the difference of the two: only
-the intervals that a column reaches are looked at, which are one or two.
+What ``gradient`` computes of these, as vector arithmetic like ``ramp``. The colour at t is that of the first
+stop and, for each interval, the clamped share of its second stop times the difference of the two: only those
+that a column reaches are computed, which are one or two.
 """
 
 import warp as wp
@@ -30,12 +30,11 @@ TINY = wp.constant(1.0e-12)
 
 
 @wp.func
-def interval_at(offsets: wp.array[wp.float32], start: wp.int32, last: wp.int32, t: wp.float32) -> wp.int32:
-    """The first stop of the interval that ``t`` lies in, from ``start`` on; the end ones go on beyond it."""
-    k = start
-    while k < last - 2 and t >= offsets[k + 1]:
-        k += 1
-    return k
+def share_of_next(t: column, before: wp.float32, after: wp.float32) -> column:
+    """Of the second stop of an interval, at parameters ``t``; two stops in one place are a step."""
+    if after > before:
+        return share_of_second(t, before, after - before)
+    return wp.min(wp.max(STEEP * (t - column(before)) + column(1.0), column(0.0)), column(1.0))
 
 
 @wp.kernel
@@ -70,7 +69,7 @@ def stops_forward(
         return
     first = stop_first[shape]
     last = stop_first[shape + 1]
-    if not is_chain(spread[shape], focus[shape], stop_offsets, first, last):
+    if not is_chain(spread[shape], focus[shape], first, last):
         return
     f = frames[shape]
     linear = paint[shape] == LINEAR
@@ -82,20 +81,30 @@ def stops_forward(
         if not linear:
             v = column(top[1]) + down[1] * row
             t = roots(wp.cw_mul(t, t) + wp.cw_mul(v, v))
-        low = interval_at(stop_offsets, first, last, wp.min(t))
-        high = interval_at(stop_offsets, low, last, wp.max(t))
-        color = stop_colors[low]
+        lowest = wp.min(t)
+        highest = wp.max(t)
+        color = stop_colors[first]
         red = column(color[0])
         green = column(color[1])
         blue = column(color[2])
-        opacity = column(stop_opacities[low])
-        for k in range(low, high + 1):
-            share = share_of_second(t, stop_offsets[k], stop_offsets[k + 1] - stop_offsets[k])
-            between = stop_colors[k + 1] - stop_colors[k]
-            red = red + between[0] * share
-            green = green + between[1] * share
-            blue = blue + between[2] * share
-            opacity = opacity + (stop_opacities[k + 1] - stop_opacities[k]) * share
+        opacity = column(stop_opacities[first])
+        before = stop_offsets[first]
+        for k in range(first, last - 1):
+            after = wp.max(before, stop_offsets[k + 1])
+            color = stop_colors[k + 1]
+            if lowest >= after:
+                red = column(color[0])
+                green = column(color[1])
+                blue = column(color[2])
+                opacity = column(stop_opacities[k + 1])
+            elif highest >= before:
+                share = share_of_next(t, before, after)
+                between = color - stop_colors[k]
+                red = red + between[0] * share
+                green = green + between[1] * share
+                blue = blue + between[2] * share
+                opacity = opacity + (stop_opacities[k + 1] - stop_opacities[k]) * share
+            before = after
         paint_columns[slot, 0, x] = red
         paint_columns[slot, 1, x] = green
         paint_columns[slot, 2, x] = blue
@@ -129,13 +138,13 @@ def stops_backward(
 ):
     """One thread a shape sums its visible slots in a fixed order: the same bits on every run.
 
-    Of a column that reaches the intervals low .. high, the stop low takes all of the gradient but what the
-    share of the interval passes on to the next one, and so on.
+    The first stop takes all of a column's gradient but what the share of its interval passes on to the next
+    one, and so on. The offset of a stop that counts as lying where one before it does has no gradient.
     """
     shape = offset + wp.tid()
     first = stop_first[shape]
     last = stop_first[shape + 1]
-    if not is_gradient(paint[shape]) or not is_chain(spread[shape], focus[shape], stop_offsets, first, last):
+    if not is_gradient(paint[shape]) or not is_chain(spread[shape], focus[shape], first, last):
         return
     for i in range(first, last):
         stop_offsets_grad[i] = 0.0
@@ -169,36 +178,50 @@ def stops_backward(
                 green = paint_columns[slot, 1, x]
                 blue = paint_columns[slot, 2, x]
                 opacity = paint_columns[slot, 3, x]
-                low = interval_at(stop_offsets, first, last, wp.min(t))
-                high = interval_at(stop_offsets, low, last, wp.max(t))
+                lowest = wp.min(t)
+                highest = wp.max(t)
                 color_rest = wp.vec3(total(red), total(green), total(blue))
                 opacity_rest = total(opacity)
                 by_t = zero
-                for k in range(low, high + 1):
-                    width = stop_offsets[k + 1] - stop_offsets[k]
-                    share = share_of_second(t, stop_offsets[k], width)
-                    on = wp.vec3(
-                        total(wp.cw_mul(share, red)),
-                        total(wp.cw_mul(share, green)),
-                        total(wp.cw_mul(share, blue)),
-                    )
-                    opacity_on = total(wp.cw_mul(share, opacity))
-                    stop_colors_grad[k] = stop_colors_grad[k] + (color_rest - on)
-                    stop_opacities_grad[k] = stop_opacities_grad[k] + (opacity_rest - opacity_on)
-                    color_rest = on
-                    opacity_rest = opacity_on
-                    between = stop_colors[k + 1] - stop_colors[k]
-                    step = between[0] * red + between[1] * green + between[2] * blue
-                    step = (step + (stop_opacities[k + 1] - stop_opacities[k]) * opacity) / width
-                    # Beyond the stops nothing changes with t.
-                    step = wp.cw_mul(step, wp.min(STEEP * share, one))
-                    step = wp.cw_mul(step, wp.min(STEEP * (one - share), one))
-                    later = total(wp.cw_mul(share, step))
-                    stop_offsets_grad[k] = stop_offsets_grad[k] + (later - total(step))
-                    stop_offsets_grad[k + 1] = stop_offsets_grad[k + 1] - later
-                    by_t = by_t + step
-                stop_colors_grad[high + 1] = stop_colors_grad[high + 1] + color_rest
-                stop_opacities_grad[high + 1] = stop_opacities_grad[high + 1] + opacity_rest
+                at = first
+                before = stop_offsets[first]
+                own_before = int(1)
+                for k in range(first, last - 1):
+                    after = wp.max(before, stop_offsets[k + 1])
+                    own = wp.where(stop_offsets[k + 1] >= before, 1, 0)
+                    if lowest >= after:
+                        at = k + 1
+                    elif highest >= before:
+                        share = share_of_next(t, before, after)
+                        on = wp.vec3(
+                            total(wp.cw_mul(share, red)),
+                            total(wp.cw_mul(share, green)),
+                            total(wp.cw_mul(share, blue)),
+                        )
+                        opacity_on = total(wp.cw_mul(share, opacity))
+                        stop_colors_grad[k] = stop_colors_grad[k] + (color_rest - on)
+                        stop_opacities_grad[k] = stop_opacities_grad[k] + (opacity_rest - opacity_on)
+                        color_rest = on
+                        opacity_rest = opacity_on
+                        at = k + 1
+                        if after > before:
+                            between = stop_colors[k + 1] - stop_colors[k]
+                            step = between[0] * red + between[1] * green + between[2] * blue
+                            step = step + (stop_opacities[k + 1] - stop_opacities[k]) * opacity
+                            step = step / (after - before)
+                            # Beyond the two stops nothing changes with t.
+                            step = wp.cw_mul(step, wp.min(STEEP * share, one))
+                            step = wp.cw_mul(step, wp.min(STEEP * (one - share), one))
+                            later = total(wp.cw_mul(share, step))
+                            if own_before == 1:
+                                stop_offsets_grad[k] = stop_offsets_grad[k] + (later - total(step))
+                            if own == 1:
+                                stop_offsets_grad[k + 1] = stop_offsets_grad[k + 1] - later
+                            by_t = by_t + step
+                    before = after
+                    own_before = own
+                stop_colors_grad[at] = stop_colors_grad[at] + color_rest
+                stop_opacities_grad[at] = stop_opacities_grad[at] + opacity_rest
                 if linear:
                     by_u = by_u + by_t
                     u_by_u = u_by_u + wp.cw_mul(u, by_t)

@@ -48,9 +48,9 @@ def test_ramps(device: str, lanes: int, clear: bool) -> None:
 
 @pytest.mark.parametrize("lanes", [1, 16])
 @pytest.mark.parametrize("clear", [False, True])
-def test_chains_of_stops(device: str, lanes: int, clear: bool) -> None:
-    """Of which columns reach one interval, several, or lie beyond either end."""
-    offsets = (0.15, 0.3, 0.42, 0.5, 0.95)
+@pytest.mark.parametrize("offsets", [(0.15, 0.3, 0.42, 0.5, 0.95), (0.15, 0.4, 0.4, 0.6, 0.6)])
+def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[float, ...]) -> None:
+    """Of which columns reach one interval, several, or lie beyond either end; some where the one before lies."""
     scene = with_stops(random_scene(Kind.FILL, 6, seed=12), offsets, seed=13)
     compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
 
