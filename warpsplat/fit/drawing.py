@@ -162,7 +162,7 @@ def start(
 def _look(step: Step) -> tuple[Scene, float]:
     """The scene and its mean squared error."""
     step.render()
-    return step.state.scene(), step.square_error()
+    return step.state.scene(), step.measured_error()
 
 
 NEAR = 6 / 255
