@@ -5,6 +5,7 @@ A set of them is an array of whole numbers, ascending, one for each.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -86,8 +87,8 @@ def by_cell(tiles: npt.NDArray[np.floating[Any]], viewport: Viewport) -> Floats:
         shape (rows + 2, columns + 2).
     """
     side = TILE // CELL
-    tall = sum(tiles[..., i::CELL].astype(np.float64) for i in range(CELL))
-    small = sum(tall[:, i::CELL] for i in range(CELL))
+    tall = functools.reduce(np.add, [tiles[..., i::CELL].astype(np.float64) for i in range(CELL)])
+    small = functools.reduce(np.add, [tall[:, i::CELL] for i in range(CELL)])
     blocks = small.reshape(viewport.tiles_y, viewport.tiles_x, side, side).transpose(0, 3, 1, 2)
     sums = blocks.reshape(viewport.tiles_y * side, viewport.tiles_x * side)
     return np.pad(sums[: -(-viewport.height // CELL), : -(-viewport.width // CELL)], 1)
