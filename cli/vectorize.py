@@ -158,7 +158,7 @@ def single(
         **request.manner,
         **keeping,
     )
-    motion.finish(result, quiet=request.quiet)
+    motion.finish(result, quiet=request.quiet, device=request.device, threads=request.threads)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 
