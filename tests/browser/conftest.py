@@ -1,4 +1,4 @@
-"""A real browser, headless, for all tests of a worker; where there is none they are skipped."""
+"""A real browser, headless, for all tests of this folder; where there is none they are skipped."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ def installed_browser() -> str | None:
     return given or next(filter(None, map(shutil.which, NAMES)), None)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
+    """As long as it is there, so is an event loop of its own: other folders' tests run some themselves."""
     api = pytest.importorskip("playwright.sync_api", reason="pip install playwright, for tests in a browser")
     with api.sync_playwright() as playwright:
         executable = installed_browser()

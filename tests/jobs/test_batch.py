@@ -15,10 +15,9 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import one_line, run
-from tests.jobs.helpers import answers, write
+from tests.jobs.helpers import answers, load_jobs, write
 from warpsplat.cli.batch_show import Show
 from warpsplat.jobs.batch.manifest import NAME, Manifest, entry_of
-from warpsplat.jobs.batch.plan import load_jobs
 from warpsplat.jobs.batch.run import Batch, Report
 from warpsplat.jobs.executors.serial import Serial
 from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Stop, Task

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypedDict
 
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.costs import Course, score_cost
@@ -24,6 +24,16 @@ from warpsplat.scene import FloatArray
 from warpsplat.svg.order import by_color, by_opacity
 
 
+class Watching(TypedDict):
+    """Who hears of a training, and who has a say in it."""
+
+    report: Report | None
+    after: float
+    """Work that comes after it (``fit.costs``)."""
+    stop: Callable[[], bool] | None
+    stages: Stages | None
+
+
 @dataclass(frozen=True)
 class Training:
     """What shapes are made of, and who is told; see ``jobs.vectorize.vectorize``."""
@@ -36,11 +46,7 @@ class Training:
     importance: FloatArray | None
     seconds: float | None
     """That it may take."""
-    report: Report | None
-    after: float
-    """Work that comes after it (``fit.costs``)."""
-    stop: Callable[[], bool] | None
-    stages: Stages | None
+    watching: Watching
 
 
 Way = Literal["fit", "layers", "goal", "trace"]
@@ -69,7 +75,7 @@ def trained(run: Training, way: Way) -> Fit:
 def _by_fit(run: Training) -> Fit:
     height, width = run.target.shape[:2]
     scene, past, begin = (run.start.scene, run.start.past, run.start.begin) if run.start else (None, None, 0)
-    course = Course.of(run.settings, width, height, run.backend, begin=begin)
+    course, watching = Course.of(run.settings, width, height, run.backend, begin=begin), run.watching
     return fit(
         run.target,
         run.settings,
@@ -79,23 +85,14 @@ def _by_fit(run: Training) -> Fit:
         begin=begin,
         importance=run.importance,
         seconds=run.seconds,
-        report=Meter(run.report, run.after).stage(course.cost(), 0),
-        stop=run.stop,
-        stages=run.stages,
+        report=Meter(watching["report"], watching["after"]).stage(course.cost(), 0),
+        stop=watching["stop"],
+        stages=watching["stages"],
     )
 
 
 def _by_layers(run: Training) -> Fit:
-    return fit_layered(
-        run.target,
-        run.settings,
-        run.backend,
-        importance=run.importance,
-        report=run.report,
-        after=run.after,
-        stop=run.stop,
-        stages=run.stages,
-    )
+    return fit_layered(run.target, run.settings, run.backend, importance=run.importance, **run.watching)
 
 
 def _by_goal(run: Training) -> Fit:
@@ -106,24 +103,12 @@ def _by_goal(run: Training) -> Fit:
         metadata=run.metadata,
         importance=run.importance,
         seconds=run.seconds,
-        report=run.report,
-        after=run.after,
-        stop=run.stop,
-        stages=run.stages,
+        **run.watching,
     )
 
 
 def _by_trace(run: Training) -> Fit:
-    return draw(
-        run.target,
-        run.settings,
-        run.backend,
-        seconds=run.seconds,
-        report=run.report,
-        after=run.after,
-        stop=run.stop,
-        stages=run.stages,
-    )
+    return draw(run.target, run.settings, run.backend, seconds=run.seconds, **run.watching)
 
 
 def arranged(made: Fit, run: Training, way: Way) -> Fit:

@@ -152,10 +152,12 @@ def vectorize(
         start=start,
         importance=importance,
         seconds=training_seconds(settings, target, started),
-        report=report,
-        after=cost_after(settings, target, backend, way),
-        stop=stop,
-        stages=None if settings.time_budget else stages,
+        watching={
+            "report": report,
+            "after": cost_after(settings, target, backend, way),
+            "stop": stop,
+            "stages": None if settings.time_budget else stages,
+        },
     )
     if way == "fit" and settings.simplify and start is None:
         settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
