@@ -29,10 +29,9 @@ from warpsplat.scene.scene import starts_of
 HOW = Refinement(steps=25)
 
 
-def costs(drawing: Drawing | None = None, threads: int = 1) -> Costs:
-    drawing, backend = drawing or logo(), replace(Backend.on("cpu", 1), threads=threads)
-    canvas = drawing.scene.canvas
-    return Costs(np.ones((canvas.height, canvas.width, 3), np.float32), drawing, backend)
+def costs(drawing: Drawing | None = None, threads: int = 1, side: int = 64) -> Costs:
+    backend = replace(Backend.on("cpu", 1), threads=threads)
+    return Costs(np.ones((side, side, 3), np.float32), drawing or logo(), backend)
 
 
 def edits(count: int) -> list[Edit]:
@@ -40,14 +39,13 @@ def edits(count: int) -> list[Edit]:
 
 
 def test_steps_cost_by_what_they_render() -> None:
-    made = logo()
-    plain = costs(made).refit(HOW)
-    assert costs(made).refit(replace(HOW, steps=50)) > plain
-    large = Costs(np.ones((200, 200, 3), np.float32), made, Backend.on("cpu", 1))
-    assert large.refit(HOW) > plain
-    longer = replace(made, scene=replace(made.scene, points=2 * made.scene.points))
-    assert costs(longer).refit(HOW) > plain
-    count = len(made.scene)
+    def step(made: Drawing) -> float:
+        return costs(made).refit(replace(HOW, steps=26)) - costs(made).refit(HOW)
+
+    made, count = logo(), len(logo().scene)
+    plain = step(made)
+    longer = replace(made, scene=replace(made.scene, points=3 * made.scene.points))
+    assert step(longer) > plain > 0
     scene = replace(
         made.scene,
         paint=np.full(count, Paint.LINEAR, np.int32),
@@ -56,12 +54,17 @@ def test_steps_cost_by_what_they_render() -> None:
         stop_colors=np.zeros((2 * count, 3), np.float32),
         stop_opacities=np.ones(2 * count, np.float32),
     )
-    assert costs(replace(made, scene=scene)).refit(HOW) > 1.2 * plain
+    assert step(replace(made, scene=scene)) > 1.05 * plain
 
 
 def test_what_one_thread_does_counts_as_often_as_there_are() -> None:
-    assert costs(threads=4).refit(HOW) == costs().refit(HOW)
+    def steps(threads: int) -> float:
+        return costs(threads=threads).refit(replace(HOW, steps=50)) - costs(threads=threads).refit(HOW)
+
+    assert steps(4) == pytest.approx(steps(1))
+    assert costs(threads=4).refit(HOW) > costs().refit(HOW), "what comes before the steps"
     assert costs(threads=4).grid() == 4 * costs().grid()
+    assert costs(side=200).grid() > costs().grid()
     assert costs(threads=4).look(100) == 4 * costs().look(100) > 4 * costs().look(10)
 
 

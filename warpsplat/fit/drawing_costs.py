@@ -21,11 +21,12 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Paint
 from warpsplat.scene.geometry import areas
 
-STEP_PIXELS, STEP_LENGTH, STEP_PAINTED = 0.8, 0.23, 1.7
-"""Of a step: of ``costs.PIXELS``, of a thousand pixels of outlines, of ``costs.PIXELS`` under gradients."""
+STEP, STEP_LENGTH, STEP_PAINTED = 0.9, 0.18, 2.7
+"""Of a step: of each, of a thousand pixels of outlines, of ``costs.PIXELS`` under gradients. What lies inside of
+shapes of one colour is known."""
 
-STARTED = 8
-"""What a fit takes besides its steps, in steps."""
+STARTED = 25.0
+"""What a fit takes besides its steps."""
 
 DONE = 0.75
 """Share of a fit's steps that are taken in the mean: then nothing is gained any more."""
@@ -33,13 +34,13 @@ DONE = 0.75
 NEAR_END = 0.5
 """Share of ``drawing.PATIENCE`` after which a fit that gains nothing is expected to end by it."""
 
-GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.15
+GRID, GRID_PIXELS, GRID_POINT = 100.0, 35.0, 0.16
 """Of choosing the grid: of each drawing, of ``costs.PIXELS``, of a point."""
 
 FITS = 1.5
 """How often a drawing is fitted anew in a round, in the mean."""
 
-LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 8.0, 0.025, 0.03
+LOOK, LOOK_PIXELS, LOOK_POINT, LOOK_CANDIDATE = 25.0, 5.0, 0.02, 0.15
 """What else a round costs: each, of ``costs.PIXELS``, of a point, of a candidate."""
 
 ROUNDS_LEFT = 0.33
@@ -70,12 +71,11 @@ class Costs:
         on, following = self.drawing.links()
         length = np.hypot(*(scene.points[following] - scene.points[on]).T).sum()
         painted = areas(scene)[scene.paint != Paint.FLAT].sum()
-        cost = STEP_PIXELS * self._size + STEP_LENGTH * length / 1000 + STEP_PAINTED * painted / PIXELS
-        return float(cost)
+        return float(STEP + STEP_LENGTH * length / 1000 + STEP_PAINTED * painted / PIXELS)
 
     def refit(self, how: Refinement) -> float:
         """Of fitting it, if all steps are taken."""
-        return (how.steps + STARTED) * self._step
+        return how.steps * self._step + serial(self.backend) * STARTED
 
     def grid(self) -> float:
         """Of choosing its grid."""
