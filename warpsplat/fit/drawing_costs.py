@@ -22,7 +22,7 @@ from warpsplat.scene import FloatArray, Paint
 from warpsplat.scene.geometry import areas
 
 STEP, STEP_LENGTH, STEP_PAINTED = 0.9, 0.18, 2.7
-"""Of a step: of each, of a thousand pixels of outlines, of ``costs.PIXELS`` under gradients. What lies inside of
+"""Of a step: of each, of a thousand pixels of outlines, of ``costs.PIXELS`` under gradients. What lies inside
 shapes of one colour is known."""
 
 STARTED = 25.0
