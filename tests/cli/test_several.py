@@ -41,6 +41,7 @@ def test_a_file_for_each_number(
     [
         ("out.svg", {"out-2.svg", "out-5.svg"}),
         ("f{o/x", {"f{o/x/photo-2.svg", "f{o/x/photo-5.svg"}),
+        ("new/{stem}/{curves}.png", {"new/photo/2.png", "new/photo/5.png"}),
         ("{stem}_{curves}_{seed}.svgz", {"photo_2_0.svgz", "photo_5_0.svgz"}),
     ],
 )
@@ -66,6 +67,9 @@ REFUSED = [
     (["--curves", "5,x"], "not a whole number, nor several"),
     (["--curves", "5,9", "-o", "-"], "several files: give -o 'NAME-{curves}.svg'"),
     (["--curves", "5,9", "-o", "same-{stem}.svg"], "2 results would be same-photo.svg"),
+    (["--curves", "5,9", "-o", "new/{curves}-{x}.svg"], "'{x}' is no field"),
+    (["--curves", "5,9", "-o", "new/{curves}.svg", "--report", "no/a.html"], "no does not exist"),
+    (["--curves", "5,9", "-o", "photo.png/{curves}.svg"], "photo.png is a file, not a folder"),
     (["--curves", "5,9", "--target-psnr", "20"], "and target-psnr do not go together"),
     (["--curves", "5,9", "--max-bytes", "2KB"], "and max-bytes do not go together"),
     (["--curves", "5,9", "--time-budget", "9s"], "and time-budget do not go together"),
@@ -110,9 +114,10 @@ def test_batches_say_what_to_use(image: Path, tmp_path: Path, capsys: pytest.Cap
     assert run("batch", image, "--curves", "5,9") == 2
     assert "matrix: {curves: [5, 9]}" in one_line(capsys.readouterr().err)
     jobs = tmp_path / "jobs.yaml"
-    jobs.write_text("jobs:\n  - images: photo.png\n    curves: [5, 9]\n")
-    assert run("batch", jobs) == 2
-    assert "matrix: {curves: [...]}" in one_line(capsys.readouterr().err)
+    for value, hint in (("[5, 9]", "{curves: [...]}"), ("5,9", "{curves: [5, 9]}")):
+        jobs.write_text(f"jobs:\n  - images: photo.png\n    curves: {value}\n")
+        assert run("batch", jobs) == 2
+        assert f"matrix: {hint}" in one_line(capsys.readouterr().err)
 
 
 def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> None:
@@ -136,6 +141,19 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
     assert [result.stopped for result in results] == [False, True]
     assert [output.exists() for output in outputs] == [True, True, False]
     assert outputs[0].read_text() == results[0].svg
+
+
+def test_files_are_named_after_their_numbers_where_it_is_interrupted(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of few shapes are made first, in whichever order the numbers are given."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("warpsplat.cli.run.Interrupt.__call__", lambda self: os.path.exists("photo-3.svg"))
+    run("vectorize", image, "--curves", "9,3,6", *FEW)
+    _, row, last = capsys.readouterr().out.splitlines()
+    assert row.split()[:2] == ["photo-3.svg", "3"]
+    assert last == "interrupted: no file with 9, 6 shapes"
+    assert {path.name for path in tmp_path.glob("*.svg")} == {"photo-3.svg"}
 
 
 def test_the_library_names_the_function_for_several(image: Path) -> None:
