@@ -207,7 +207,7 @@ def test_a_suggestion_in_words(
     from warpsplat.cli import run as runs
     from warpsplat.fit.survey import Worth
 
-    made = suggestion(Worth(16, 1024, (0.0, 2.0, 10.0), (1.0, 6.0), 0.1))
+    made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
@@ -220,9 +220,9 @@ def test_a_suggestion_in_words(
 def test_the_suggestion_is_the_knee() -> None:
     from warpsplat.fit.survey import Worth
 
-    made = suggestion(Worth(16, 1024, (0.0, 2.0, 10.0), (1.0, 6.0), 0.1))
+    made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     assert made.by_shapes == made.by_bytes == made.curves == 240
-    straight = suggestion(Worth(16, 17, (0.0, 0.0, 20.0), (1.0, 6.0), 0.0))
+    straight = suggestion(Worth(16, 17, 16, 20.0, 0.0, 0.0, 64.0))
     assert isinstance(straight, Suggestion) and straight.curves == 17
 
 
