@@ -183,6 +183,20 @@ def test_a_drawing_that_has_fewer_regions_is_traced_once(
     assert many.svg == most.svg and len(few.scene) < len(many.scene) <= 9
 
 
+@pytest.mark.parametrize("noise", [1, 90])
+def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
+    """They would lose by going on from one another; those to what looks like a photograph do go on."""
+    levels = np.full((48, 48, 3), 250, np.uint8)
+    levels[8:30, 8:30], levels[20:40, 20:44] = (200, 130, 130), (120, 180, 160)
+    levels -= np.random.default_rng(0).integers(0, noise, levels.shape, np.uint8)
+    path = tmp_path / "picture.png"
+    Image.fromarray(levels).save(path)
+    settings = warpsplat.make_settings(subject="photo", iterations=30, density={"interval": 2})
+    few, many = warpsplat.vectorize_several(path, [3, 6], settings=settings, device="cpu", threads=1)
+    assert few.iterations == 30
+    assert (many.iterations == 30) == (noise == 1)
+
+
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpsplat.fit.survey.STEPS", 60)
