@@ -54,7 +54,7 @@ TURN_PAINTED = 2.5
 FILE, FILE_PIXELS, FILE_SHAPE = 8.0, 25.0, 0.38
 """Of making and measuring a file, or of a look at it: of each, of ``PIXELS``, of a shape."""
 
-EYES, EYES_PIXELS, EYES_SHAPE = 200.0, 160.0, 0.3
+EYES, EYES_PIXELS, EYES_SHAPE = 200.0, 150.0, 0.5
 """Of making a file and measuring it with SSIMULACRA2 as well."""
 
 GRID, GRID_SHAPE, GRID_SHAPE_THRIFTY = 30.0, 0.22, 0.95
