@@ -113,7 +113,7 @@ def command(
             overwrite=overwrite,
         )
         motion.show(result, None if image == STANDARD else image)
-    motion.finish(result, quiet=quiet)
+    motion.finish(result, quiet=quiet, device=device, threads=threads)
     before = result.before or 0.0
     if result.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)

@@ -149,7 +149,7 @@ def single(
     from warpsplat.cli.run import leave, run_file
 
     result = run_file(request, output, settings, data, motion=motion, **keeping)
-    motion.finish(result, quiet=request.quiet)
+    motion.finish(result, quiet=request.quiet, device=request.device, threads=request.threads)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 

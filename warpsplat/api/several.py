@@ -46,8 +46,8 @@ def vectorize_several(
         name: see ``vectorize``.
 
     Returns:
-        a result for each number, in the order of ``curves``; where the run was stopped, of those that it came
-        to, the last of which is ``stopped``.
+        a result for each number, in the order of ``curves``; where the run was stopped, of the smallest ones
+        alone, and that of most shapes may be ``stopped``.
 
     Raises:
         UsageError: a number that is out of range or there twice; settings that say how many shapes there
