@@ -62,6 +62,10 @@ REFINED = 40
 """Of a pixel of the image that an SVG is refined against, besides: pictures of what was given and of what was
 read, a file that is not drawn in strips, and the image on a colour."""
 
+CLEARED = 150
+"""Of a pixel of an image with opacity that an SVG is refined against, of whose size is what finds pixels that
+should be empty (``fit.clear``)."""
+
 SHARE = 0.9
 """Of the machine's memory, where no limit is given: others are there."""
 
@@ -207,7 +211,9 @@ def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1, mask
 
 def need_refined(facts: Facts, settings: Settings) -> int:
     """What refining an SVG of as many shapes as usual takes [bytes]."""
-    return need(facts, settings).most + REFINED * facts.width * facts.height
+    pixels = facts.width * facts.height
+    cleared = PROGRAM + CLEARED * pixels if facts.channels == 4 else 0
+    return max(need(facts, settings).most + REFINED * pixels, cleared)
 
 
 def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
