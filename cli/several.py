@@ -24,8 +24,8 @@ from warpsplat.jobs.formats import ENDINGS
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.reports.command import several_command
 from warpsplat.jobs.reports.several import Version, several_page
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.several import check_several
-from warpsplat.jobs.vectorize import Result
 
 COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Of the table."""
@@ -49,7 +49,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
         check_report(request.report, inputs, path, overwrite=request.overwrite)
     for folder in {path.parent for path in outputs}:
         make_folder(folder)
-    results = run_several(image, outputs, numbers, settings, data=data, **request.manner)
+    results = run_several(request, outputs, numbers, settings, data)
     begun = sorted(numbers)[: len(results)]  # where it was stopped, the fewest shapes are there
     paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]
     made = list(zip(paths, results, strict=True))

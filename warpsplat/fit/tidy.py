@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares
+from warpsplat.fit.cells import by_cell, first_apart, sum_within
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
 from warpsplat.fit.costs import DRAWINGS, PIXELS, serial
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
-from warpsplat.fit.nodes import CELL, Edit, Key, Outlines, applied, turned
+from warpsplat.fit.nodes import Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
 from warpsplat.fit.work import Meter, Report
@@ -21,6 +22,7 @@ from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
@@ -198,12 +200,12 @@ def tidied(
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
         growth = judge.errors(applied(drawing, edits)) - errors
-        left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
+        left = [e for e in edits if sum_within(growth, e.cells) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
         while left:
             made, after = refitted(left)
             growth = after - errors
-            taken = [e for e in left if within(growth, e) <= e.saved * worth]
+            taken = [e for e in left if sum_within(growth, e.cells) <= e.saved * worth]
             if len(taken) == len(left):
                 drawing, errors = made, after
                 break
@@ -229,7 +231,9 @@ class Judge:
     """What drawings lack of one picture."""
 
     def __init__(self, target: FloatArray, backend: Backend) -> None:
-        self._target, self._backend = target, backend
+        self._backend = backend
+        self._viewport = Viewport(target.shape[1], target.shape[0])
+        self._target = to_tiles(target)
         self.capacity: Capacity | None = None
         """Of a renderer that the last drawing fits into; one that is much like it will as well, so that
         arrays and launches need not be made twice.
@@ -239,28 +243,12 @@ class Judge:
         """What each cell adds to the mean squared error, as ``by_cell``."""
         parameters = Parameters(drawing.scene, self._backend)
         Keeper(Constraints.of(drawing), parameters).project()
-        height, width = self._target.shape[:2]
-        renderer = Renderer(parameters, Viewport(width, height), model=EXACT, capacity=self.capacity)
+        renderer = Renderer(parameters, self._viewport, model=EXACT, capacity=self.capacity)
         renderer.forward_complete()
         self.capacity = renderer.capacity
-        return by_cell(squares(renderer.read_image() - self._target)) / (3 * height * width)
-
-
-def by_cell(pixels: npt.NDArray[np.floating[Any]]) -> Floats:
-    """Sums over the cells by which edits are told, with one more beyond each border that is empty.
-
-    Pixels of shape (height, width) make cells of shape (rows + 2, columns + 2).
-    """
-    height, width = pixels.shape
-    rows = np.add.reduceat(pixels, np.arange(0, height, CELL), axis=0, dtype=np.float64)
-    return np.pad(np.add.reduceat(rows, np.arange(0, width, CELL), axis=1), 1)
-
-
-def within(cells: Floats, edit: Edit) -> float:
-    """Sum over the cells that an edit may change; ``cells`` as of ``by_cell``."""
-    columns, rows = np.array([*edit.cells]).T + 1
-    height, width = cells.shape
-    return float(cells[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].sum())
+        film = renderer.film.buffers
+        lacking = squares(film.image.numpy() - self._target, axis=1) * film.inside.numpy()
+        return by_cell(lacking, self._viewport) / (3 * self._viewport.pixel_count)
 
 
 def worth_of(errors: Floats, size: int) -> float:
@@ -270,13 +258,8 @@ def worth_of(errors: Floats, size: int) -> float:
 
 def apart(edits: Sequence[Edit]) -> list[Edit]:
     """Those that cost least for what they spare, no two of them with pixels in common."""
-    chosen: list[Edit] = []
-    changed: set[tuple[int, int]] = set()
-    for edit in sorted(edits, key=lambda e: (e.off / e.saved, e.key)):
-        if not changed & edit.cells:
-            chosen.append(edit)
-            changed |= edit.cells
-    return chosen
+    ranked = sorted(edits, key=lambda e: (e.off / e.saved, e.key))
+    return [ranked[i] for i in first_apart(edit.cells for edit in ranked)]
 
 
 def drawing_grid(target: FloatArray, drawing: Drawing, backend: Backend, finest: float) -> float:

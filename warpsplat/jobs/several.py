@@ -12,7 +12,9 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.several import Series
 from warpsplat.fit.work import Report
 from warpsplat.jobs.formats import write_named
-from warpsplat.jobs.vectorize import Prepared, Result, make, prepare
+from warpsplat.jobs.prepare import Prepared, prepare
+from warpsplat.jobs.result import Result
+from warpsplat.jobs.vectorize import make
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.trace.subject import guess_subject

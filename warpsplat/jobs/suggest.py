@@ -16,8 +16,8 @@ from warpsplat.fit.knee import knee
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
+from warpsplat.jobs.prepare import prepare
 from warpsplat.jobs.several import OWN_NUMBER
-from warpsplat.jobs.vectorize import prepare
 from warpsplat.rendering.backend import Backend
 from warpsplat.trace.subject import guess_subject
 
