@@ -12,8 +12,9 @@ import pytest
 from tests.trace.line_art import CROSS, TEE, drawn, grown, shown
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.subjects import decided
-from warpsplat.jobs.vectorize import Result, vectorize, vectorize_image
+from warpsplat.jobs.vectorize import vectorize, vectorize_image
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
 

@@ -20,6 +20,7 @@ from warpsplat.fit.stages import Stages
 from warpsplat.fit.tidy import finish_drawing
 from warpsplat.fit.work import Report
 from warpsplat.jobs.line import draw_lines
+from warpsplat.jobs.thin import THIN, THINNEST, best_of_thin, continued, cut, margins
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -70,18 +71,24 @@ def draw(
         return time.monotonic() > deadline or bool(stop and stop())
 
     if settings.subject == "pixel":
-        scene, per_pixel = trace_pixels(target, solid_color(settings.background))
-        if settings.is_limited:
-            scene = limited(scene.take(solid_shapes(scene)), settings)
-        return _made(scene, per_pixel, target, backend, interrupted=False)
+        return _cells(target, settings, backend)
     if settings.subject == "line":
+        across, down = margins(target, THINNEST)
+        if across or down:
+            made = draw_lines(continued(target, across, down), settings, backend, seconds=seconds, stop=stop)
+            return replace(made, scene=cut(made.scene, across, down))
         return draw_lines(
             target, settings, backend, seconds=seconds, report=report, after=after, stop=stop, stages=stages
         )
     most = None if settings.simplify else settings.curves
 
     def drawn(most: int | None) -> Fit:
-        return _drawn(target, settings, backend, most, over, stop, report, after)
+        across, down = margins(target, THIN)
+        ways = [lambda: _drawn(target, settings, backend, most, over, stop, report, after)]
+        if across or down:
+            ways.append(lambda: _drawn_beyond(target, settings, backend, most, over, stop))
+            ways += [lambda: _cells(target, settings, backend)] if most is None else []
+        return best_of_thin(ways)
 
     made = drawn(most)
     low, high = 0, len(made.scene)  # regions that fit into the size, and that do not
@@ -101,6 +108,24 @@ def draw(
             high = count
             best = best if low else made
     return best
+
+
+def _cells(target: FloatArray, settings: Settings, backend: Backend) -> Fit:
+    """Pixel art."""
+    scene, per_pixel = trace_pixels(target, solid_color(settings.background))
+    if settings.is_limited:
+        scene = limited(scene.take(solid_shapes(scene)), settings)
+    return _made(scene, per_pixel, target, backend, interrupted=False)
+
+
+def _drawn_beyond(
+    target: FloatArray, settings: Settings, backend: Backend, most: int | None, over: Stop, stop: Stop | None
+) -> Fit:
+    """As ``_drawn``, of the picture continued beyond its borders."""
+    across, down = margins(target, THIN)
+    made = _drawn(continued(target, across, down), settings, backend, most, over, stop, None, 0.0)
+    scene = cut(made.scene, across, down)
+    return _made(scene, made.per_pixel, target, backend, interrupted=made.interrupted)
 
 
 def _size(made: Fit, settings: Settings) -> int:
