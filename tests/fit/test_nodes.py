@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,10 @@ from warpsplat.fit import tidy
 from warpsplat.fit.cells import by_cell, cells_around, cells_at, columns_and_rows, joined, sum_within
 from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.drawing import Refinement, start
+from warpsplat.fit.drawing_costs import Costs, RoundsWatch
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
 from warpsplat.fit.tidy import Judge, apart, finish_drawing, rounds_for, tidied
+from warpsplat.fit.work import Meter
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.renderer import Capacity, Renderer, render
 from warpsplat.rendering.tiles import to_tiles
@@ -178,19 +181,21 @@ def test_a_drawing_like_the_last_one_needs_no_second_renderer(
 def test_large_pictures_have_fewer_rounds(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert [rounds_for(side * side) for side in (64, 1250, 2048, 10_000)] == [16, 16, 6, 4]
     backend, made = Backend.on(device, 1), split(logo())
-    asked: list[float] = []
+    asked: list[int] = []
     target = render(logo().scene, backend=backend)
+    watch = RoundsWatch(Meter(None), Costs(target, made, backend), Refinement(), 0.0, 0.0)
 
-    def told(later: float) -> None:
-        asked.append(later)
+    def found(candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> None:
+        asked.append(most)
 
+    monkeypatch.setattr(watch, "found", found)
     for pixels in (64 * 64 * 5, 1):
         asked.clear()
         monkeypatch.setattr(tidy, "ROUND_PIXELS", pixels)
         monkeypatch.setattr(tidy, "ROUNDS", 2)
         monkeypatch.setattr(tidy, "FEWEST_ROUNDS", 1)
-        tidied(target, made, backend, told)
-        assert len(asked) == (2 if pixels > 1 else 1)
+        tidied(target, made, backend, watch)
+        assert asked == ([2, 1] if pixels > 1 else [1])
 
 
 def test_turned_outlines_are_the_same() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy.typing as npt
 from warpsplat.alpha import squares
 from warpsplat.fit.cells import by_cell, first_apart, sum_within
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
-from warpsplat.fit.costs import DRAWINGS, PIXELS, serial
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
+from warpsplat.fit.drawing_costs import DONE, Costs, Ending, RoundsWatch
 from warpsplat.fit.nodes import Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
@@ -31,18 +31,6 @@ ROUNDS, FEWEST_ROUNDS = 16, 4
 
 ROUND_PIXELS = 26_000_000
 """Pixels that all rounds together look at: of a large picture each takes long, and the first find most."""
-
-POINTS_A_ROUND = 110
-"""Of a traced drawing: how many rounds there will be, as progress is shown."""
-
-REFIT_STARTED = 8
-"""What fitting a drawing anew takes besides its steps, in steps."""
-
-GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.4
-"""What choosing the grid costs: of each drawing, of ``costs.PIXELS``, of a point."""
-
-ROUND_REFITS, ROUND_GRIDS = 1.5, 0.22
-"""What a round takes, in times that a drawing is fitted anew, and that its grid is chosen."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
 """At the end; after each round gradients stay besides."""
@@ -113,16 +101,15 @@ def finish_drawing(
         return Finished(drawing, min(USUAL_GRID, finest))
     how, meter = how or Refinement(), Meter(report, after)
     second, costs = replace(REFIT, steps=2 * REFIT.steps), Costs(target, drawing, backend)
-    rounds, refit = costs.round(), costs.refit(REFIT)
-    last = costs.refit(second) + costs.grid() + refit
-    usual = min(len(drawing.joints) / POINTS_A_ROUND, rounds_for(target[..., 0].size))
-    drawing = refined(drawing, how, meter.stage(costs.refit(how), usual * rounds + last))
-
-    def told(later: float) -> Report | None:
-        return meter.stage(rounds, later * rounds + last)
-
-    drawing = tidied(target, drawing, backend, told, stop)
-    drawing = refined(drawing, second, meter.stage(costs.refit(second), costs.grid() + refit))
+    refit = costs.refit(REFIT)
+    last = DONE * costs.refit(second) + costs.grid() + refit
+    watch = RoundsWatch(meter, costs, after_round(target), WORTHWHILE, last)
+    found = Outlines(drawing).edits() if report else []
+    later = watch.ahead(found, apart(found), rounds_for(target[..., 0].size))
+    drawing = refined(drawing, how, meter.stage(costs.refit(how), later, likely=Ending()))
+    drawing = tidied(target, drawing, backend, watch, stop)
+    told_second = meter.stage(costs.refit(second), costs.grid() + refit, likely=Ending())
+    drawing = refined(drawing, second, told_second)
     meter.stage(costs.grid(), refit)  # of which nothing shows on the way
     grid = drawing_grid(target, drawing, backend, finest)
     on, _ = drawing.links()
@@ -135,55 +122,26 @@ def finish_drawing(
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
 
 
-@dataclass(frozen=True)
-class Costs:
-    """What parts of finishing a drawing cost (``fit.costs``)."""
-
-    target: FloatArray
-    drawing: Drawing
-    backend: Backend
-
-    @property
-    def _size(self) -> float:
-        return self.target[..., 0].size / PIXELS
-
-    def refit(self, how: Refinement) -> float:
-        """Of fitting it."""
-        return (how.steps + REFIT_STARTED) * DRAWINGS.cost(self._size, len(self.drawing.scene))
-
-    def grid(self) -> float:
-        """Of choosing its grid."""
-        cost = GRID + GRID_PIXELS * self._size + GRID_POINT * len(self.drawing.joints)
-        return serial(self.backend) * cost
-
-    def round(self) -> float:
-        """Of a round of ``tidied``."""
-        return ROUND_REFITS * self.refit(after_round(self.target)) + ROUND_GRIDS * self.grid()
-
-
 def tidied(
     target: FloatArray,
     drawing: Drawing,
     backend: Backend,
-    told: Callable[[float], Report | None] = lambda later: None,
+    watch: RoundsWatch | None = None,
     stop: Stop | None = None,
 ) -> Drawing:
     """A drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round candidates that do not meet are made together and fitted anew; each is judged by the pixels
-    around it, and where some cost too much, the others are made alone. ``told``: what a round reports to,
-    by how many may come after it.
+    around it, and where some cost too much, the others are made alone. ``watch``: of its progress.
     """
     refused: set[Key] = set()
     how = after_round(target)
     judge = Judge(target, backend)
     errors = judge.errors(drawing)
 
-    report: Report | None = None
-
     def refitted(edits: Sequence[Edit]) -> tuple[Drawing, Floats]:
         made = applied(drawing, edits)
-        fields = (made.scene, made.joints, made.same)
+        fields, report = (made.scene, made.joints, made.same), watch.refit() if watch else None
         scene = refine_drawing(
             target, *fields, backend, how, capacity=judge.capacity, report=report, stop=stop
         )
@@ -196,7 +154,8 @@ def tidied(
         edits = apart(candidates)
         if not edits or (stop and stop()):
             break
-        report = told(min(len(candidates) / len(edits), most - 1 - turn))
+        if watch:
+            watch.found(candidates, edits, most - turn)
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
         growth = judge.errors(applied(drawing, edits)) - errors
@@ -212,7 +171,10 @@ def tidied(
             refused |= {e.key for e in left} - {e.key for e in taken}
             left = taken
         drawing = turned(drawing)
-        if sum(e.saved for e in left) < WORTHWHILE * size:
+        spared = sum(e.saved for e in left)
+        if watch:
+            watch.spared(spared / size)
+        if spared < WORTHWHILE * size:
             break
     return drawing
 

@@ -138,10 +138,11 @@ TAIL_PER_PIXEL = 3e-7
 """Of a time budget: what the last step, exporting and scoring take [s]."""
 
 
-def cost_after(settings: Settings, target: FloatArray, backend: Backend) -> float:
+def cost_after(settings: Settings, target: FloatArray, backend: Backend, way: Way) -> float:
     """Work that scoring takes (``fit.costs``)."""
     pixels, eyes = pixels_of(target), has_time_for_eyes(settings, target)
-    whole = score_cost(pixels, settings.curves, backend, eyes=eyes)
+    shapes = settings.curves if way in {"fit", "layers"} else 0  # otherwise nobody knows how many
+    whole = score_cost(pixels, shapes, backend, eyes=eyes)
     return whole + sum(score_cost(pixels, count, backend, eyes=False) for count in settings.levels)
 
 

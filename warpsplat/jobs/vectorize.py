@@ -154,7 +154,7 @@ def vectorize(
         seconds=training_seconds(settings, target, started),
         watching={
             "report": report,
-            "after": cost_after(settings, target, backend),
+            "after": cost_after(settings, target, backend, way),
             "stop": stop,
             "stages": None if settings.time_budget else stages,
         },
