@@ -133,7 +133,7 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     count = len(knots)
 
     def sums(weights: Floats) -> Floats:
-        return np.bincount(low, weights, count)
+        return np.asarray(np.bincount(low, weights, count), np.float64)
 
     # What is at t is a share of two knots that are neighbours: the sums of products are three diagonals.
     beside = sums(share * (1 - share))[:-1]
