@@ -17,7 +17,7 @@ from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
     from warpsplat.fit.work import Progress
-    from warpsplat.jobs.vectorize import Result
+    from warpsplat.jobs.result import Result
     from warpsplat.motion.recorder import Recorder
     from warpsplat.terminal.preview import Preview
 

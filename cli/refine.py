@@ -86,7 +86,7 @@ def command(
         check_output(checkpoint, svg, image)
     motion.check(svg, image, output, *filter(None, [checkpoint]), overwrite=overwrite)
     check_report(report, (svg, image), output, overwrite=overwrite)
-    from warpsplat.api import refine
+    from warpsplat.api.refine import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.summary import summary

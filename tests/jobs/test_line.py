@@ -12,10 +12,13 @@ import pytest
 from tests.trace.line_art import CROSS, TEE, drawn, grown, shown
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.line import tour_cost
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.subjects import decided
-from warpsplat.jobs.vectorize import Result, vectorize, vectorize_image
+from warpsplat.jobs.vectorize import vectorize, vectorize_image
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
+from warpsplat.trace.tour import FEW, MANY
 
 
 def lines_of(image: np.ndarray, device: str) -> Result:
@@ -122,3 +125,10 @@ def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
     noise = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
     chosen, why = decided(noise, settings)
     assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
+
+
+def test_tours_cost_by_how_thoroughly_they_are_sought() -> None:
+    costs = [tour_cost(count) for count in (0, 20, FEW, MANY)]
+    assert costs == sorted(costs) and costs[0] == 0 < costs[1]
+    assert tour_cost(FEW) > 2 * tour_cost(FEW + 1), "from several places"
+    assert tour_cost(MANY) > 5 * tour_cost(MANY + 1), "until nothing shortens it"

@@ -8,6 +8,7 @@ import pytest
 from warpsplat.errors import ImageError
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray
+from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 from warpsplat.trace import pixels
@@ -105,3 +106,20 @@ def test_ever_smaller_parts_end_with_cells() -> None:
     assert sorted(polygons(inside, 1)) == sorted(
         [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]] for x in range(2) for y in range(3)
     )
+
+
+def test_no_hairlines_at_a_zoom_that_ends_cells_within_pixels() -> None:
+    image = np.concatenate([noise(12, 3), np.ones((12, 12, 1), np.float32)], axis=2)
+    scene, per_pixel = trace_pixels(image)
+    text = write_svg(scene, per_pixel=per_pixel)
+    # What begins in the last row and column is not whole.
+    shown = np.asarray(render_svg(text, zoom=1.37).convert("RGBA"))[:-1, :-1]
+    known = np.round(image[..., :3].reshape(-1, 3) * 255).astype(np.uint8)
+    assert (shown[..., 3] == 255).all()
+    assert set(map(tuple, shown[..., :3].reshape(-1, 3))) <= set(map(tuple, known))
+    assert len(load_scene(text, 12, 12, "cells.svg")[0]) == len(scene), "and the file can be read again"
+
+
+def test_one_colour_on_a_ground_abuts_nothing() -> None:
+    text = write_svg(trace_pixels(noise(12, 2))[0])
+    assert "shape-rendering" not in text

@@ -16,7 +16,7 @@ from warpsplat.fit.knee import knee
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
-from warpsplat.jobs.vectorize import prepare
+from warpsplat.jobs.prepare import prepare
 from warpsplat.rendering.backend import Backend
 
 TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
@@ -55,8 +55,6 @@ class Suggestion:
     """The knee of quality against shapes ..."""
     by_bytes: int | None
     """... and against bytes, in shapes."""
-    misfit: float
-    """How far measured decibels lie from the parabola, root of the mean square [dB]."""
     seconds: float
 
     def as_dict(self) -> dict[str, Any]:
@@ -64,7 +62,6 @@ class Suggestion:
         return {
             **{name: value for name, value in vars(self).items() if name != "expected"},
             "expected": [asdict(one) for one in self.expected],
-            "misfit": round(self.misfit, 3),
             "seconds": round(self.seconds, 2),
         }
 
@@ -113,7 +110,7 @@ def suggest_curves(
     if subject != "photo":
         reason = f"{work.why}. " if work.why else ""
         why = f"{reason}It is traced: the picture says how many shapes there are; --subject photo fits them."
-        return Suggestion(None, subject, why, (), None, None, 0.0, time.monotonic() - started)
+        return Suggestion(None, subject, why, (), None, None, time.monotonic() - started)
     worth = survey(work.target, work.settings, backend, importance=work.importance, report=report, stop=stop)
     if worth is None:
         return None
@@ -128,8 +125,8 @@ def suggestion(worth: Worth) -> Suggestion:
     by_shapes, by_bytes = (None if at is None else rounded(float(shapes[at])) for at in found)
     known = [number for number in (by_shapes, by_bytes) if number is not None]
     chosen = min(known) if known else worth.most
-    rows = sorted({round(share * chosen) for share in TABLE})
-    expected = tuple(expect(worth, row) for row in rows if worth.fewest <= row <= worth.most)
+    rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in TABLE})
+    expected = tuple(expect(worth, row) for row in rows)
     return Suggestion(
         chosen,
         "photo",
@@ -137,7 +134,6 @@ def suggestion(worth: Worth) -> Suggestion:
         expected,
         by_shapes,
         by_bytes,
-        worth.misfit,
         0.0,
     )
 
@@ -150,16 +146,17 @@ def expect(worth: Worth, shapes: int) -> Expected:
 def reason(worth: Worth, chosen: int, *, is_knee: bool) -> str:
     """Why it is this number."""
     one, two = expect(worth, chosen), expect(worth, 2 * chosen)
-    first = f"{chosen} shapes: {one.psnr:.1f} dB, {one.bytes / 1000:.0f} kB"
     more = (two.bytes - one.bytes) / 1000
-    first += f"; twice as many buy {two.psnr - one.psnr:.1f} dB for {more:.0f} kB more."
+    first = f"{chosen} shapes are expected to give {one.psnr:.1f} dB in {one.bytes / 1000:.0f} kB"
+    if 2 * chosen <= worth.most:
+        first += f", and twice as many {two.psnr - one.psnr:.1f} dB more for {more:.0f} kB more"
     if not is_knee:
-        return f"{first} Up to {worth.most} shapes each further one buys as much as those before."
+        return f"{first}. Up to {worth.most:,} shapes each further one buys as much as those before."
     fewest, most = expect(worth, worth.fewest), expect(worth, worth.most)
     average = (most.psnr - fewest.psnr) / ((most.bytes - fewest.bytes) / 1000)
     return (
-        f"{first} Up to there a kB buys more than the {average:.2g} dB that it buys on the average from "
-        f"{worth.fewest} to {worth.most:,} shapes, beyond it less: this is the knee."
+        f"{first}. From {worth.fewest} to {worth.most:,} shapes a kB buys {average:.2g} dB on the average: "
+        f"up to {chosen} shapes it buys more, beyond them less. This is the knee."
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from warpsplat.errors import UsageError
 from warpsplat.files.output import write_result
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.motion import drawing, films, training
 from warpsplat.motion.timing import LONGEST, SECONDS, SHORTEST, kept
 from warpsplat.rendering.backend import Backend

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from warpsplat.fit.export import export, shown_paths
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.motion import moving
 from warpsplat.motion.films import Frame, ticks_of, zoom_of
 from warpsplat.motion.painter import Painter

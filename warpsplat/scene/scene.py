@@ -27,6 +27,8 @@ class Canvas:
     """[px]"""
     background: FloatArray | None
     """sRGB in [0, 1], shape (3,); None: transparent."""
+    crisp: bool = False
+    """Whether viewers are to draw edges without antialiasing: cells abut."""
 
 
 class Alike(NamedTuple):

@@ -194,13 +194,29 @@ def _check(style: Style, subpaths: list[Subpath], line: Line | None) -> None:
     """
     if any(style[name] != "none" for name in ("marker-start", "marker-mid", "marker-end")):
         raise ImageError("uses markers, not supported")
-    if style["shape-rendering"] not in {"auto", "geometricPrecision"}:
-        raise ImageError(f"uses shape-rendering {style['shape-rendering'][:40]!r}, not supported")
+    rendering = style["shape-rendering"]
+    if rendering not in {"auto", "geometricPrecision"} and (line or not _is_of_pixels(subpaths)):
+        raise ImageError(f"uses shape-rendering {rendering[:40]!r}, not supported")
     if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")
     reach = np.array([line.width if line else 0.0, *(np.abs(s.points).max() for s in subpaths)])
     if not (reach <= MAX_EXTENT).all():  # what is no number is not either
         raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
+
+
+BETWEEN_PIXELS = 1e-3
+"""How far an edge may be from those of pixels [px] to be the same with antialiasing and without."""
+
+
+def _is_of_pixels(subpaths: list[Subpath]) -> bool:
+    """Whether all outlines run between pixels."""
+    for subpath in subpaths:
+        ends = subpath.points[::3]
+        ring = np.concatenate([subpath.points, subpath.points[:1]])
+        is_level = (np.abs(np.diff(ring, axis=0)) <= BETWEEN_PIXELS).any(axis=1)
+        if not is_level.all() or not (np.abs(ends - np.round(ends)) <= BETWEEN_PIXELS).all():
+            return False
+    return True
 
 
 def opacity_of(shape: Shape) -> float:

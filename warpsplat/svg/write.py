@@ -284,6 +284,8 @@ def write_svg(
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
     shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale, ids))
+    if canvas.crisp and len(scene):
+        shapes = f'<g shape-rendering="crispEdges">{shapes}</g>'
     return (
         f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
         f'viewBox="0 0 {width} {height}">{MARK}{" " if metadata else ""}{metadata}-->\n'

@@ -167,8 +167,8 @@ def trace_pixels(
         seen = cells.palette[:, 3] > 0
     elif background is None:
         corners = [sum(len(ring) for rings in own for ring in rings) for own in sets]
-        ground = int(np.argmax(corners))
-        seen[ground], background = False, np.asarray(cells.palette[ground], np.float32)
+        paper = int(np.argmax(corners))
+        seen[paper], background = False, np.asarray(cells.palette[paper], np.float32)
     else:
         seen = (np.abs(cells.palette - background) > SAME).any(axis=1)
     owner = [i for i in np.flatnonzero(seen).tolist() for _ in sets[i]]
@@ -178,8 +178,10 @@ def trace_pixels(
     palette = np.asarray(cells.palette[owner], np.float32)
     opacities = palette[:, 3] if image.shape[2] == 4 else np.ones(len(palette), np.float32)
     flat = list(itertools.chain.from_iterable(contours))
+    ground = None if image.shape[2] == 4 else np.asarray(background, np.float32)
+    # Antialiased, shapes that abut show what is behind them: at zooms where cells end within pixels.
     scene = Scene.of(
-        Canvas(width, height, None if image.shape[2] == 4 else np.asarray(background, np.float32)),
+        Canvas(width, height, ground, crisp=len(contours) > 1),
         np.full(len(contours), Kind.FILL, np.int32),
         starts_of(np.array([sum(map(len, ring)) for ring in contours], np.int32)),
         np.full(len(contours), Basis.CUBIC, np.int32),

@@ -62,6 +62,11 @@ SMALL = 128
 
 PIXEL_COLORS = 64
 
+FEWEST = (2, 64, 1024)
+"""Rows or columns, or pixels, up to which a picture is its pixels rather than a photograph; and pixels of
+such rows at the most.
+"""
+
 MIXED = 0.2
 """Share of mixtures among the pixels at edges from which on a picture is antialiased."""
 
@@ -81,6 +86,15 @@ def guess_subject(image: FloatArray) -> Guess:
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
     """
+    guess = _guess(image)
+    side, pixels = min(image.shape[:2]), image.shape[0] * image.shape[1]
+    if guess.subject == "photo" and (pixels <= FEWEST[1] or (side <= FEWEST[0] and pixels <= FEWEST[2])):
+        return Guess("pixel", f"no more than {pixels} pixels")
+    return guess
+
+
+def _guess(image: FloatArray) -> Guess:
+    """As ``guess_subject``, whatever the size."""
     part = _levels(_middle(image))
     colors, counts = _colors(part)
     cell = _cell(image, counts)

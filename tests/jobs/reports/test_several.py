@@ -10,7 +10,7 @@ from PIL import Image
 
 import warpsplat
 from warpsplat.jobs.reports.several import knee_of, plots, several_page, versions_of
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 
 
 @pytest.fixture(scope="module")
