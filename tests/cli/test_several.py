@@ -13,8 +13,9 @@ from PIL import Image
 import warpsplat
 from tests.cli.helpers import one_line, run
 from warpsplat.cli.main import main
+from warpsplat.fit.survey import Worth
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.suggest import Suggestion, suggestion
+from warpsplat.jobs.suggest import suggestion
 from warpsplat.scene import FloatArray
 from warpsplat.trace.trace import Traced, trace
 
@@ -211,7 +212,7 @@ def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert 16 <= values["curves"] <= 300
     assert values["command"] == f"warpsplat vectorize {image} --curves {values['curves']} --open -o photo.svg"
     assert values["curves"] in [row["shapes"] for row in values["expected"]]
-    assert "twice as many buy" in values["why"]
+    assert "shapes are expected to give" in values["why"]
     assert os.listdir(image.parent) == before
 
 
@@ -219,7 +220,6 @@ def test_a_suggestion_in_words(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from warpsplat.cli import run as runs
-    from warpsplat.fit.survey import Worth
 
     made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
@@ -232,12 +232,24 @@ def test_a_suggestion_in_words(
 
 
 def test_the_suggestion_is_the_knee() -> None:
-    from warpsplat.fit.survey import Worth
-
     made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     assert made.by_shapes == made.by_bytes == made.curves == 240
-    straight = suggestion(Worth(16, 17, 16, 20.0, 0.0, 0.0, 64.0))
-    assert isinstance(straight, Suggestion) and straight.curves == 17
+    assert "twice as many 2.0 dB more" in made.why and "up to 240 shapes it buys more" in made.why
+    assert [one.shapes for one in made.expected] == [60, 120, 240, 480, 960]
+
+
+@pytest.mark.parametrize(
+    ("worth", "curves", "words"),
+    [
+        (Worth(7, 7, 7, 20.0, 0.0, 0.0, 64.0), 7, "no room for more than 7 shapes"),
+        (Worth(16, 99, 99, 20.0, 0.0, 0.0, 64.0), 16, "more are expected to add nothing"),
+        (Worth(16, 32, 32, 99.0, 2.0, 0.0, 64.0), 16, "more are expected to add nothing"),
+    ],
+)
+def test_more_shapes_than_are_worth_it_are_not_suggested(worth: Worth, curves: int, words: str) -> None:
+    made = suggestion(worth)
+    assert made.curves == curves and words in made.why
+    assert curves in [one.shapes for one in made.expected]
 
 
 def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -245,4 +257,5 @@ def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest
     Image.fromarray(np.kron(np.eye(8, dtype=np.uint8) * 255, np.ones((4, 4), np.uint8))).save(path)
     assert run("vectorize", path, "--suggest") == 0
     said = capsys.readouterr().out
-    assert "the picture says how many shapes there are; --subject photo fits them" in said
+    assert "A picture of cells (2 colours in cells of 4x4 px), which is traced" in said
+    assert "the picture says how many shapes there are. --subject photo fits a number of shapes" in said

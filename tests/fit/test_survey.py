@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
+from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.survey import BEND, GAIN, STEEPEST, expected, expected_gain, lost_detail, survey
 from warpsplat.rendering.backend import Backend
@@ -15,9 +16,9 @@ from warpsplat.rendering.backend import Backend
 
 def test_it_goes_through_what_was_measured() -> None:
     """With the gain of a longer run, and what doublings gain in those."""
-    worth = expected(1024, (256, 30.0), (64, 25.0), 30_000)
+    worth = expected(1024, (256, 30.0), (64, 25.0), 0.4, 30_000)
     there = float(worth.psnr(256))
-    assert there == pytest.approx(30.0 + GAIN)
+    assert there == pytest.approx(30.4)
     assert there - float(worth.psnr(64)) == pytest.approx(2 * 0.79 * 2.5)
     gains = [float(worth.psnr(2 * n) - worth.psnr(n)) for n in (16, 32, 64, 128, 256, 512)]
     assert np.diff(gains) == pytest.approx(2 * BEND)
@@ -26,26 +27,32 @@ def test_it_goes_through_what_was_measured() -> None:
 
 @pytest.mark.parametrize("few", [10.0, 29.9, 31.0])
 def test_more_shapes_are_never_worse(few: float) -> None:
-    worth = expected(1024, (256, 30.0), (64, few), 30_000)
+    worth = expected(1024, (256, 30.0), (64, few), 0.0, 30_000)
     decibels = worth.psnr(np.geomspace(16, 1024, 50))
     assert (np.diff(decibels) >= -1e-9).all()
     assert float(decibels[-1] - decibels[0]) < 6 * STEEPEST + 16 * BEND
 
 
 def test_one_measurement_is_a_level() -> None:
-    worth = expected(16, (16, 25.0), (16, 24.0), 2000)
-    assert float(worth.psnr(16)) == pytest.approx(25 + expected_gain(25))
+    worth = expected(16, (16, 25.0), (16, 24.0), 0.0, 2000)
+    assert float(worth.psnr(16)) == pytest.approx(25)
     assert float(worth.psnr(8)) == float(worth.psnr(16))
 
 
 def test_a_picture_without_error_has_a_ceiling() -> None:
-    worth = expected(32, (32, float("inf")), (16, float("inf")), 2000)
+    worth = expected(32, (32, float("inf")), (16, float("inf")), 0.4, 2000)
     assert 99 < float(worth.psnr(32)) <= 101
 
 
 def test_what_is_hard_to_draw_gains_little() -> None:
-    assert expected_gain(20.0) == 0
-    assert 0 < expected_gain(25.0) < expected_gain(30.0) == expected_gain(40.0) == GAIN
+    plan = [Phase(100, 100)]
+    assert expected_gain(20.0, plan) == 0
+    assert 0 < expected_gain(25.0, plan) < expected_gain(30.0, plan) == expected_gain(40.0, plan) == GAIN
+
+
+def test_what_is_much_larger_than_most_steps_see_gains_little() -> None:
+    gains = [expected_gain(30.0, [Phase(100, 100), Phase(side, 100)]) for side in (400, 800, 1600, 9000)]
+    assert gains == pytest.approx([GAIN, GAIN / 2, 0, 0])
 
 
 def test_detail_that_the_finest_size_lacks() -> None:
@@ -53,8 +60,8 @@ def test_detail_that_the_finest_size_lacks() -> None:
     assert lost_detail(image, make_settings()) == 0
     lost = lost_detail(image, make_settings(fine_pixels=256, coarse_pixels=256))
     assert lost > 0.03
-    worth = expected(1024, (256, 40.0), (64, 35.0), 30_000)
-    assert float(worth.psnr(256)) > 40
+    worth = expected(1024, (256, 40.0), (64, 35.0), 0.0, 30_000)
+    assert float(worth.psnr(256)) == pytest.approx(40)
     assert float(replace(worth, detail=lost).psnr(256)) < -10 * np.log10(lost)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,7 +16,7 @@ from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.rounding import USUAL_GRID, finest
-from warpsplat.fit.schedule import phases
+from warpsplat.fit.schedule import Phase, phases
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import Past
 from warpsplat.fit.work import Meter, Progress, Report
@@ -43,6 +43,11 @@ PROBE, PROBE_RUN = 30, 200
 GAIN, GAIN_FROM, GAIN_WHOLE = 0.42, 22.0, 27.0
 """What a run of the default effort has over the short one [dB] where that has ``GAIN_WHOLE`` or more; none up
 to ``GAIN_FROM`` [dB], and in between a part of it. What is hard to draw gains little (docs/experiments.md).
+"""
+
+GAIN_SIZES = 4.0, 16.0
+"""Pixels of the finest size over those of the reduced image up to which there is all of that gain, and from
+which on there is none: most steps see the reduced one.
 """
 
 SLOPE = 0.79
@@ -107,9 +112,9 @@ def survey(
     stop: Callable[[], bool] | None = None,
 ) -> Worth | None:
     """What numbers of shapes are worth on an image; None where it was stopped. See ``fit`` for arguments."""
-    most = max(FEWEST, min(MOST, simple_curves(image)))
+    most = min(MOST, simple_curves(image))
     measured = min(MEASURED, most)
-    few = max(FEWEST, measured // FEWER)
+    few = max(min(FEWEST, most), measured // FEWER)
     short, probing = _short(settings, measured), _probing(settings, few)
     height, width = image.shape[:2]
     costs = [
@@ -145,17 +150,19 @@ def survey(
     if probe.interrupted:
         return None
     size = len(export(made.scene, short, min(USUAL_GRID, finest(short))))
-    worth = expected(most, (measured, made.render_psnr), (len(scene), probe.render_psnr), size)
+    gain = expected_gain(made.render_psnr, phases(short, width, height))
+    worth = expected(most, (measured, made.render_psnr), (len(scene), probe.render_psnr), gain, size)
     return replace(worth, detail=lost_detail(image, short))
 
 
-def expected(most: int, short: tuple[int, float], probe: tuple[int, float], size: int) -> Worth:
+def expected(most: int, short: tuple[int, float], probe: tuple[int, float], gain: float, size: int) -> Worth:
     """What is expected up to ``most`` shapes.
 
     Args:
         most: shapes.
         short: those of the short run, and its decibels.
         probe: the same of the probe.
+        gain: of a run over the short one [dB].
         size: bytes of the short run's file.
     """
     shapes, psnr = short
@@ -165,18 +172,21 @@ def expected(most: int, short: tuple[int, float], probe: tuple[int, float], size
     # Its rise from the probe to the short run is as measured, and nowhere does it fall.
     bend = min(BEND, below / (2 * math.log2(MEASURED / FEWEST) - math.log2(FEWER)))
     slope = below + bend * math.log2(FEWER)
-    there = min(psnr, CEILING) + expected_gain(psnr)
-    return Worth(FEWEST, most, shapes, there, slope, bend, LATER_BYTES * size / shapes)
+    there, each = min(psnr, CEILING) + gain, LATER_BYTES * size / shapes
+    return Worth(min(FEWEST, most), most, shapes, there, slope, bend, each)
 
 
-def expected_gain(psnr: float) -> float:
-    """What a run of the default effort has over a short one with ``psnr`` [dB]."""
-    return GAIN * min(max((psnr - GAIN_FROM) / (GAIN_WHOLE - GAIN_FROM), 0.0), 1.0)
+def expected_gain(psnr: float, plan: Sequence[Phase]) -> float:
+    """What a run of the default effort has over a short one with ``psnr`` and the sizes of ``plan`` [dB]."""
+    first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
+    low, high = map(math.log, GAIN_SIZES)
+    seen = min(max((high - math.log(last / first)) / (high - low), 0.0), 1.0)
+    return GAIN * seen * min(max((psnr - GAIN_FROM) / (GAIN_WHOLE - GAIN_FROM), 0.0), 1.0)
 
 
 def _short(settings: Settings, shapes: int) -> Settings:
     """A run with so many shapes in the end, which begins with the fewest."""
-    density = replace(settings.density, start=FEWEST / shapes, interval=INTERVAL)
+    density = replace(settings.density, start=min(FEWEST / shapes, 1.0), interval=INTERVAL)
     return replace(settings, curves=shapes, simplify=False, iterations=STEPS, coarse=COARSE, density=density)
 
 
@@ -193,5 +203,5 @@ def lost_detail(image: FloatArray, settings: Settings) -> float:
     if (phase.width, phase.height) == (width, height):
         return 0.0
     small = cv2.resize(image, (phase.width, phase.height), interpolation=cv2.INTER_AREA)
-    whole = cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC)
+    whole = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
     return float(squares(whole - image).mean(dtype="float64")) / 3
