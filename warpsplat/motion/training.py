@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from warpsplat.fit.export import export, shown_paths
@@ -95,13 +96,6 @@ def vector(scenes: Sequence[Scene], moments: Sequence[int], result: Result, seco
     settings, canvas = Settings(renderer=result.renderer), result.scene.canvas
     units = canvas.width * _coarse(canvas)
     shown = [shown_paths(scene, settings) for scene in scenes[: keys[-1] + 1]]
-    names = itertools.count()
-
-    def still(scene: Scene) -> str:
-        markup = _parts(write_svg(scene, per_pixel=(grid := _coarse(scene.canvas)), background=False))[1]
-        zoom = number(units / (scene.canvas.width * grid), 6)
-        return f'<g transform="scale({zoom})">{_named(markup, f"p{next(names)}-")}</g>'
-
     box = float(VIEW_BOX.findall(head)[0].split()[2])
     height = number(units * canvas.height / canvas.width, 0)
     behind = ""
@@ -109,10 +103,27 @@ def vector(scenes: Sequence[Scene], moments: Sequence[int], result: Result, seco
         fill = hex_colors(canvas.background[None])[0]
         behind = f'<rect width="{number(units, 0)}" height="{height}" fill="{fill}"/>\n'
     tick = seconds / max(1, len(keys) - 1)
-    shapes, rules = moving.elements(shown, keys, tick, units, still)
+    shapes, rules = moving.elements(shown, keys, tick, units, _still(units))
     style = STYLE.format(start=number(seconds, 2), fade=number(FADE, 2), end=number(seconds + FADE, 2))
     group = f'<g class="m" transform="scale({box / units:.9g})">{behind}{shapes}</g>'
     return f'{head}{MARK}-->\n<style>{style}{rules}</style>\n{group}\n<g class="e">{inside}</g></svg>\n'
+
+
+def _still(width: float) -> Callable[[Scene], str]:
+    """What gives the markup of scenes on a canvas of ``width`` units; the same for the same ones."""
+    names = itertools.count()
+
+    @functools.cache
+    def apart(markup: str) -> str:
+        return _named(markup, f"p{next(names)}-")
+
+    def still(scene: Scene) -> str:
+        grid = _coarse(scene.canvas)
+        markup = _parts(write_svg(scene, per_pixel=grid, background=False))[1]
+        zoom = number(width / (scene.canvas.width * grid), 6)
+        return f'<g transform="scale({zoom})">{apart(markup)}</g>'
+
+    return still
 
 
 VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
