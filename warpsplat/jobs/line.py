@@ -34,6 +34,9 @@ WIDTH_RATE = 0.06
 TOUR_STROKE, TOUR_PAIR = 1.0, 0.0034
 """What finding the order of strokes costs: of each stroke, of each pair of strokes (``fit.costs``)."""
 
+THIN = 1.0
+"""Width below which a stroke keeps it [px]: the least of a training."""
+
 FINE_PIXELS = 1_000_000
 """Largest size of the image that the refinement sees [pixels]."""
 
@@ -118,7 +121,9 @@ def _fitted(
         stop=stop,
         stages=stages,
     )
-    scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas)
+    # A training knows no strokes thinner than a pixel; how wide they are was measured.
+    widths = np.where(lines.widths < THIN, lines.widths, made.scene.widths)
+    scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
     return replace(made, scene=toured(rejoined(lines, scene)))
 
 
