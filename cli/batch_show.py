@@ -32,7 +32,7 @@ class Show:
     """Listens to a batch."""
 
     def __init__(self, total: int, *, quiet: bool, as_json: bool) -> None:
-        self.totals = Totals()
+        self.totals = Totals(total)
         self._total, self._quiet, self._as_json = total, quiet, as_json
         self._bar = sys.stderr.isatty() and not quiet
         self._parts: dict[int, float] = {}
@@ -98,6 +98,8 @@ class Show:
             say(f"{self._total} images: {did} ({elapsed:.1f} s{by})")
             for row in self.totals.rows():
                 say("  ".join([f"  {row[0]:9}", *(f"{cell:>9}" for cell in row[1:])]).rstrip())
+        if self.totals.not_started and not self._quiet:
+            say("warpsplat: interrupted; the same command goes on with the rest", err=True)
         failures = self.totals.failures
         if failures and not self._quiet:
             say("failed:", err=True)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from warpsplat.fit.settings import Settings
     from warpsplat.jobs.compare import Comparison, Row
+    from warpsplat.jobs.result import Result
     from warpsplat.jobs.tracer import Tracer
-    from warpsplat.jobs.vectorize import Result
     from warpsplat.scene import FloatArray
 
 TABLES, FIGURES, PLOT = "comparison.md", "comparison.json", "comparison.svg"

@@ -28,7 +28,7 @@ def command(image: Path, svg: Path, report: Path | None, overwrite: bool, as_jso
     for images of up to 4 million pixels. One of the two may be - for the
     standard input.
     """
-    from warpsplat import api
+    import warpsplat
     from warpsplat.files.inputs import STANDARD, read_input
 
     if image == svg == STANDARD:
@@ -37,11 +37,11 @@ def command(image: Path, svg: Path, report: Path | None, overwrite: bool, as_jso
     # The standard input can be read once.
     shown = read_input(image) if image == STANDARD else image
     text = read_input(svg, "an SVG") if svg == STANDARD else svg
-    values = api.score(text, shown).as_dict()
+    values = warpsplat.score(text, shown).as_dict()
     if report:
         named = "image" if image == STANDARD else image.name
         svg_named = "image.svg" if svg == STANDARD else f"{svg.stem}.svg"
-        api.report(text, shown, report, name=named, svg_name=svg_named)
+        warpsplat.report(text, shown, report, name=named, svg_name=svg_named)
     if as_json:
         page = {"report": str(report)} if report else {}
         say(json.dumps({"image": str(image), "svg": str(svg), **values, **page}))

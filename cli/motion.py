@@ -17,7 +17,7 @@ from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
     from warpsplat.fit.work import Progress
-    from warpsplat.jobs.vectorize import Result
+    from warpsplat.jobs.result import Result
     from warpsplat.motion.recorder import Recorder
     from warpsplat.terminal.preview import Preview
 
@@ -148,8 +148,10 @@ class Motion:
 
         finished(self.preview, result, source)
 
-    def finish(self, result: Result, *, quiet: bool) -> None:
-        """Write what was asked for.
+    def finish(
+        self, result: Result, *, quiet: bool, device: str = "auto", threads: int | None = None
+    ) -> None:
+        """Write what was asked for, drawn as the run was made.
 
         Raises:
             OutputError: it cannot be written.
@@ -163,7 +165,9 @@ class Motion:
         log = logging.getLogger("warpsplat")
         log.info(f"{self.animation}: pictures of the {what} ...", extra={"passing": True})
         try:
-            size = self.recorder.save(self.animation, result, what=what, width=self.width)
+            size = self.recorder.save(
+                self.animation, result, what=what, width=self.width, device=device, threads=threads
+            )
         finally:
             log.info("", extra={"passing": True})
         if not quiet:

@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 from warpsplat.cli.say import say
 from warpsplat.errors import ImageError
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.terminal.blocks import HALF
 from warpsplat.terminal.detect import Terminal, measured, terminal
 from warpsplat.terminal.preview import Preview

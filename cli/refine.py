@@ -86,7 +86,7 @@ def command(
         check_output(checkpoint, svg, image)
     motion.check(svg, image, output, *filter(None, [checkpoint]), overwrite=overwrite)
     check_report(report, (svg, image), output, overwrite=overwrite)
-    from warpsplat.api import refine
+    from warpsplat.api.refine import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.summary import summary
@@ -113,7 +113,7 @@ def command(
             overwrite=overwrite,
         )
         motion.show(result, None if image == STANDARD else image)
-    motion.finish(result, quiet=quiet)
+    motion.finish(result, quiet=quiet, device=device, threads=threads)
     before = result.before or 0.0
     if result.kept and not quiet:
         say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)

@@ -53,7 +53,7 @@ def command(
     try:
         check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
         if renderer != "viewer":
-            from warpsplat.api import render
+            from warpsplat.api.render import render
 
             png = to_png(render(text, scale=scale, renderer=renderer, device=device, threads=threads))
             write_result(output, mark_png(png))

@@ -14,7 +14,7 @@ from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output
 
 if TYPE_CHECKING:
-    from warpsplat.jobs.vectorize import Result
+    from warpsplat.jobs.result import Result
 
 ENDINGS = (".html", ".htm")
 """Of names of pages."""
@@ -67,11 +67,11 @@ def write_report(
     """
     if report is None:
         return
-    from warpsplat import api
+    import warpsplat
 
     name = "image" if image == STANDARD else image.name
     stem = Path(name if output == STANDARD else output.name).stem
-    api.report(
+    warpsplat.report(
         result,
         data,
         report,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat.errors import UsageError
-from warpsplat.files.inputs import STANDARD
+from warpsplat.files.inputs import STANDARD, input_name
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,14 @@ class Request:
         return (self.image,) if self.importance is None else (self.image, self.importance)
 
     @property
-    def manner(self) -> dict[str, Any]:
-        """What the runs of ``cli.run`` take besides image and settings."""
-        names = ("device", "threads", "importance", "verbose", "quiet")
-        return {name: getattr(self, name) for name in names}
+    def source(self) -> dict[str, Any]:
+        """What the library's functions take besides the image's bytes and the settings."""
+        return {
+            "name": input_name(self.image),
+            "importance": self.importance,
+            "device": self.device,
+            "threads": self.threads,
+        }
 
     @property
     def flags(self) -> tuple[str, ...]:

@@ -12,16 +12,19 @@ from typing import Any
 
 import click
 
-from warpsplat.api import suggest, vectorize, vectorize_several
+from warpsplat.api.several import vectorize_several
+from warpsplat.api.suggest import suggest
+from warpsplat.api.vectorize import vectorize
 from warpsplat.cli.motion import Motion
+from warpsplat.cli.request import Request
 from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.work import Progress, TimeLeft
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.suggest import Suggestion
-from warpsplat.jobs.vectorize import Result
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.scene import Kind
 
@@ -86,114 +89,79 @@ def progress_bar(
         yield show
 
 
-def run_file(
-    source: Path,
-    output: Path,
-    settings: Settings,
-    *,
-    data: bytes,
-    device: str,
-    threads: int | None,
-    importance: Path | None = None,
-    verbose: int = 0,
-    quiet: bool = False,
-    motion: Motion | None = None,
-    **keeping: Any,
-) -> Result:
-    """``warpsplat.vectorize`` of the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C.
+@contextlib.contextmanager
+def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Progress], None], Interrupt]]:
+    """What a run on the image of ``request`` reports to, a progress bar, and what it asks whether to stop,
+    Ctrl-C.
 
-    ``importance``: file of a mask. ``motion``: what shows the run besides. ``keeping``: how its state is
-    kept, see there.
+    Raises:
+        UsageError: an unknown device is found before a bar is shown.
     """
-    pursued = settings.target_psnr or settings.max_bytes
     start_warp()
-    chosen = choose_device(device)  # an unknown one is found before a bar is shown
-    if verbose:
-        number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
-        if settings.simplify and pursued:
-            number = "no more than needed"
-        plural = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
-        say(f"{source}: {number} {plural} on {chosen}", err=True)
-    interrupt, motion = Interrupt(), motion or Motion()
-    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
+    choose_device(request.device)
+    interrupt = Interrupt()
+    bar = progress_bar(request.image, settings, quiet=request.quiet, verbose=request.verbose)
+    with interrupt.watching(), bar as report:
+        yield report, interrupt
+
+
+def run_file(
+    request: Request, output: Path, settings: Settings, data: bytes, *, motion: Motion, **keeping: Any
+) -> Result:
+    """``warpsplat.vectorize`` of the image, whose bytes are ``data``.
+
+    ``motion``: what shows the run besides. ``keeping``: how its state is kept, see there.
+    """
+    if request.verbose:
+        say_start(request, _asked(settings))
+    with watched(request, settings) as (report, stop):
         result = vectorize(
             data,
             settings=settings,
             output=output,
-            device=device,
-            threads=threads,
-            name=input_name(source),
-            importance=importance,
+            overwrite=request.overwrite,
             callback=motion.watch(report),
-            stop=interrupt,
+            stop=stop,
+            **request.source,
             **keeping,
         )
         motion.show(result, data)
-    if not quiet:
-        say_about(source, settings, result, verbose=verbose)
+    if not request.quiet:
+        say_about(request.image, settings, result, verbose=request.verbose)
     return result
 
 
 def run_several(
-    source: Path,
-    outputs: Sequence[Path],
-    numbers: Sequence[int],
-    settings: Settings,
-    *,
-    data: bytes,
-    device: str,
-    threads: int | None,
-    importance: Path | None = None,
-    verbose: int = 0,
-    quiet: bool = False,
+    request: Request, outputs: Sequence[Path], numbers: Sequence[int], settings: Settings, data: bytes
 ) -> tuple[Result, ...]:
-    """``warpsplat.vectorize_several`` of the bytes ``data`` of ``source``, with one bar, until Ctrl-C."""
-    start_warp()
-    chosen = choose_device(device)
-    if verbose:
-        say(f"{source}: {', '.join(map(str, numbers))} {PLURALS[settings.kind]} on {chosen}", err=True)
-    interrupt = Interrupt()
-    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
+    """``warpsplat.vectorize_several`` of the image, whose bytes are ``data``, with one bar."""
+    if request.verbose:
+        say_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
+    with watched(request, settings) as (report, stop):
         return vectorize_several(
-            data,
-            numbers,
-            settings=settings,
-            outputs=outputs,
-            device=device,
-            threads=threads,
-            name=input_name(source),
-            importance=importance,
-            callback=report,
-            stop=interrupt,
+            data, numbers, settings=settings, outputs=outputs, callback=report, stop=stop, **request.source
         )
 
 
-def suggest_file(
-    source: Path,
-    settings: Settings,
-    *,
-    data: bytes,
-    device: str,
-    threads: int | None,
-    importance: Path | None = None,
-    verbose: int = 0,
-    quiet: bool = False,
-) -> Suggestion | None:
-    """``warpsplat.suggest`` for the bytes ``data`` of ``source``, with a progress bar, until Ctrl-C."""
+def suggest_file(request: Request, settings: Settings, data: bytes) -> Suggestion | None:
+    """``warpsplat.suggest`` for the image, whose bytes are ``data``."""
+    with watched(request, settings) as (report, stop):
+        return suggest(data, settings=settings, callback=report, stop=stop, **request.source)
+
+
+def _asked(settings: Settings) -> str:
+    """How many shapes of which kind are asked for."""
+    pursued = settings.target_psnr or settings.max_bytes
+    number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
+    if settings.simplify and pursued:
+        number = "no more than needed"
+    return f"{number} {'fills and strokes' if settings.mixed else PLURALS[settings.kind]}"
+
+
+def say_start(request: Request, what: str) -> None:
+    """Say what is about to be made, and where."""
     start_warp()
-    choose_device(device)
-    interrupt = Interrupt()
-    with interrupt.watching(), progress_bar(source, settings, quiet=quiet, verbose=verbose) as report:
-        return suggest(
-            data,
-            settings=settings,
-            device=device,
-            threads=threads,
-            name=input_name(source),
-            importance=importance,
-            callback=report,
-            stop=interrupt,
-        )
+    say(f"{request.image}: {what} on {choose_device(request.device)}", err=True)
 
 
 def say_about(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:

@@ -17,13 +17,15 @@ from warpsplat.files.inputs import STANDARD, read_input
 from warpsplat.files.output import check_output, write_result
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.batch.images import Found
-from warpsplat.jobs.batch.names import Wanted, fields_of, name_results
-from warpsplat.jobs.formats import ENDINGS, check_format
+from warpsplat.jobs.batch.layers import Place
+from warpsplat.jobs.batch.names import Wanted, check_outputs, fields_of, name_results
+from warpsplat.jobs.executors.work import make_folder
+from warpsplat.jobs.formats import ENDINGS
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.reports.command import several_command
 from warpsplat.jobs.reports.several import Version, several_page
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.several import check_several
-from warpsplat.jobs.vectorize import Result
 
 COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Of the table."""
@@ -40,12 +42,17 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     check_several(settings, numbers)
     outputs = named(image, request.output, numbers, settings)
     data = read_input(image)
+    check_outputs([_place(request.output)] * len(outputs), outputs)
     for path in outputs:
-        check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
-        check_format(path)
+        if path.parent.exists():
+            check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
         check_report(request.report, inputs, path, overwrite=request.overwrite)
-    results = run_several(image, outputs, numbers, settings, data=data, **request.manner)
-    made = list(zip(outputs, results, strict=False))
+    for folder in {path.parent for path in outputs}:
+        make_folder(folder)
+    results = run_several(request, outputs, numbers, settings, data)
+    begun = sorted(numbers)[: len(results)]  # where it was stopped, the fewest shapes are there
+    paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]
+    made = list(zip(paths, results, strict=True))
     if not request.quiet and results:
         say_about(image, settings, results[-1], verbose=request.verbose)
     if request.as_json:
@@ -55,7 +62,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
         ]
         say(json.dumps(each))
     elif not request.quiet:
-        say(table(made))
+        say("\n".join([table(made), *_missing(numbers, begun)] if made else _missing(numbers, begun)))
     if request.report and made:
         line = several_command(settings, numbers, str(image), request.output, *request.flags)
         _write_report(request.report, made, image, data, line)
@@ -81,18 +88,11 @@ def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Se
         raise UsageError("several numbers of shapes make several files: give -o 'NAME-{curves}.svg'")
     pattern = output or Path()
     if pattern.suffix.lower() not in ENDINGS:
-        try:
-            pattern.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UsageError(f"{pattern}: cannot be made: {error.strerror or error}") from error
         pattern = Path(_literal(str(pattern)), _literal(image.stem) + "-{curves}.svg")
     elif not re.search(r"(?<!\{)\{[^{}]", str(pattern)):
         pattern = pattern.with_name(f"{pattern.stem}-{{curves}}{pattern.suffix}")
 
-    def place(message: str) -> UsageError:
-        return UsageError(f"-o {output}: {message.removeprefix('output: ')}")
-
-    found = Found(image, image.parent)
+    found, place = Found(image, image.parent), _place(output)
     return name_results(
         [
             Wanted(found, pattern, settings, {**fields_of(settings, {}), "curves": number}, place)
@@ -101,9 +101,20 @@ def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Se
     )
 
 
+def _place(output: Path | None) -> Place:
+    """Makes errors that name what was given."""
+    return lambda message: UsageError(f"-o {output or '.'}: {message.removeprefix('output: ')}")
+
+
 def _literal(text: str) -> str:
     """A text that means itself in a pattern of names."""
     return text.replace("{", "{{").replace("}", "}}")
+
+
+def _missing(numbers: Sequence[int], begun: Sequence[int]) -> list[str]:
+    """A line that says which of the ``numbers`` of shapes there is no file of, if there are some."""
+    left = [str(number) for number in numbers if number not in begun]
+    return [f"interrupted: no file with {', '.join(left)} shapes"] if left else []
 
 
 def table(made: Sequence[tuple[Path, Result]]) -> str:

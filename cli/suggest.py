@@ -42,7 +42,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     image, _ = request.image, request.inputs
     settings = settings_from(given)
     check_suggesting(settings)
-    made = suggest_file(image, settings, data=read_input(image), **request.manner)
+    made = suggest_file(request, settings, read_input(image))
     if made is None:
         return
     command = _command(request, settings, made)

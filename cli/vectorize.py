@@ -148,17 +148,8 @@ def single(
     check_report(report, inputs, output, overwrite=overwrite)
     from warpsplat.cli.run import leave, run_file
 
-    result = run_file(
-        image,
-        output,
-        settings,
-        data=data,
-        overwrite=overwrite,
-        motion=motion,
-        **request.manner,
-        **keeping,
-    )
-    motion.finish(result, quiet=request.quiet)
+    result = run_file(request, output, settings, data, motion=motion, **keeping)
+    motion.finish(result, quiet=request.quiet, device=request.device, threads=request.threads)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 

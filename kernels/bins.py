@@ -19,6 +19,8 @@ TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
 COVERED = wp.constant(constants.COVERED)
 FULL = wp.constant(constants.FULL)
 HIDDEN = wp.constant(constants.HIDDEN)
+STILL = wp.constant(constants.STILL)
+SAME = wp.constant(constants.SAME)
 
 
 @wp.kernel
@@ -148,16 +150,23 @@ def list_visible(
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_last: wp.array[wp.int32],  # [tile_count]
     most: wp.float32,  # of an opacity, for what lies behind; below 1, the lists go further back
+    keeps_colors: wp.int32,  # 1 where no gradient of colours and opacities is asked for
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] HIDDEN added
     tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
     list_slot: wp.array[wp.int32],  # [slot_capacity] slot, or -1 - slot of a FULL one
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
+    tile_shapes: wp.array[wp.int32],  # [tile_count] of a tile that is still: which they are, as a number
+    tile_still: wp.array[wp.int32],  # [tile_count] 0, STILL or SAME
 ):
-    """Each tile's slots that can be seen: covered, and not behind so many FULL ones that no light is left."""
+    """Each tile's slots that can be seen: covered, and not behind so many FULL ones that no light is left.
+    And whether the tile is still.
+    """
     tile = offset + wp.tid()
     light = float(1.0)
     n = tile_first[tile]
+    shapes = int(1)
+    is_still = keeps_colors
     for k in range(tile_first[tile], tile_last[tile]):
         slot = sort_slots[k]
         state = slot_state[slot]
@@ -169,7 +178,15 @@ def list_visible(
             list_slot[n] = slot
             if state == FULL:
                 list_slot[n] = -1 - slot
+                shapes = 31 * shapes + shape + 1
                 if paint[shape] == FLAT:
                     light *= 1.0 - wp.min(opacities[shape], most)
+            if state != FULL or paint[shape] != FLAT:
+                is_still = 0
             n += 1
     tile_stop[tile] = n
+    still = int(0)
+    if is_still == 1:
+        still = wp.where(shapes == tile_shapes[tile], SAME, STILL)
+    tile_shapes[tile] = is_still * shapes
+    tile_still[tile] = still

@@ -15,6 +15,7 @@ AREA = wp.constant(constants.AREA)
 TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
+SAME = wp.constant(constants.SAME)
 
 
 @wp.kernel
@@ -24,6 +25,7 @@ def paint_forward(
     lane_columns: wp.int32,  # columns of a tile that a thread handles
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_stop: wp.array[wp.int32],  # [tile_count]
+    tile_still: wp.array[wp.int32],  # [tile_count]
     list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
@@ -32,9 +34,11 @@ def paint_forward(
     # Out:
     image: wp.array3d[column],  # [tile_count, planes, TILE]
 ):
-    """One thread a tile and lane."""
+    """One thread a tile and lane. A tile that is the same as in the last pass stays as it is."""
     i, lane = wp.tid()
     tile = offset + i
+    if tile_still[tile] == SAME:
+        return
     start = tile_first[tile]
     stop = tile_stop[tile]
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
@@ -73,6 +77,7 @@ def paint_backward(
     lane_columns: wp.int32,
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_stop: wp.array[wp.int32],  # [tile_count]
+    tile_still: wp.array[wp.int32],  # [tile_count]
     list_slot: wp.array[wp.int32],  # [slot_capacity]
     list_paint: wp.array[wp.vec4],  # [slot_capacity]
     coverage: wp.array2d[column],  # [slot_capacity, TILE]
@@ -86,10 +91,12 @@ def paint_backward(
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
 ):
     """See the module. The gradient of s takes the place of the coverage, which is not needed any more: this
-    stage waits for memory.
+    stage waits for memory. Tiles that are still have no gradient that is asked for.
     """
     i, lane = wp.tid()
     tile = offset + i
+    if tile_still[tile] != 0:
+        return
     start = tile_first[tile]
     stop = tile_stop[tile]
     one = column(1.0)

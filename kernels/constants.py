@@ -181,3 +181,9 @@ MODULE_OPTIONS = {
 """Of every kernel module. Loops over the 16 elements of a column become vector instructions only where they
 are not unrolled before; unrolled, they also take ten times as long to compile. Warp's headers are precompiled
 once for all modules whose options for the compiler are the same."""
+
+STILL = 1
+"""A tile that shows nothing but flat colours which cover it: of outlines there is nothing to be found ..."""
+
+SAME = 2
+"""... and did so in the last pass."""

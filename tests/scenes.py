@@ -178,16 +178,21 @@ def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:
 
 def with_two_stops(scene: Scene, *, seed: int = 0) -> Scene:
     """Every shape but the last has a gradient of two stops, padded, linear and radial by turns."""
+    return with_stops(scene, (0.1, 0.8), seed=seed)
+
+
+def with_stops(scene: Scene, offsets: Sequence[float], *, seed: int = 0) -> Scene:
+    """As ``with_two_stops``, with stops at ``offsets``."""
     scene = with_gradients(scene, seed=seed)
     rng = np.random.default_rng(seed)
-    stops = 2 * (scene.paint != Paint.FLAT)
+    stops = len(offsets) * (scene.paint != Paint.FLAT)
     total = int(stops.sum())
     return replace(
         scene,
         spread=np.zeros_like(scene.spread),
         focus=np.zeros_like(scene.focus),
         stop_first=starts_of(stops),
-        stop_offsets=np.tile(np.array([0.1, 0.8], np.float32), total // 2),
+        stop_offsets=np.tile(np.array(offsets, np.float32), total // len(offsets)),
         stop_colors=rng.uniform(0.05, 0.95, (total, 3)).astype(np.float32),
         stop_opacities=rng.uniform(0.3, 1.0, total).astype(np.float32),
     )

@@ -44,7 +44,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "pages",
         "torch",
     ),
-    "motion": ("errors", "files", "fit", "jobs", "scene", "svg"),
+    "motion": ("errors", "files", "fit", "jobs", "rendering", "scene", "svg"),
     "terminal": ("scene", "fit.work"),
     "torch": ("errors", "scene", "kernels", "rendering", "fit", "svg"),
 }

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 from warpsplat._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from warpsplat.api import load_image as load_image
-    from warpsplat.api import load_svg as load_svg
-    from warpsplat.api import refine as refine
-    from warpsplat.api import render as render
-    from warpsplat.api import report as report
-    from warpsplat.api import save_svg as save_svg
-    from warpsplat.api import score as score
-    from warpsplat.api import starting_scene as starting_scene
-    from warpsplat.api import suggest as suggest
-    from warpsplat.api import vectorize as vectorize
-    from warpsplat.api import vectorize_several as vectorize_several
+    from warpsplat.api.images import load_image as load_image
+    from warpsplat.api.images import starting_scene as starting_scene
+    from warpsplat.api.refine import refine as refine
+    from warpsplat.api.render import render as render
+    from warpsplat.api.report import report as report
+    from warpsplat.api.several import vectorize_several as vectorize_several
+    from warpsplat.api.suggest import suggest as suggest
+    from warpsplat.api.svg import load_svg as load_svg
+    from warpsplat.api.svg import save_svg as save_svg
+    from warpsplat.api.svg import score as score
+    from warpsplat.api.vectorize import vectorize as vectorize
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
     from warpsplat.errors import ResourceError as ResourceError
@@ -33,22 +33,23 @@ if TYPE_CHECKING:
     from warpsplat.fit.work import Progress as Progress
     from warpsplat.fit.work import Snapshot as Snapshot
     from warpsplat.jobs.render import to_pillow as to_pillow
+    from warpsplat.jobs.result import Result as Result
     from warpsplat.jobs.suggest import Expected as Expected
     from warpsplat.jobs.suggest import Suggestion as Suggestion
-    from warpsplat.jobs.vectorize import Result as Result
     from warpsplat.metrics import Score as Score
     from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.scene import Canvas as Canvas
     from warpsplat.scene import Scene as Scene
 
 _HOMES = {
-    **dict.fromkeys(
-        (
-            *("vectorize", "refine", "render", "load_image", "load_svg", "save_svg", "score", "report"),
-            *("starting_scene", "vectorize_several", "suggest"),
-        ),
-        "warpsplat.api",
-    ),
+    "vectorize": "warpsplat.api.vectorize",
+    "vectorize_several": "warpsplat.api.several",
+    "suggest": "warpsplat.api.suggest",
+    "refine": "warpsplat.api.refine",
+    "render": "warpsplat.api.render",
+    "report": "warpsplat.api.report",
+    **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.api.images"),
+    **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.api.svg"),
     **dict.fromkeys(
         ("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"), "warpsplat.errors"
     ),
@@ -57,7 +58,7 @@ _HOMES = {
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
     "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.jobs.render",
-    "Result": "warpsplat.jobs.vectorize",
+    "Result": "warpsplat.jobs.result",
     "Score": "warpsplat.metrics",
     **dict.fromkeys(("Expected", "Suggestion"), "warpsplat.jobs.suggest"),
 }

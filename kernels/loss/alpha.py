@@ -9,6 +9,7 @@ from warpsplat.kernels.tile import column, total
 wp.set_module_options({**constants.MODULE_OPTIONS, "max_unroll": 1})
 
 TILE = wp.constant(constants.TILE)
+SAME = wp.constant(constants.SAME)
 
 
 @wp.kernel
@@ -18,15 +19,18 @@ def alpha_loss(
     image: wp.array3d[column],  # [tile_count, 4, TILE] premultiplied, and opacity
     target: wp.array3d[column],  # [tile_count, 4, TILE]
     importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
+    tile_still: wp.array[wp.int32],  # [tile_count] the loss of tiles that are the SAME is, if it is known
     value_count: wp.int32,  # pixels x colours
     # Out:
     image_grad: wp.array3d[column],  # [tile_count, 4, TILE]
-    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted
+    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted; below 0: not known
 ):
     """Mean over pixels and colours of w (e^2 + (e - a)^2) / 2: e is the error of the premultiplied colour,
     which is that on black, a the error of the opacity, by which less of the white shows. One thread a tile.
     """
     tile = offset + wp.tid()
+    if tile_still[tile] == SAME and loss[tile, 0] >= 0.0:
+        return
     factor = 1.0 / float(value_count)
     for channel in range(3):
         squares = column(0.0)

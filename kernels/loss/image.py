@@ -8,6 +8,7 @@ from warpsplat.kernels.tile import column, total
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 TILE = wp.constant(constants.TILE)
+SAME = wp.constant(constants.SAME)
 WINDOW = wp.constant(8)
 C1 = wp.constant(0.01 * 0.01)
 C2 = wp.constant(0.03 * 0.03)
@@ -31,6 +32,7 @@ def image_loss(
     image: wp.array3d[column],  # [tile_count, 3, TILE]
     target: wp.array3d[column],  # [tile_count, 3, TILE]
     importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
+    tile_still: wp.array[wp.int32],  # [tile_count] the loss of tiles that are the SAME is, if it is known
     weighted: wp.int32,  # whether that is anything but 1 in the image; if not, it is not read
     width: wp.int32,  # [px]
     height: wp.int32,  # [px]
@@ -40,7 +42,7 @@ def image_loss(
     value_count: wp.int32,  # pixels x channels
     # Out:
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
-    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted
+    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted; below 0: not known
     similarity: wp.array2d[
         wp.float32
     ],  # [tile_count, 3] sums over windows of SSIM x weight; 0 without weight
@@ -57,6 +59,8 @@ def image_loss(
     """
     i, channel = wp.tid()
     tile = offset + i
+    if tile_still[tile] == SAME and loss[tile, channel] >= 0.0:
+        return
     columns = wp.min(width - tile % tiles_x * TILE, TILE)
     rows = wp.min(height - tile / tiles_x * TILE, TILE)
     phase = clock[0] % 4

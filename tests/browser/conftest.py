@@ -1,17 +1,19 @@
-"""A real browser, headless, for all tests of a worker; where there is none they are skipped."""
+"""A real browser, headless, for all tests of this folder; where there is none they are skipped."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Route
+    from playwright.sync_api import Browser, Page, Route, ViewportSize
 
 ARGUMENTS = [
     "--headless",
@@ -21,7 +23,7 @@ ARGUMENTS = [
     "--no-first-run",
 ]
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-LONGEST_WAIT = 10_000
+LONGEST_WAIT = 20_000
 """For anything on a page [ms]."""
 
 
@@ -31,8 +33,9 @@ def installed_browser() -> str | None:
     return given or next(filter(None, map(shutil.which, NAMES)), None)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
+    """As long as it is there, so is an event loop of its own: other folders' tests run some themselves."""
     api = pytest.importorskip("playwright.sync_api", reason="pip install playwright, for tests in a browser")
     with api.sync_playwright() as playwright:
         executable = installed_browser()
@@ -52,11 +55,22 @@ def complaints() -> Complaints:
     return Complaints()
 
 
+@contextlib.contextmanager
+def opened(browser: Browser, complaints: Complaints) -> Iterator[Page]:
+    """An empty page that must not complain of anything."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    context.set_default_timeout(LONGEST_WAIT)
+    page = context.new_page()
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("console", lambda line: complaints.append(line.text) if line.type != "log" else None)
+    yield page
+    context.close()
+    assert not complaints
+
+
 @pytest.fixture
 def tab(browser: Browser, complaints: Complaints) -> Iterator[Page]:
     """An empty page that reaches nothing but files, and whose test fails where it complains of anything."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900})
-    context.set_default_timeout(LONGEST_WAIT)
 
     def local_only(route: Route) -> None:
         if route.request.url.startswith(("file:", "data:", "blob:")):
@@ -65,10 +79,24 @@ def tab(browser: Browser, complaints: Complaints) -> Iterator[Page]:
             complaints.append(f"asked for {route.request.url}")
             route.abort()
 
-    context.route("**/*", local_only)
-    page = context.new_page()
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda line: complaints.append(line.text) if line.type != "log" else None)
-    yield page
-    context.close()
-    assert not complaints
+    with opened(browser, complaints) as page:
+        page.context.route("**/*", local_only)
+        yield page
+
+
+PHONE: ViewportSize = {"width": 390, "height": 844}
+
+
+def fits_a_phone(page: Page) -> bool:
+    """Whether a page on a phone's screen, where it is shown from now on, need not be moved sideways."""
+    page.set_viewport_size(PHONE)
+    width: int = page.evaluate("document.documentElement.scrollWidth")
+    return width == PHONE["width"]
+
+
+@pytest.fixture(scope="session")
+def halves() -> np.ndarray:
+    """Pixels of a dark and a bright half with grain, of the type uint8, shape (32, 48, 3)."""
+    image = np.random.default_rng(0).integers(0, 60, (32, 48, 3)).astype(np.uint8)
+    image[:, 24:] += 150
+    return image

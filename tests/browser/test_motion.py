@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import warpsplat
+from tests.motion.helpers import recording
 from warpsplat import Recorder, Result
 from warpsplat.motion.timing import HOLD
 
@@ -28,11 +28,7 @@ LONGEST_WAIT = 15.0
 
 @pytest.fixture(scope="module")
 def recorded() -> tuple[Recorder, Result]:
-    y, x = np.mgrid[:36, :48] / 48
-    pixels = np.stack([x, y, 0.5 + 0.3 * np.sin(9 * x * y)], axis=2)
-    recorder = Recorder()
-    result = warpsplat.vectorize(pixels, 6, subject="photo", iterations=50, device="cpu", callback=recorder)
-    return recorder, result
+    return recording(iterations=50)
 
 
 def shot(tab: Page, element: str = "#shown") -> np.ndarray:

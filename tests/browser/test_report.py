@@ -11,19 +11,18 @@ import pytest
 from PIL import Image
 
 import warpsplat
+from tests.browser.conftest import fits_a_phone
 
 if TYPE_CHECKING:
     from playwright.sync_api import Dialog, Page
 
 
 @pytest.fixture(scope="session")
-def report_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a run of some steps, on an image in two halves."""
+def report_file(halves: np.ndarray, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a run of some steps."""
     path = tmp_path_factory.mktemp("report") / "report.html"
-    image = np.random.default_rng(0).integers(0, 60, (32, 48, 3)).astype(np.uint8)
-    image[:, 24:] += 150
-    result = warpsplat.vectorize(image, 12, iterations=12, subject="photo", device="cpu", threads=1)
-    shown = Image.fromarray(image)
+    result = warpsplat.vectorize(halves, 12, iterations=12, subject="photo", device="cpu", threads=1)
+    shown = Image.fromarray(halves)
     warpsplat.report(
         result, shown, path, command="warpsplat vectorize 'a b.png'", name="a b.png", device="cpu"
     )
@@ -154,8 +153,7 @@ def test_error_map_download_and_command(report: Page, report_file: Path) -> None
 
 
 def test_on_a_phone(report: Page) -> None:
-    report.set_viewport_size({"width": 390, "height": 844})
-    assert report.evaluate("document.documentElement.scrollWidth") == 390
+    assert fits_a_phone(report)
 
 
 HOSTILE = (

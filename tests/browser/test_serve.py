@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import warpsplat
-from tests.browser.conftest import Complaints
+from tests.browser.conftest import Complaints, fits_a_phone, opened
 from tests.serve.helpers import Visitor, picture, until
 from warpsplat.fit.settings import PRESETS
 
@@ -31,16 +31,9 @@ def visitor(monkeypatch: pytest.MonkeyPatch) -> Iterator[Visitor]:
 
 @pytest.fixture
 def visit(visitor: Visitor, browser: Browser, complaints: Complaints) -> Iterator[Page]:
-    """The page, which must not complain of anything."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900})
-    context.set_default_timeout(20_000)
-    page = context.new_page()
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda line: complaints.append(line.text) if line.type != "log" else None)
-    page.goto(visitor.server.address())
-    yield page
-    context.close()
-    assert not complaints
+    with opened(browser, complaints) as page:
+        page.goto(visitor.server.address())
+        yield page
 
 
 def give(page: Page, data: bytes, name: str = "my photo.png") -> None:
@@ -138,8 +131,8 @@ def test_what_is_refused_is_said_in_its_place(visit: Page, complaints: Complaint
 
 def test_it_fits_a_phone(visit: Page) -> None:
     page = visit
-    page.set_viewport_size({"width": 390, "height": 800})
+    assert fits_a_phone(page)
     give(page, picture())
     start(page, 4)
     done(page, 1)
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert fits_a_phone(page)

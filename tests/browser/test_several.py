@@ -10,19 +10,18 @@ import pytest
 from PIL import Image
 
 import warpsplat
+from tests.browser.conftest import PHONE, fits_a_phone
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 
 @pytest.fixture(scope="session")
-def several_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def several_file(halves: np.ndarray, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("several") / "page.html"
-    image = np.random.default_rng(0).integers(0, 60, (32, 48, 3)).astype(np.uint8)
-    image[:, 24:] += 150
     settings = warpsplat.make_settings(iterations=12, subject="photo")
-    results = warpsplat.vectorize_several(image, [2, 5, 9], settings=settings, device="cpu", threads=1)
-    warpsplat.report(results, Image.fromarray(image), path, name="a <b>.png", command="warpsplat vectorize")
+    results = warpsplat.vectorize_several(halves, [2, 5, 9], settings=settings, device="cpu", threads=1)
+    warpsplat.report(results, Image.fromarray(halves), path, name="a <b>.png", command="warpsplat vectorize")
     return path
 
 
@@ -46,6 +45,6 @@ def test_any_two_are_compared_and_each_is_downloaded(tab: Page, several_file: Pa
 
 
 def test_a_phone_sees_all_of_it(tab: Page, several_file: Path) -> None:
-    tab.set_viewport_size({"width": 390, "height": 800})
+    tab.set_viewport_size(PHONE)
     tab.goto(several_file.as_uri())
-    assert tab.evaluate("document.documentElement.scrollWidth") == 390
+    assert fits_a_phone(tab)

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run
-from warpsplat.api import load_svg, save_svg
+from warpsplat.api.svg import load_svg, save_svg
 from warpsplat.errors import UsageError
 from warpsplat.files.output import may_replace
 from warpsplat.jobs.formats import write_named

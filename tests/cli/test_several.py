@@ -13,8 +13,9 @@ from PIL import Image
 import warpsplat
 from tests.cli.helpers import one_line, run
 from warpsplat.cli.main import main
+from warpsplat.fit.survey import Worth
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.suggest import Suggestion, suggestion
+from warpsplat.jobs.suggest import suggestion
 from warpsplat.scene import FloatArray
 from warpsplat.trace.trace import Traced, trace
 
@@ -41,6 +42,7 @@ def test_a_file_for_each_number(
     [
         ("out.svg", {"out-2.svg", "out-5.svg"}),
         ("f{o/x", {"f{o/x/photo-2.svg", "f{o/x/photo-5.svg"}),
+        ("new/{stem}/{curves}.png", {"new/photo/2.png", "new/photo/5.png"}),
         ("{stem}_{curves}_{seed}.svgz", {"photo_2_0.svgz", "photo_5_0.svgz"}),
     ],
 )
@@ -66,6 +68,9 @@ REFUSED = [
     (["--curves", "5,x"], "not a whole number, nor several"),
     (["--curves", "5,9", "-o", "-"], "several files: give -o 'NAME-{curves}.svg'"),
     (["--curves", "5,9", "-o", "same-{stem}.svg"], "2 results would be same-photo.svg"),
+    (["--curves", "5,9", "-o", "new/{curves}-{x}.svg"], "'{x}' is no field"),
+    (["--curves", "5,9", "-o", "new/{curves}.svg", "--report", "no/a.html"], "no does not exist"),
+    (["--curves", "5,9", "-o", "photo.png/{curves}.svg"], "photo.png is a file, not a folder"),
     (["--curves", "5,9", "--target-psnr", "20"], "and target-psnr do not go together"),
     (["--curves", "5,9", "--max-bytes", "2KB"], "and max-bytes do not go together"),
     (["--curves", "5,9", "--time-budget", "9s"], "and time-budget do not go together"),
@@ -110,9 +115,10 @@ def test_batches_say_what_to_use(image: Path, tmp_path: Path, capsys: pytest.Cap
     assert run("batch", image, "--curves", "5,9") == 2
     assert "matrix: {curves: [5, 9]}" in one_line(capsys.readouterr().err)
     jobs = tmp_path / "jobs.yaml"
-    jobs.write_text("jobs:\n  - images: photo.png\n    curves: [5, 9]\n")
-    assert run("batch", jobs) == 2
-    assert "matrix: {curves: [...]}" in one_line(capsys.readouterr().err)
+    for value, hint in (("[5, 9]", "{curves: [...]}"), ("5,9", "{curves: [5, 9]}")):
+        jobs.write_text(f"jobs:\n  - images: photo.png\n    curves: {value}\n")
+        assert run("batch", jobs) == 2
+        assert f"matrix: {hint}" in one_line(capsys.readouterr().err)
 
 
 def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> None:
@@ -136,6 +142,19 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
     assert [result.stopped for result in results] == [False, True]
     assert [output.exists() for output in outputs] == [True, True, False]
     assert outputs[0].read_text() == results[0].svg
+
+
+def test_files_are_named_after_their_numbers_where_it_is_interrupted(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of few shapes are made first, in whichever order the numbers are given."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("warpsplat.cli.run.Interrupt.__call__", lambda self: os.path.exists("photo-3.svg"))
+    run("vectorize", image, "--curves", "9,3,6", *FEW)
+    _, row, last = capsys.readouterr().out.splitlines()
+    assert row.split()[:2] == ["photo-3.svg", "3"]
+    assert last == "interrupted: no file with 9, 6 shapes"
+    assert {path.name for path in tmp_path.glob("*.svg")} == {"photo-3.svg"}
 
 
 def test_the_library_names_the_function_for_several(image: Path) -> None:
@@ -165,6 +184,20 @@ def test_a_drawing_that_has_fewer_regions_is_traced_once(
     assert many.svg == most.svg and len(few.scene) < len(many.scene) <= 9
 
 
+@pytest.mark.parametrize("noise", [1, 90])
+def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
+    """They would lose by going on from one another; those to what looks like a photograph do go on."""
+    levels = np.full((48, 48, 3), 250, np.uint8)
+    levels[8:30, 8:30], levels[20:40, 20:44] = (200, 130, 130), (120, 180, 160)
+    levels -= np.random.default_rng(0).integers(0, noise, levels.shape, np.uint8)
+    path = tmp_path / "picture.png"
+    Image.fromarray(levels).save(path)
+    settings = warpsplat.make_settings(subject="photo", iterations=30, density={"interval": 2})
+    few, many = warpsplat.vectorize_several(path, [3, 6], settings=settings, device="cpu", threads=1)
+    assert few.iterations == 30
+    assert (many.iterations == 30) == (noise == 1)
+
+
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpsplat.fit.survey.STEPS", 60)
@@ -179,7 +212,7 @@ def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert 16 <= values["curves"] <= 300
     assert values["command"] == f"warpsplat vectorize {image} --curves {values['curves']} --open -o photo.svg"
     assert values["curves"] in [row["shapes"] for row in values["expected"]]
-    assert "twice as many buy" in values["why"]
+    assert "shapes are expected to give" in values["why"]
     assert os.listdir(image.parent) == before
 
 
@@ -187,9 +220,8 @@ def test_a_suggestion_in_words(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from warpsplat.cli import run as runs
-    from warpsplat.fit.survey import Worth
 
-    made = suggestion(Worth(16, 1024, (0.0, 2.0, 10.0), (1.0, 6.0), 0.1))
+    made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
@@ -200,12 +232,24 @@ def test_a_suggestion_in_words(
 
 
 def test_the_suggestion_is_the_knee() -> None:
-    from warpsplat.fit.survey import Worth
-
-    made = suggestion(Worth(16, 1024, (0.0, 2.0, 10.0), (1.0, 6.0), 0.1))
+    made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     assert made.by_shapes == made.by_bytes == made.curves == 240
-    straight = suggestion(Worth(16, 17, (0.0, 0.0, 20.0), (1.0, 6.0), 0.0))
-    assert isinstance(straight, Suggestion) and straight.curves == 17
+    assert "twice as many 2.0 dB more" in made.why and "up to 240 shapes it buys more" in made.why
+    assert [one.shapes for one in made.expected] == [60, 120, 240, 480, 960]
+
+
+@pytest.mark.parametrize(
+    ("worth", "curves", "words"),
+    [
+        (Worth(7, 7, 7, 20.0, 0.0, 0.0, 64.0), 7, "no room for more than 7 shapes"),
+        (Worth(16, 99, 99, 20.0, 0.0, 0.0, 64.0), 16, "more are expected to add nothing"),
+        (Worth(16, 32, 32, 99.0, 2.0, 0.0, 64.0), 16, "more are expected to add nothing"),
+    ],
+)
+def test_more_shapes_than_are_worth_it_are_not_suggested(worth: Worth, curves: int, words: str) -> None:
+    made = suggestion(worth)
+    assert made.curves == curves and words in made.why
+    assert curves in [one.shapes for one in made.expected]
 
 
 def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -213,4 +257,5 @@ def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest
     Image.fromarray(np.kron(np.eye(8, dtype=np.uint8) * 255, np.ones((4, 4), np.uint8))).save(path)
     assert run("vectorize", path, "--suggest") == 0
     said = capsys.readouterr().out
-    assert "the picture says how many shapes there are; --subject photo fits them" in said
+    assert "A picture of cells (2 colours in cells of 4x4 px), which is traced" in said
+    assert "the picture says how many shapes there are. --subject photo fits a number of shapes" in said

@@ -45,8 +45,8 @@ strike_in(Step, "advance", 5)
 strike_in(os, "fsync")
 """,
     "scoring": """
-import warpsplat.jobs.vectorize
-strike_in(warpsplat.jobs.vectorize, "score_svg")
+import warpsplat.jobs.figures
+strike_in(warpsplat.jobs.figures, "score_svg")
 """,
     "writing, twice": """
 strike_in(os, "fsync", times=2)

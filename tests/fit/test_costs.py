@@ -13,10 +13,11 @@ from tests.fit.test_goals import made
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.drawing import Refinement
+from warpsplat.fit.drawing_costs import Costs
 from warpsplat.fit.goals import ROUNDS, rounds_left
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Density, Settings, make_settings
-from warpsplat.fit.tidy import Costs, finish_drawing
+from warpsplat.fit.tidy import REFIT, finish_drawing
 from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
@@ -37,6 +38,22 @@ def test_a_course_goes_on_with_its_steps() -> None:
     late = course(settings, begin=800)
     assert late.cost(800) == 0
     assert late.cost() == pytest.approx(whole.cost() - whole.cost(800), rel=0.05)
+
+
+def test_a_turn_is_over_at_once() -> None:
+    """It is done after the report of its step, at the size of the step before it."""
+    settings = make_settings(curves=64, iterations=400, coarse=0.5)
+    interval = settings.density.interval
+    plain = course(replace(settings, density=replace(settings.density, interval=0)))
+
+    def surgery(step: int) -> float:
+        return course(settings, serial=1000).cost(step) - course(settings, serial=0).cost(step)
+
+    assert interval == 25
+    assert surgery(25) == 0 < surgery(26) == surgery(50) < surgery(51)
+    coarse, fine = surgery(201) - surgery(200), surgery(226) - surgery(225)
+    assert fine > 1.5 * coarse > 0, "the one at the change is done before it"
+    assert plain.cost() < course(settings).cost()
 
 
 def test_what_is_done_besides_steps_counts() -> None:
@@ -75,18 +92,22 @@ def test_measuring_takes_longer_with_eyes_and_beside_threads(monkeypatch: pytest
 
 
 def test_rounds_that_are_left_follow_what_is_amiss() -> None:
-    settings = make_settings(curves=100, target_psnr=27.0)
     scene = trace(np.zeros((32, 32, 3), np.float32)).scene
+    settings = make_settings(curves=100, target_psnr=27.0)
+    left = [rounds_left([made(scene, 10_000, 27.4)], settings, most) for most in range(ROUNDS + 1)]
+    assert left[:2] == pytest.approx([0, 1])
+    assert all(fewer < more < fewer + 1.001 for fewer, more in itertools.pairwise(left))
+    assert left[ROUNDS] < ROUNDS, "any of them may be the last"
 
-    def left(*psnr: float) -> float:
-        return rounds_left([made(scene, 10_000 - i, each) for i, each in enumerate(psnr)], settings)
-
-    assert left(26.5) == ROUNDS
-    assert ROUNDS > left(27.4) > left(27.1) > left(27.05) > 0
-    assert left(27.4, 26.9) == left(27.4), "the one that will do counts"
     size = make_settings(curves=100, max_bytes=10_000)
-    assert rounds_left([made(scene, 30_000, 27)], size) > rounds_left([made(scene, 10_500, 27)], size) > 1
-    assert rounds_left([made(scene, 1_000, 27)], size) > rounds_left([made(scene, 9_500, 27)], size) > 1
+
+    def tried(size_now: int, most: int = ROUNDS) -> float:
+        return rounds_left([made(scene, size_now, 27)], size, most)
+
+    assert tried(30_000) > tried(10_500) > 1
+    assert tried(1_000) > tried(9_500) > 1
+    assert tried(9_500) > tried(10_500), "what grows may come to be too large"
+    assert tried(30_000, 2) == 2
 
 
 def test_a_drawing_goes_on_while_its_grid_is_chosen() -> None:
@@ -102,5 +123,5 @@ def test_a_drawing_goes_on_while_its_grid_is_chosen() -> None:
     ends = [now.work for now, later in itertools.pairwise(told) if later.step < now.step]
     begins = [now.work for now in told if now.step == 10]
     assert begins[-1] - ends[-1] > costs.grid() / (
-        costs.grid() + costs.refit(Refinement()) + 9 * costs.round()
+        costs.grid() + costs.refit(Refinement()) + 20 * costs.refit(REFIT) + 16 * costs.look(20)
     )

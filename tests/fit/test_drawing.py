@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.fit.drawings import WHITE, logo, seam
+from tests.fit.drawings import BLUE, RED, WHITE, disc, drawing, logo, seam
 from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.fit.constraints import Constraints, Drawing, Joint
-from warpsplat.fit.drawing import Refinement, own_colors, refine_drawing
+from warpsplat.fit.drawing import Refinement, own_colors, refine_drawing, start
+from warpsplat.fit.step import Step
+from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import Canvas, FloatArray, Scene
 
 QUICK = Refinement(steps=60, point_rate=0.4)
 
@@ -134,3 +136,33 @@ def test_gradients_are_fitted_and_stay_as_opaque_as_they_are(device: str) -> Non
     fitted = refine_drawing(target, off, exact.joints, exact.same, backend, QUICK)
     assert psnr(fitted, target, backend) > psnr(replace(off, opacities=fitted.opacities), target, backend)
     np.testing.assert_array_equal(fitted.stop_opacities, ramps.stop_opacities)
+
+
+@pytest.mark.parametrize("background", [WHITE, None])
+def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray | None) -> None:
+    """The same steps and figures to the bit, while outlines come into tiles and leave them."""
+    made = drawing(
+        Canvas(96, 80, background), (RED, [disc(49.0, 40.0, 30.0)]), (BLUE, [disc(55.0, 36.0, 22.0)])
+    )
+    target = render(replace(made.scene, points=made.scene.points + np.array([7, 3], np.float32)))
+    points, errors, still = [], [], []
+    for keeps in (False, True):
+        step = start(target, made, Backend.on(device, 1), Refinement(point_rate=0.9))
+        step.state.parameters.keeps_colors = keeps
+        step = Step(step.state, step.settings, step.target)
+        figures, states = [], []
+        for _ in range(12):
+            step.advance()
+            figures.append(step.aim.mean_square())
+            states.append(step.renderer.bins.buffers.tile_still.numpy().copy())
+        step.render()
+        assert step.measured_error() == pytest.approx(step.square_error(), rel=1e-5)
+        points.append(step.state.scene().points)
+        errors.append(figures)
+        still.append(states)
+    np.testing.assert_array_equal(*points)
+    assert errors[0] == errors[1]
+    assert not np.any(still[0])
+    same = np.stack(still[1]) == constants.SAME
+    assert same[1:].any(axis=1).all(), "where nothing is to be found"
+    assert (same[1:-1] != same[2:]).any(), "outlines come and go"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +12,16 @@ from tests.fit.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, poly
 from tests.fit.test_drawing import assert_clean, psnr
 from tests.fit.test_merge import halves
 from warpsplat.fit import tidy
+from warpsplat.fit.cells import by_cell, cells_around, cells_at, columns_and_rows, joined, sum_within
 from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.drawing import Refinement, start
+from warpsplat.fit.drawing_costs import Costs, RoundsWatch
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
-from warpsplat.fit.tidy import Judge, apart, by_cell, finish_drawing, rounds_for, tidied, within
-from warpsplat.rendering.backend import Backend
+from warpsplat.fit.tidy import Judge, apart, finish_drawing, rounds_for, tidied
+from warpsplat.fit.work import Meter
+from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.renderer import Capacity, Renderer, render
+from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
@@ -114,7 +119,8 @@ def test_chosen_candidates_have_no_cell_in_common() -> None:
     edits = Outlines(split(logo())).edits()
     chosen = apart(edits)
     assert 1 < len(chosen) < len(edits)
-    assert sum(len(edit.cells) for edit in chosen) == len(frozenset().union(*(e.cells for e in chosen)))
+    assert sum(len(edit.cells) for edit in chosen) == len(joined([edit.cells for edit in chosen]))
+    assert all(np.intersect1d(edit.cells, joined([e.cells for e in chosen])).size for edit in edits)
 
 
 def test_what_was_refused_is_not_measured_again() -> None:
@@ -127,16 +133,28 @@ def test_what_was_refused_is_not_measured_again() -> None:
     assert not again._cells, "what it would change"
 
 
+def test_cells_around_cubics() -> None:
+    """Those of its points and their neighbours, each by itself; also beyond the border."""
+    level = np.array([(1, 1), (3, 1), (5, 1), (7, 1)], float)
+    dot = np.full((4, 2), -0.5)
+    first, second = cells_around(np.stack([level, dot]))
+    columns, rows = columns_and_rows(first)
+    assert sorted(zip(columns.tolist(), rows.tolist(), strict=True)) == [
+        (x, y) for x in range(-1, 5) for y in range(-1, 2)
+    ]
+    assert second.tolist() == cells_at(np.array([(x, y) for x in (-2, -1, 0) for y in (-2, -1, 0)])).tolist()
+
+
 def test_errors_within_an_edit() -> None:
     """Those of its cells, whole or cut by the border, none beyond."""
     errors = np.random.default_rng(0).random((7, 9))
-    (edit, *_) = Outlines(split(logo())).edits()
+    sums = by_cell(to_tiles(errors[..., None].astype(np.float32))[:, 0], Viewport(9, 7))
     for cells, want in (
         ([(0, 0), (4, 3)], errors[:2, :2].sum() + errors[6, 8]),
         ([(-1, 0), (-2, -2), (5, 1), (1, 4), (9, 9)], 0),
         ([(2, 1)], errors[2:4, 4:6].sum()),
     ):
-        assert within(by_cell(errors), replace(edit, cells=frozenset(cells))) == pytest.approx(want)
+        assert sum_within(sums, cells_at(np.array(cells))) == pytest.approx(want)
 
 
 def test_a_drawing_like_the_last_one_needs_no_second_renderer(
@@ -163,19 +181,21 @@ def test_a_drawing_like_the_last_one_needs_no_second_renderer(
 def test_large_pictures_have_fewer_rounds(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert [rounds_for(side * side) for side in (64, 1250, 2048, 10_000)] == [16, 16, 6, 4]
     backend, made = Backend.on(device, 1), split(logo())
-    asked: list[float] = []
+    asked: list[int] = []
     target = render(logo().scene, backend=backend)
+    watch = RoundsWatch(Meter(None), Costs(target, made, backend), Refinement(), 0.0, 0.0)
 
-    def told(later: float) -> None:
-        asked.append(later)
+    def found(candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> None:
+        asked.append(most)
 
+    monkeypatch.setattr(watch, "found", found)
     for pixels in (64 * 64 * 5, 1):
         asked.clear()
         monkeypatch.setattr(tidy, "ROUND_PIXELS", pixels)
         monkeypatch.setattr(tidy, "ROUNDS", 2)
         monkeypatch.setattr(tidy, "FEWEST_ROUNDS", 1)
-        tidied(target, made, backend, told)
-        assert len(asked) == (2 if pixels > 1 else 1)
+        tidied(target, made, backend, watch)
+        assert asked == ([2, 1] if pixels > 1 else [1])
 
 
 def test_turned_outlines_are_the_same() -> None:

@@ -14,7 +14,8 @@ from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.jobs.vectorize import Result, vectorize
+from warpsplat.jobs.result import Result
+from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

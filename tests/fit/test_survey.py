@@ -2,52 +2,67 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
+from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.survey import expected_gain, lost_detail, survey, worth_by
+from warpsplat.fit.survey import BEND, GAIN, STEEPEST, expected, expected_gain, lost_detail, survey
 from warpsplat.rendering.backend import Backend
 
 
-def test_a_parabola_and_a_power_are_found_again() -> None:
-    shapes = [20, 40, 100, 300, 900]
-    x = np.log2(shapes)
-    worth = worth_by(shapes, (10 + 3 * x - 0.1 * x * x).tolist(), [100 * n for n in shapes], 1024)
-    assert worth.misfit == pytest.approx(0, abs=1e-6)
-    assert float(worth.psnr(64)) == pytest.approx(10 + 18 - 3.6)
-    assert float(worth.size(50)) == pytest.approx(0.92 * 5000)
+def test_it_goes_through_what_was_measured() -> None:
+    """With the gain of a longer run, and what doublings gain in those."""
+    worth = expected(1024, (256, 30.0), (64, 25.0), 0.4, 30_000)
+    there = float(worth.psnr(256))
+    assert there == pytest.approx(30.4)
+    assert there - float(worth.psnr(64)) == pytest.approx(2 * 0.79 * 2.5)
+    gains = [float(worth.psnr(2 * n) - worth.psnr(n)) for n in (16, 32, 64, 128, 256, 512)]
+    assert np.diff(gains) == pytest.approx(2 * BEND)
+    assert float(worth.size(512)) == pytest.approx(2 * 0.93 * 30_000)
+
+
+@pytest.mark.parametrize("few", [10.0, 29.9, 31.0])
+def test_more_shapes_are_never_worse(few: float) -> None:
+    worth = expected(1024, (256, 30.0), (64, few), 0.0, 30_000)
+    decibels = worth.psnr(np.geomspace(16, 1024, 50))
+    assert (np.diff(decibels) >= -1e-9).all()
+    assert float(decibels[-1] - decibels[0]) < 6 * STEEPEST + 16 * BEND
 
 
 def test_one_measurement_is_a_level() -> None:
-    worth = worth_by([16], [25.0], [2000], 16)
+    worth = expected(16, (16, 25.0), (16, 24.0), 0.0, 2000)
     assert float(worth.psnr(16)) == pytest.approx(25)
-    assert float(worth.size(16)) == pytest.approx(0.92 * 2000)
+    assert float(worth.psnr(8)) == float(worth.psnr(16))
 
 
-@pytest.mark.parametrize("psnr", [22.0, 28.0])
-def test_it_goes_through_what_was_probed(psnr: float) -> None:
-    """With less quality than the reduced image promised, details stay lost; with more, errors are smaller."""
-    plain = worth_by([20, 100, 1000], [20.0, 25, 30], [2000, 10_000, 100_000], 1024)
-    worth = plain.through(100, psnr, 0.0)
-    assert float(worth.psnr(100)) == pytest.approx(psnr)
-    gain, before = (float(one.psnr(1000) - one.psnr(100)) for one in (worth, plain))
-    assert gain == pytest.approx(before) if psnr > 25 else gain < before
-    assert float(plain.through(100, psnr, 1e-3).psnr(100)) < psnr
+def test_a_picture_without_error_has_a_ceiling() -> None:
+    worth = expected(32, (32, float("inf")), (16, float("inf")), 0.4, 2000)
+    assert 99 < float(worth.psnr(32)) <= 101
 
 
-def test_what_is_hard_to_draw_gains_less() -> None:
-    assert expected_gain(25.0, 0.0) == pytest.approx(1)
-    assert expected_gain(29.3, 0.0) == pytest.approx(2)
-    assert expected_gain(29.3, 4.0) == pytest.approx(1)
-    assert expected_gain(60.0, -1.0) == 5
+def test_what_is_hard_to_draw_gains_little() -> None:
+    plan = [Phase(100, 100)]
+    assert expected_gain(20.0, plan) == 0
+    assert 0 < expected_gain(25.0, plan) < expected_gain(30.0, plan) == expected_gain(40.0, plan) == GAIN
+
+
+def test_what_is_much_larger_than_most_steps_see_gains_little() -> None:
+    gains = [expected_gain(30.0, [Phase(100, 100), Phase(side, 100)]) for side in (400, 800, 1600, 9000)]
+    assert gains == pytest.approx([GAIN, GAIN / 2, 0, 0])
 
 
 def test_detail_that_the_finest_size_lacks() -> None:
     image = np.random.default_rng(0).random((32, 32, 3), dtype=np.float32)
     assert lost_detail(image, make_settings()) == 0
-    assert lost_detail(image, make_settings(fine_pixels=256, coarse_pixels=256)) > 0.03
+    lost = lost_detail(image, make_settings(fine_pixels=256, coarse_pixels=256))
+    assert lost > 0.03
+    worth = expected(1024, (256, 40.0), (64, 35.0), 0.0, 30_000)
+    assert float(worth.psnr(256)) == pytest.approx(40)
+    assert float(replace(worth, detail=lost).psnr(256)) < -10 * np.log10(lost)
 
 
 def test_survey(monkeypatch: pytest.MonkeyPatch) -> None:

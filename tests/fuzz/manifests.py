@@ -10,7 +10,7 @@ from tests.fuzz import mutate
 from tests.fuzz.corpus import Seed
 from warpsplat.fit.settings import make_settings
 from warpsplat.jobs.batch.manifest import Entry
-from warpsplat.jobs.vectorize import job_key
+from warpsplat.jobs.keys import job_key
 
 NAME = "case.jsonl"
 FIGURES = {"psnr": 20.5, "bytes": 700, "seconds": 1.5, "paths": 4, "missed": [], "levels": []}

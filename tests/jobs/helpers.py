@@ -6,11 +6,19 @@ import json
 from pathlib import Path
 from typing import Any
 
+from warpsplat.jobs.batch.layers import Layer
+from warpsplat.jobs.batch.plan import Job, plan_jobs
+
 
 def write(folder: Path, text: str) -> Path:
     path = folder / "jobs.yaml"
     path.write_text(text)
     return path
+
+
+def load_jobs(path: Path, command: Layer | None = None) -> list[Job]:
+    """Of a batch file."""
+    return plan_jobs([str(path)], command)
 
 
 def answers(out: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:

@@ -13,7 +13,9 @@ from warpsplat.errors import UsageError
 from warpsplat.files.image import load_image
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.vectorize import Result, load_target, vectorize_image
+from warpsplat.jobs.prepare import load_target
+from warpsplat.jobs.result import Result
+from warpsplat.jobs.vectorize import vectorize_image
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import signal
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import run
-from tests.jobs.helpers import answers, write
+from tests.cli.helpers import one_line, run
+from tests.jobs.helpers import answers, load_jobs, write
+from warpsplat.cli.batch_show import Show
 from warpsplat.jobs.batch.manifest import NAME, Manifest, entry_of
-from warpsplat.jobs.batch.plan import load_jobs
 from warpsplat.jobs.batch.run import Batch, Report
 from warpsplat.jobs.executors.serial import Serial
 from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, Stop, Task
@@ -50,6 +52,36 @@ def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixt
     assert run("batch", path, "-q") == 0
     assert capsys.readouterr() == ("", "")
     assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_interrupted_run_says_what_is_left(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, as_json: bool
+) -> None:
+    for i in range(5):
+        shutil.copy(folder / "in" / "a.png", folder / "in" / f"more{i}.png")
+    usual = Show.hear
+
+    def hear(show: Show, report: Report) -> None:
+        usual(show, report)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Show, "hear", hear)
+    settings = ("--curves", 4, "--iterations", 6, "--device", "cpu", "--workers", 1)
+    arguments = ("batch", folder / "in", "-o", folder / "out", *settings, *(["--json"] if as_json else []))
+    assert run(*arguments) == 130
+    captured = capsys.readouterr()
+    assert one_line(captured.err) == "warpsplat: interrupted; the same command goes on with the rest"
+    if as_json:
+        (image,), values = answers(captured.out)
+        assert image["status"] == "made"
+        assert (values["images"], values["made"], values["not_started"]) == (9, 1, 8)
+    else:
+        assert "\n9 images: 1 made, 0 skipped, 0 failed, 8 not started (" in captured.out
+    monkeypatch.undo()
+    assert run(*arguments) == 5
+    out, err = capsys.readouterr()
+    assert "not started" not in out and "not_started" not in out and "goes on" not in err
 
 
 def test_a_stopped_result_is_made_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

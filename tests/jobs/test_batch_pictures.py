@@ -9,11 +9,11 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import run
-from tests.jobs.helpers import answers, write
+from tests.jobs.helpers import answers, load_jobs, write
 from warpsplat.files.marks import mark_pdf, mark_png, picture_key
 from warpsplat.files.output import may_replace
 from warpsplat.jobs.batch.manifest import NAME, Manifest, entry_of
-from warpsplat.jobs.batch.plan import load_jobs, plan_jobs
+from warpsplat.jobs.batch.plan import plan_jobs
 from warpsplat.jobs.batch.run import Batch, Report
 from warpsplat.jobs.executors.serial import Serial
 from warpsplat.jobs.executors.tasks import Stop

@@ -18,8 +18,9 @@ from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.compare import OURS, compare, warm_up
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.tracer import VTRACER_SETTINGS, Options, vtracer
-from warpsplat.jobs.vectorize import Result, vectorize
+from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from tests.cli.helpers import run
-from tests.jobs.helpers import write
+from tests.jobs.helpers import load_jobs, write
 from warpsplat.cli.batch import flags_of
 from warpsplat.errors import UsageError
 from warpsplat.jobs.batch.layers import assigned, command_layer
-from warpsplat.jobs.batch.plan import Job, home_of, in_shard, load_jobs, plan_jobs
+from warpsplat.jobs.batch.plan import Job, home_of, in_shard, plan_jobs
 from warpsplat.scene import Kind
 
 

@@ -208,7 +208,7 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.Mo
         sizes.append(found.shape)
         return found
 
-    monkeypatch.setattr("warpsplat.jobs.vectorize.load_importance", noted)
+    monkeypatch.setattr("warpsplat.jobs.prepare.load_importance", noted)
     made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most - 1, name="big.png")
     assert sizes == [(25, 33)]
     assert "worked on at 33x25" in made.reduced
@@ -234,7 +234,7 @@ def test_refining_against_what_takes_too_much_is_refused(
     arguments = ("refine", svg, image, "-o", output, "--iterations", 1, "--device", "cpu")
     limit = memory.PROGRAM + memory.REFINED * WIDTH * HEIGHT
     assert run(*arguments, "--max-memory", limit) == 0
-    monkeypatch.setattr("warpsplat.api.load_target", None)
+    monkeypatch.setattr("warpsplat.api.refine.load_target", None)
     capsys.readouterr()
     assert run(*arguments, "--max-memory", limit - 1) == ExitCode.RESOURCES
     error = one_line(capsys.readouterr().err)

@@ -11,16 +11,15 @@ import pytest
 
 import warpsplat.configs
 from tests.cli.helpers import run
-from tests.jobs.helpers import write
+from tests.jobs.helpers import load_jobs, write
 from tests.scenes import random_scene
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.batch.file import MAX_FILE
 from warpsplat.jobs.batch.layers import KEYS
-from warpsplat.jobs.batch.plan import load_jobs
 from warpsplat.jobs.batch.run import marked
+from warpsplat.jobs.keys import job_key
 from warpsplat.jobs.research import UNSET
-from warpsplat.jobs.vectorize import job_key
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import write_svg
 

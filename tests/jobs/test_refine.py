@@ -11,7 +11,7 @@ from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.refine import refine
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

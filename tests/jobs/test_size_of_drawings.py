@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.subjects import decided
+from warpsplat.fit.work import Progress
+from warpsplat.jobs.subjects import FEWER_ROUNDS, Tries, decided
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
+from warpsplat.trace.trace import trace
 
 COLORS = ("e00", "0a0", "00e", "ea0", "0ae", "a0e", "555", "000")
 
@@ -46,3 +48,26 @@ def test_a_size_leaves_drawings_what_they_are() -> None:
     assert settings.subject == "drawing" and why
     settings, why = decided(image, make_settings(target_psnr=30.0))
     assert settings.subject == "photo" and "target-psnr" in why
+
+
+def test_tries_of_a_size_are_one_progress() -> None:
+    """Each is expected to go on from where the one before it ended, not to begin anew."""
+    traced, told = trace(squares()).scene, list[Progress]()
+
+    def half_way(tries: Tries, shapes: int) -> float:
+        report = tries.begun(traced.take(np.arange(shapes)))
+        assert report
+        report(Progress(1, 2, 20.0, 0.0, 0.5, fine=True))
+        return told[-1].work
+
+    assert half_way(Tries(told.append, 10**6), 8) == pytest.approx(0.5), "it fits"
+    tries = Tries(told.append, 100)
+    first = half_way(tries, 8)
+    assert 0 < tries.left < FEWER_ROUNDS, "with 8 regions there is not much to choose"
+    assert 0 < first < 0.25
+    tries.left = 1.0
+    second = half_way(tries, 4)
+    assert second > first
+    tries.left = 0.0
+    assert half_way(tries, 4) > second
+    assert Tries(None, 100).begun(traced) is None

@@ -17,7 +17,8 @@ from warpsplat.cli.summary import summary
 from warpsplat.files.image import load_image
 from warpsplat.fit.settings import Density, Renderer, make_settings
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.vectorize import has_time_for_eyes, render_figures, vectorize
+from warpsplat.jobs.figures import has_time_for_eyes, render_figures
+from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import compare, renderer_for
-from tests.scenes import disc, mixed_scene, random_scene, with_gradients, with_two_stops
+from tests.scenes import disc, mixed_scene, random_scene, with_gradients, with_stops, with_two_stops
 from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Canvas, Kind, Paint, Scene, Spread
 
@@ -43,6 +43,15 @@ def test_spread(device: str, paint: Paint, spread: Spread) -> None:
 def test_ramps(device: str, lanes: int, clear: bool) -> None:
     """Two ascending stops, padded, from a circle's centre: the way for these is a shorter one."""
     scene = with_two_stops(random_scene(Kind.FILL, 6, seed=10), seed=11)
+    compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("clear", [False, True])
+@pytest.mark.parametrize("offsets", [(0.15, 0.3, 0.42, 0.5, 0.95), (0.15, 0.4, 0.4, 0.6, 0.6)])
+def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[float, ...]) -> None:
+    """Of which columns reach one interval, several, or lie beyond either end; two in one place."""
+    scene = with_stops(random_scene(Kind.FILL, 6, seed=12), offsets, seed=13)
     compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
 
 

@@ -9,7 +9,7 @@ from tests import ROOT
 
 MODULES = (
     "warpsplat",
-    "warpsplat.api",
+    *(f"warpsplat.api.{name}" for name in ("vectorize", "several", "suggest", "refine", "render", "report")),
     "warpsplat.cli.main",
     "warpsplat.jobs.bench",
     "warpsplat.jobs.vectorize",

@@ -117,7 +117,7 @@ def test_no_hairlines_at_a_zoom_that_ends_cells_within_pixels() -> None:
     known = np.round(image[..., :3].reshape(-1, 3) * 255).astype(np.uint8)
     assert (shown[..., 3] == 255).all()
     assert set(map(tuple, shown[..., :3].reshape(-1, 3))) <= set(map(tuple, known))
-    assert len(load_scene(text, 12, 12, "a.svg")[0]) == len(scene), "and the file can be read again"
+    assert len(load_scene(text, 12, 12, "cells.svg")[0]) == len(scene), "and the file can be read again"
 
 
 def test_one_colour_on_a_ground_abuts_nothing() -> None:

@@ -196,11 +196,6 @@ GZIP = b"\x1f\x8b"
 """How gzipped files begin."""
 
 
-def write_svg_text(path: Path, text: str) -> None:
-    """Write an SVG, gzipped where the name of ``path`` says so, see ``write_result``."""
-    write_result(path, svg_bytes(path, text))
-
-
 def svg_bytes(path: Path, text: str) -> bytes:
     """What an SVG's file holds, gzipped where the name of ``path`` says so."""
     data = text.encode()

@@ -56,6 +56,15 @@ def source_bytes(source: str | os.PathLike[str] | bytes | Readable, what: str = 
     return data
 
 
+def held(source: ImageSource) -> ImageSource:
+    """``source`` as it can be read twice: the bytes of a file; pixels, and what is no image, as they are.
+
+    Raises:
+        ImageError: as ``source_bytes``.
+    """
+    return source_bytes(source) if isinstance(source, (str, os.PathLike, bytes, Readable)) else source
+
+
 def source_name(source: object, default: str = "the image") -> str:
     """How messages call a source."""
     if isinstance(source, (str, os.PathLike)):

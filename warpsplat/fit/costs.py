@@ -44,10 +44,6 @@ FILLS = Law(0.34, 0.66, 0.235, 0.49, 0.656)
 STROKES = Law(20.0, 0.64, 0.033, 0.69)
 SPLATS = Law(38.0, 0.59, 0.052, 0.85)
 SOFT = Law(14.0, 1.1, 0.075, 1.0)
-LINES = Law(1.1, 0.66, 0.013, 0.33)
-"""Strokes of line art, which are thin."""
-DRAWINGS = Law(1.3, 1.0, 0.06, 0.1)
-"""Outlines of a drawing: few and long."""
 
 TURN, TURN_PIXELS, TURN_SHAPE = 8.0, 15.0, 0.115
 """Of surgery: of each turn, of ``PIXELS``, of a shape."""
@@ -58,7 +54,7 @@ TURN_PAINTED = 2.5
 FILE, FILE_PIXELS, FILE_SHAPE = 8.0, 25.0, 0.38
 """Of making and measuring a file, or of a look at it: of each, of ``PIXELS``, of a shape."""
 
-EYES, EYES_PIXELS = 250.0, 190.0
+EYES, EYES_PIXELS, EYES_SHAPE = 200.0, 150.0, 0.5
 """Of making a file and measuring it with SSIMULACRA2 as well."""
 
 GRID, GRID_SHAPE, GRID_SHAPE_THRIFTY = 30.0, 0.22, 0.95
@@ -117,23 +113,38 @@ class Course:
         total = sum(
             self._stretch(phase, max(first, self.begin), min(last, until)) for phase, first, last in stretches
         )
+        total += self._turns(change, until)
         return total + (self._file(change, until) if self.finish else 0.0)
 
     def _stretch(self, phase: Phase, first: float, last: float) -> float:
         """Of steps and turns at one size."""
         size = phase.width * phase.height / PIXELS
-        law, density = law_of(self.settings), self.settings.density
-        interval, stop = density.interval, density.stop * self.settings.iterations
-        below, length = (self.ends[-1] if self.ends else 0), max(last - first, 0.0) / PARTS
+        law, length = law_of(self.settings), max(last - first, 0.0) / PARTS
         total = 0.0
         for part in range(PARTS if length else 0):
-            middle = int(first + (part + 0.5) * length)
-            shapes = below + shapes_at(self.settings, middle - middle % interval if interval else middle)
+            shapes = self._shapes(int(first + (part + 0.5) * length))
             total += length * sum(law.cost(size, count) for count in (shapes, *self.ends))
-            if interval > 0 and middle < stop:
-                factor = 1.0 if self.settings.paint == "flat" else TURN_PAINTED
-                total += length / interval * self.serial * factor * turn_cost(size, shapes)
         return total
+
+    def _shapes(self, step: int) -> int:
+        """How many there are after ``step`` steps, those of earlier levels included."""
+        below, interval = (self.ends[-1] if self.ends else 0), self.settings.density.interval
+        return below + shapes_at(self.settings, step - step % interval if interval else step)
+
+    def _turns(self, change: float, until: float) -> float:
+        """Of surgery before the step ``until``, at the size that it is done at: that before ``change`` or
+        after. Each turn takes as long as several steps, and is over at once.
+        """
+        density = self.settings.density
+        if not density.interval:
+            return 0.0
+        first = density.interval * (self.begin // density.interval + 1)
+        last = min(until, density.stop * self.settings.iterations)
+        total = 0.0
+        for step in range(first, math.ceil(last), density.interval):
+            phase = self.plan[0] if step <= change else self.plan[-1]
+            total += turn_cost(phase.width * phase.height / PIXELS, self._shapes(step))
+        return self.serial * total * (1.0 if self.settings.paint == "flat" else TURN_PAINTED)
 
     def _file(self, fine: float, until: float) -> float:
         """Of looks at the file from the step ``fine`` on, and of choosing its grid."""
@@ -169,5 +180,5 @@ def file_cost(pixels: int, shapes: float) -> float:
 def score_cost(pixels: int, shapes: float, backend: Backend, *, eyes: bool) -> float:
     """What comes after a run: making its file and measuring it."""
     if eyes and importlib.util.find_spec("ssimulacra2"):
-        return serial(backend) * (EYES + EYES_PIXELS * pixels / PIXELS)
+        return serial(backend) * (EYES + EYES_PIXELS * pixels / PIXELS + EYES_SHAPE * shapes)
     return serial(backend) * file_cost(pixels, shapes)

@@ -154,6 +154,7 @@ def start(
     state.parameters.hold("stop_opacities", np.ones(len(drawing.scene.stop_opacities), np.bool_))
     if how.colors == "held":
         state.parameters.hold("colors", every)
+        state.parameters.keeps_colors = True
     height, width = target.shape[:2]
     goal = Target(target, Phase(width, height, slack=1.0))
     return Step(state, how.settings(drawing.scene), goal, capacity=capacity)
@@ -162,7 +163,7 @@ def start(
 def _look(step: Step) -> tuple[Scene, float]:
     """The scene and its mean squared error."""
     step.render()
-    return step.state.scene(), step.square_error()
+    return step.state.scene(), step.measured_error()
 
 
 NEAR = 6 / 255

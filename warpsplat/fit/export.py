@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 from PIL import Image
 
 from warpsplat.fit.as_paths import as_paths
@@ -16,15 +19,26 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
     """The file that ``settings`` ask for, with ``per_pixel`` units of its view box a pixel."""
     if settings.renderer == "gaussian":
         scene = as_paths(scene, settings.softness)
-    plateau = constants.PLATEAU if settings.renderer == "splat" else 1.0
     return write_svg(
         scene,
         per_pixel=per_pixel,
         metadata=metadata,
-        opacity_scale=plateau,
+        opacity_scale=_opacity_scale(settings),
         title=settings.title,
         ids=settings.ids,
     )
+
+
+def shown_paths(scene: Scene, settings: Settings) -> Scene:
+    """The paths of the file of ``scene``, with the opacities that they have there; nothing is rounded."""
+    if settings.renderer == "gaussian":
+        return as_paths(scene, settings.softness)
+    return replace(scene, opacities=scene.opacities * np.float32(_opacity_scale(settings)))
+
+
+def _opacity_scale(settings: Settings) -> float:
+    """Opacity of a path over that of its shape."""
+    return constants.PLATEAU if settings.renderer == "splat" else 1.0
 
 
 def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:

@@ -67,8 +67,11 @@ TRIES = 3
 MAIN_TIME = 0.7
 """Share of a time budget that is left after the pilots; the rest is for the rounds."""
 
-LAST_ROUNDS = {"target_psnr": 1.5, "max_bytes": 0.5}
-"""How many follow in the mean once the file should be right."""
+ENDING = 0.17
+"""Share of rounds on the way to a PSNR after which there is no other, whatever was missing before."""
+
+LAST_ROUNDS = {"grow": 0.75, "shrink": 0.5}
+"""How many follow in the mean once a file should have its size: one that grew is often too large."""
 
 
 def pursue(
@@ -107,7 +110,7 @@ def pursue(
         change = _next(tried, settings)
         if change is None or pursuit.over():
             break
-        shapes, later = len(change.base.fit.scene), min(rounds_left(tried, settings), ROUNDS - turn) - 1
+        shapes, later = len(change.base.fit.scene), rounds_left(tried, settings, ROUNDS - turn) - 1
         cost = pursuit.round_cost(shapes, per_pixel=change.per_pixel)
         rest = max(later, 0.0) * pursuit.round_cost(shapes, per_pixel=change.base.fit.per_pixel)
         result = pursuit.changed(change, pursuit.meter.stage(cost, rest))
@@ -123,22 +126,20 @@ def pursue(
     return replace(best.fit, iterations=done, interrupted=interrupted)
 
 
-def rounds_left(tried: list[Made], settings: Settings) -> float:
-    """How many rounds there will be in the mean, by what has been ``tried``: for progress.
+def rounds_left(tried: list[Made], settings: Settings, most: int) -> float:
+    """How many rounds there will be in the mean, ``most`` at the most and the next one included, by what has
+    been ``tried``: for progress.
 
-    While a PSNR is missed, most take all that they may; then each leaves about half of the surplus. On the
-    way to a size, that follows the number of shapes, as far as that may change in a round.
+    On the way to a PSNR each may be the last. On that to a size, they go by the number of shapes, as far as
+    it may change in a round.
     """
     best = min(tried, key=lambda made: _rank(made, settings))
     if settings.target_psnr and _fits(best, settings):
-        surplus = best.psnr - settings.target_psnr
-        if surplus < 0:
-            return ROUNDS
-        return math.log2(max(surplus / ENOUGH_DB, 1.0)) + LAST_ROUNDS["target_psnr"]
+        return (1 - (1 - ENDING) ** most) / ENDING
     assert settings.max_bytes
     growth = math.log(AIM_FULL * settings.max_bytes / best.size)
-    step = math.log(GROW_MOST) if growth > 0 else math.log(CUT_MOST)
-    return max(growth / step, 1.0) + LAST_ROUNDS["max_bytes"]
+    way, step = ("grow", GROW_MOST) if growth > 0 else ("shrink", CUT_MOST)
+    return min(max(growth / math.log(step), 1.0) + LAST_ROUNDS[way], most)
 
 
 def _first(pursuit: Pursuit) -> tuple[int, Fit]:

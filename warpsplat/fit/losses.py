@@ -27,7 +27,7 @@ class LossBuffers:
     """Sums that the losses leave, by tile and channel."""
 
     loss: wp.array = buffer(wp.float32, "tiles", 3)
-    """Squared errors, each of the same weight."""
+    """Squared errors, each of the same weight; below 0 where they are not known yet."""
     similarity: wp.array = buffer(wp.float32, "tiles", 3)
     """SSIM x weight."""
 
@@ -57,11 +57,13 @@ class Aim:
         self.moved = False
         """Whether it is at another target than at first."""
         self.buffers = backend.allocate(LossBuffers, {"tiles": viewport.tile_count})
+        self.buffers.loss.fill_(-1.0)
         self.value_count = 3 * viewport.pixel_count
 
     def at(self, target: FloatArray) -> None:
         """Another target from now on."""
         self.target.assign(to_tiles(target))
+        self.buffers.loss.fill_(-1.0)
         self.moved = True
 
     def mean_square(self) -> float:
@@ -96,6 +98,7 @@ def record_error(program: Program, inputs: LossInputs) -> None:
         inputs.aim,
         inputs.aim.buffers,
         viewport,
+        tile_still=inputs.renderer.bins.buffers.tile_still,
         clock=inputs.clock,
         similarity_weight=inputs.settings.ssim,
         split=True,
@@ -112,6 +115,7 @@ def record_alpha(program: Program, inputs: LossInputs) -> None:
         inputs.renderer.film.buffers,
         inputs.aim,
         inputs.aim.buffers,
+        tile_still=inputs.renderer.bins.buffers.tile_still,
         split=True,
     )
 

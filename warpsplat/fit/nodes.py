@@ -6,7 +6,6 @@ What it costs is for the renderer to say (``fit.tidy``).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.fit.cells import Cells, cells_around, joined
 from warpsplat.fit.constraints import EQUAL, Drawing, Joint
 from warpsplat.fit.merge import handles_through, points_at
 
@@ -25,12 +25,6 @@ MOST_OFF = 0.6
 
 STEEP = 0.06
 """Slope below which a line may be level, or upright, and a tangent likewise."""
-
-CELL = 2
-"""Side of the squares by which is told what a candidate changes [canvas units]."""
-
-NEAR = (-1, 0, 1)
-"""Steps from a cell to those that an outline in it may change as well."""
 
 AT_ONCE = 512
 """Candidates that are measured in one go: bounds their memory to some megabytes."""
@@ -54,8 +48,8 @@ class Edit:
     kind: str
     at: tuple[float, float]
     """Where it is [canvas units]."""
-    cells: frozenset[tuple[int, int]]
-    """What it may change: column and row of cells of ``CELL``."""
+    cells: Cells
+    """What it may change."""
     off: float
     """How far it moves the outline, about [canvas units]."""
     saved: int
@@ -108,7 +102,8 @@ class Outlines:
         self.is_line = dict(zip(self.on, drawing.lines().tolist(), strict=True))
         count = len(self.points)
         self.place = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(count)).tolist()
-        self._cells: dict[int, frozenset[tuple[int, int]]] = {}
+        self._cells: dict[int, Cells] = {}
+        """Around the cubic that begins at each point, once they are asked for."""
         self._members: dict[int, list[int]] = {}
         for i, place in enumerate(self.place):
             self._members.setdefault(place, []).append(i)
@@ -116,6 +111,7 @@ class Outlines:
         self._firsts = set(starts[:-1].tolist())
         sizes = np.repeat(np.diff(starts), np.diff(starts))
         self._sizes = sizes.tolist()
+        self._is_smooth: list[bool] = (drawing.joints == Joint.SMOOTH).tolist()
         self._refused: Set[Key] = frozenset()
 
     def members(self, point: int) -> list[int]:
@@ -126,25 +122,20 @@ class Outlines:
         """The cubic that begins at ``a``, shape (4, 2)."""
         return self.points[[a, a + 1, a + 2, self.next[a]]]
 
-    def cells(self, *starts: int) -> frozenset[tuple[int, int]]:
+    def cells(self, *starts: int) -> Cells:
         """Around the cubics that begin at ``starts``, and those that turn with them."""
         wide = set(starts)
         for a in starts:
-            if self.drawing.joints[a] == Joint.SMOOTH:
+            if self._is_smooth[a]:
                 wide.add(self.previous[a])
-            if self.drawing.joints[self.next[a]] == Joint.SMOOTH:
+            if self._is_smooth[self.next[a]]:
                 wide.add(self.next[a])
-        return frozenset().union(*(self._cells_of(a) for a in wide))
-
-    def _cells_of(self, a: int) -> frozenset[tuple[int, int]]:
-        """Around the cubic that begins at ``a``."""
-        if a not in self._cells:
-            corners = self.corners(a)
-            reach = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
-            t = np.linspace(0, 1, 2 + math.ceil(1.5 * reach / CELL))[:, None]
-            places = set(map(tuple, np.floor(points_at(corners, t) / CELL).astype(np.intp).tolist()))
-            self._cells[a] = frozenset((x + i, y + j) for x, y in places for i in NEAR for j in NEAR)
-        return self._cells[a]
+        if not self._cells:
+            on = np.array(self.on)
+            following = [self.next[a] for a in self.on]
+            cubics = self.points[np.stack([on, on + 1, on + 2, following], axis=1)]
+            self._cells = dict(zip(self.on, cells_around(cubics), strict=True))
+        return joined([self._cells[a] for a in wide])
 
     def _at(self, p: int) -> tuple[float, float]:
         x, y = self.points[p].tolist()
@@ -155,6 +146,7 @@ class Outlines:
         self._refused = refused
         found: list[Edit] = []
         merged = self._merged()
+        leaning, sloping = self._leaning(), self._sloping()
         done: set[int] = set()
         for p in self.on:
             if self.place[p] in done:
@@ -162,13 +154,14 @@ class Outlines:
             done.add(self.place[p])
             if p in merged:
                 found.append(self._without(p, *merged[p]))
-            found += self._level_tangent(p)
+            if p in leaning:
+                found += self._level_tangent(p, *leaning[p])
         # Once for all shapes.
         firsts = [a for a in self.on if min(self.members(a + 1) + self.members(a + 2)) >= a]
         thirds = self._thirds([a for a in firsts if not self.is_line[a] and self._is_open("straight", a + 1)])
         for a in firsts:
-            if self.is_line[a]:
-                found += self._level_line(a)
+            if a in sloping:
+                found += self._level_line(a, *sloping[a])
             elif a in thirds:
                 found.append(self._straight(a, *thirds[a]))
         return found
@@ -251,15 +244,22 @@ class Outlines:
                 joints |= dict.fromkeys(self.members(end), Joint.CORNER)
         return Edit("straight", self._at(a + 1), self.cells(a), off, saved, points, joints)
 
-    def _level_line(self, a: int) -> Iterator[Edit]:
+    def _sloping(self) -> dict[int, tuple[int, float]]:
+        """The lines that are almost level or upright: the axis in which their ends differ little, and by how
+        much.
+        """
+        starts = np.array([a for a in self.on if self.is_line[a]], np.intp)
+        ways = np.abs(self.points[[self.next[a] for a in starts.tolist()]] - self.points[starts])
+        axes = ways.argmin(axis=1)
+        off, along = ways.min(axis=1), ways.max(axis=1)
+        near = (off >= EQUAL) & (off <= np.minimum(STEEP * along, MOST_OFF))
+        return _picked(near, starts, axes, off)
+
+    def _level_line(self, a: int, axis: int, off: float) -> Iterator[Edit]:
         """A line that is almost level or upright, so."""
         if not self._is_open("level", a + 1):
             return
         b = self.next[a]
-        way = np.abs(self.points[b] - self.points[a])
-        axis = int(way.argmin())
-        if way[axis] < EQUAL or way[axis] > min(STEEP * way[1 - axis], MOST_OFF):
-            return
         bound = [self._is_bound(end, axis) for end in (a, b)]
         if all(bound):
             return
@@ -272,7 +272,7 @@ class Outlines:
                 points[m][axis] = level
         cells = self.cells(a, self.previous[a], b)
         saved = NUMBER_BYTES * len(self.members(a))
-        yield Edit("level", self._at(a + 1), cells, float(way[axis]), saved, points)
+        yield Edit("level", self._at(a + 1), cells, off, saved, points)
 
     def _is_bound(self, p: int, axis: int) -> bool:
         """Whether a level or upright line, or the border, holds a coordinate of ``p``."""
@@ -285,19 +285,27 @@ class Outlines:
                     return True
         return False
 
-    def _level_tangent(self, p: int) -> Iterator[Edit]:
+    def _leaning(self) -> dict[int, tuple[int, float]]:
+        """The smooth joints whose tangents are almost level or upright: the axis in which their handles
+        differ little from them, and by how much.
+        """
+        smooth = [p for p in self.on if self._is_smooth[p] and not self.is_line[p]]
+        joints = np.array([p for p in smooth if not self.is_line[self.previous[p]]], np.intp)
+        before = np.array([self.previous[p] for p in joints.tolist()], np.intp)
+        ways = np.abs(self.points[np.stack([before + 2, joints + 1], axis=1)] - self.points[joints][:, None])
+        axes = ways.sum(axis=1).argmin(axis=1)
+        across = np.take_along_axis(ways, axes[:, None, None], axis=2)[..., 0]
+        along = np.take_along_axis(ways, 1 - axes[:, None, None], axis=2)[..., 0]
+        off = across.max(axis=1)
+        near = (off >= EQUAL) & (across <= STEEP * along).all(axis=1)
+        return _picked(near, joints, axes, off)
+
+    def _level_tangent(self, p: int, axis: int, off: float) -> Iterator[Edit]:
         """A smooth joint whose tangent is almost level or upright, so."""
-        a = self.previous[p]
-        if self.drawing.joints[p] != Joint.SMOOTH or self.is_line[a] or self.is_line[p]:
-            return
         if not self._is_open("tangent", p):
             return
+        a = self.previous[p]
         handles = (a + 2, p + 1)
-        ways = np.abs(self.points[list(handles)] - self.points[p])
-        axis = int(ways.sum(axis=0).argmin())
-        off = float(ways[:, axis].max())
-        if off < EQUAL or (ways[:, axis] > STEEP * ways[:, 1 - axis]).any():
-            return
         points = {}
         for handle in handles:
             for m in self.members(handle):
@@ -306,6 +314,17 @@ class Outlines:
         yield Edit(
             "tangent", self._at(p), self.cells(a, p), 0.4 * off, NUMBER_BYTES * len(self.members(p)), points
         )
+
+
+def _picked(
+    near: npt.NDArray[np.bool_],
+    points: npt.NDArray[np.intp],
+    axes: npt.NDArray[np.intp],
+    off: Floats,
+) -> dict[int, tuple[int, float]]:
+    """Axis and distance by point, of those that are near."""
+    kept = zip(points[near].tolist(), axes[near].tolist(), off[near].tolist(), strict=True)
+    return {point: (axis, distance) for point, axis, distance in kept}
 
 
 def thirds_between(ends: Floats) -> Floats:

@@ -23,6 +23,9 @@ BEGIN = 0.25, 0.375
 between, it begins where there would be as many shapes by now (docs/experiments.md).
 """
 
+MANY = 256
+"""Shapes to go on from with which a fit leaves out the most: what few ones have come to is worth less."""
+
 TURNS = 5
 """In which the number of shapes grows from where it goes on, at the least: many at a time find bad places.
 Runs of few steps have fewer, and begin anew.
@@ -44,10 +47,26 @@ class Series:
     """Fits of ascending numbers of shapes, one after the other."""
 
     def __init__(
-        self, settings: Settings, numbers: Sequence[int], width: int, height: int, backend: Backend
+        self,
+        settings: Settings,
+        numbers: Sequence[int],
+        width: int,
+        height: int,
+        backend: Backend,
+        *,
+        shares: bool = True,
     ) -> None:
-        """``settings``: of all; the image has ``width`` x ``height`` pixels."""
-        self._settings = settings
+        """A series that has not begun.
+
+        Args:
+            settings: of all.
+            numbers: of shapes.
+            width: of the image [px].
+            height: likewise.
+            backend: where to compute.
+            shares: whether fits go on from one another; else each begins anew.
+        """
+        self._settings, self._shares = settings, shares
         self._numbers = sorted(numbers)
         self._kept: tuple[Scene, Past] | None = None
         self._costs = {}
@@ -60,7 +79,7 @@ class Series:
 
     def _expected(self, at: int, number: int) -> int:
         """The step at which a fit, the first one being 0, will begin."""
-        if at == 0:
+        if at == 0 or not self._shares:
             return 0
         shapes = round(self._settings.density.surplus * self._numbers[at - 1])
         return begin_of(replace(self._settings, curves=number), shapes)
@@ -83,7 +102,7 @@ class Series:
         full = self._settings.density.thin * self._settings.iterations
         before = sum(self._costs[other] for other in self._numbers if other < number)
         share, whole = self._costs[number], sum(self._costs.values())
-        waits = number != self._numbers[-1]
+        waits = self._shares and number != self._numbers[-1]
 
         def told(now: Progress) -> None:
             nonlocal waits
@@ -103,7 +122,8 @@ def begin_of(settings: Settings, shapes: int) -> int:
         return 0
     growth = math.log(density.surplus / density.start)
     missing = math.log(density.surplus * settings.curves / shapes) / growth if growth > 0 else 0.0
-    share = min(max(density.grown * (1 - missing), BEGIN[0]), BEGIN[1])
+    least = BEGIN[1] if shapes >= MANY else BEGIN[0]
+    share = min(max(density.grown * (1 - missing), least), BEGIN[1])
     latest = max(density.grown * steps - TURNS * density.interval, 0)
     return round(min(share * steps, latest)) // density.interval * density.interval
 

@@ -188,6 +188,11 @@ class Step:
         errors = squares(difference, axis=1) * self.renderer.film.buffers.inside.numpy()
         return float(errors.sum(dtype="float64")) / self.aim.value_count
 
+    def measured_error(self) -> float:
+        """As ``square_error``, of the image only, summed up on the device: reads a number a tile back."""
+        self.programs[1].run()
+        return self.aim.mean_square()
+
     def lacking(self) -> FloatArray:
         """What the last render lacks of what it is compared with, by colour.
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares
+from warpsplat.fit.cells import by_cell, first_apart, sum_within
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
-from warpsplat.fit.costs import DRAWINGS, PIXELS, serial
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
-from warpsplat.fit.nodes import CELL, Edit, Key, Outlines, applied, turned
+from warpsplat.fit.drawing_costs import DONE, Costs, Ending, RoundsWatch
+from warpsplat.fit.nodes import Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
 from warpsplat.fit.work import Meter, Report
@@ -21,6 +22,7 @@ from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
@@ -29,18 +31,6 @@ ROUNDS, FEWEST_ROUNDS = 16, 4
 
 ROUND_PIXELS = 26_000_000
 """Pixels that all rounds together look at: of a large picture each takes long, and the first find most."""
-
-POINTS_A_ROUND = 110
-"""Of a traced drawing: how many rounds there will be, as progress is shown."""
-
-REFIT_STARTED = 8
-"""What fitting a drawing anew takes besides its steps, in steps."""
-
-GRID, GRID_PIXELS, GRID_POINT = 100.0, 60.0, 0.4
-"""What choosing the grid costs: of each drawing, of ``costs.PIXELS``, of a point."""
-
-ROUND_REFITS, ROUND_GRIDS = 1.5, 0.22
-"""What a round takes, in times that a drawing is fitted anew, and that its grid is chosen."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
 """After each round."""
@@ -111,16 +101,15 @@ def finish_drawing(
         return Finished(drawing, min(USUAL_GRID, finest))
     how, meter = how or Refinement(), Meter(report, after)
     second, costs = replace(REFIT, steps=2 * REFIT.steps), Costs(target, drawing, backend)
-    rounds, refit = costs.round(), costs.refit(REFIT)
-    last = costs.refit(second) + costs.grid() + refit
-    usual = min(len(drawing.joints) / POINTS_A_ROUND, rounds_for(target[..., 0].size))
-    drawing = refined(drawing, how, meter.stage(costs.refit(how), usual * rounds + last))
-
-    def told(later: float) -> Report | None:
-        return meter.stage(rounds, later * rounds + last)
-
-    drawing = tidied(target, drawing, backend, told, stop)
-    drawing = refined(drawing, second, meter.stage(costs.refit(second), costs.grid() + refit))
+    refit = costs.refit(REFIT)
+    last = DONE * costs.refit(second) + costs.grid() + refit
+    watch = RoundsWatch(meter, costs, after_round(target), WORTHWHILE, last)
+    found = Outlines(drawing).edits() if report else []
+    later = watch.ahead(found, apart(found), rounds_for(target[..., 0].size))
+    drawing = refined(drawing, how, meter.stage(costs.refit(how), later, likely=Ending()))
+    drawing = tidied(target, drawing, backend, watch, stop)
+    told_second = meter.stage(costs.refit(second), costs.grid() + refit, likely=Ending())
+    drawing = refined(drawing, second, told_second)
     meter.stage(costs.grid(), refit)  # of which nothing shows on the way
     grid = drawing_grid(target, drawing, backend, finest)
     on, _ = drawing.links()
@@ -133,55 +122,26 @@ def finish_drawing(
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
 
 
-@dataclass(frozen=True)
-class Costs:
-    """What parts of finishing a drawing cost (``fit.costs``)."""
-
-    target: FloatArray
-    drawing: Drawing
-    backend: Backend
-
-    @property
-    def _size(self) -> float:
-        return self.target[..., 0].size / PIXELS
-
-    def refit(self, how: Refinement) -> float:
-        """Of fitting it."""
-        return (how.steps + REFIT_STARTED) * DRAWINGS.cost(self._size, len(self.drawing.scene))
-
-    def grid(self) -> float:
-        """Of choosing its grid."""
-        cost = GRID + GRID_PIXELS * self._size + GRID_POINT * len(self.drawing.joints)
-        return serial(self.backend) * cost
-
-    def round(self) -> float:
-        """Of a round of ``tidied``."""
-        return ROUND_REFITS * self.refit(after_round(self.target)) + ROUND_GRIDS * self.grid()
-
-
 def tidied(
     target: FloatArray,
     drawing: Drawing,
     backend: Backend,
-    told: Callable[[float], Report | None] = lambda later: None,
+    watch: RoundsWatch | None = None,
     stop: Stop | None = None,
 ) -> Drawing:
     """A drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round candidates that do not meet are made together and fitted anew; each is judged by the pixels
-    around it, and where some cost too much, the others are made alone. ``told``: what a round reports to,
-    by how many may come after it.
+    around it, and where some cost too much, the others are made alone. ``watch``: of its progress.
     """
     refused: set[Key] = set()
     how = after_round(target)
     judge = Judge(target, backend)
     errors = judge.errors(drawing)
 
-    report: Report | None = None
-
     def refitted(edits: Sequence[Edit]) -> tuple[Drawing, Floats]:
         made = applied(drawing, edits)
-        fields = (made.scene, made.joints, made.same)
+        fields, report = (made.scene, made.joints, made.same), watch.refit() if watch else None
         scene = refine_drawing(
             target, *fields, backend, how, capacity=judge.capacity, report=report, stop=stop
         )
@@ -194,23 +154,27 @@ def tidied(
         edits = apart(candidates)
         if not edits or (stop and stop()):
             break
-        report = told(min(len(candidates) / len(edits), most - 1 - turn))
+        if watch:
+            watch.found(candidates, edits, most - turn)
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
         worth = worth_of(errors, size)
         growth = judge.errors(applied(drawing, edits)) - errors
-        left = [e for e in edits if within(growth, e) <= MENDED * e.saved * worth]
+        left = [e for e in edits if sum_within(growth, e.cells) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
         while left:
             made, after = refitted(left)
             growth = after - errors
-            taken = [e for e in left if within(growth, e) <= e.saved * worth]
+            taken = [e for e in left if sum_within(growth, e.cells) <= e.saved * worth]
             if len(taken) == len(left):
                 drawing, errors = made, after
                 break
             refused |= {e.key for e in left} - {e.key for e in taken}
             left = taken
         drawing = turned(drawing)
-        if sum(e.saved for e in left) < WORTHWHILE * size:
+        spared = sum(e.saved for e in left)
+        if watch:
+            watch.spared(spared / size)
+        if spared < WORTHWHILE * size:
             break
     return drawing
 
@@ -229,7 +193,9 @@ class Judge:
     """What drawings lack of one picture."""
 
     def __init__(self, target: FloatArray, backend: Backend) -> None:
-        self._target, self._backend = target, backend
+        self._backend = backend
+        self._viewport = Viewport(target.shape[1], target.shape[0])
+        self._target = to_tiles(target)
         self.capacity: Capacity | None = None
         """Of a renderer that the last drawing fits into; one that is much like it will as well, so that
         arrays and launches need not be made twice.
@@ -239,28 +205,12 @@ class Judge:
         """What each cell adds to the mean squared error, as ``by_cell``."""
         parameters = Parameters(drawing.scene, self._backend)
         Keeper(Constraints.of(drawing), parameters).project()
-        height, width = self._target.shape[:2]
-        renderer = Renderer(parameters, Viewport(width, height), model=EXACT, capacity=self.capacity)
+        renderer = Renderer(parameters, self._viewport, model=EXACT, capacity=self.capacity)
         renderer.forward_complete()
         self.capacity = renderer.capacity
-        return by_cell(squares(renderer.read_image() - self._target)) / (3 * height * width)
-
-
-def by_cell(pixels: npt.NDArray[np.floating[Any]]) -> Floats:
-    """Sums over the cells by which edits are told, with one more beyond each border that is empty.
-
-    Pixels of shape (height, width) make cells of shape (rows + 2, columns + 2).
-    """
-    height, width = pixels.shape
-    rows = np.add.reduceat(pixels, np.arange(0, height, CELL), axis=0, dtype=np.float64)
-    return np.pad(np.add.reduceat(rows, np.arange(0, width, CELL), axis=1), 1)
-
-
-def within(cells: Floats, edit: Edit) -> float:
-    """Sum over the cells that an edit may change; ``cells`` as of ``by_cell``."""
-    columns, rows = np.array([*edit.cells]).T + 1
-    height, width = cells.shape
-    return float(cells[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].sum())
+        film = renderer.film.buffers
+        lacking = squares(film.image.numpy() - self._target, axis=1) * film.inside.numpy()
+        return by_cell(lacking, self._viewport) / (3 * self._viewport.pixel_count)
 
 
 def worth_of(errors: Floats, size: int) -> float:
@@ -270,13 +220,8 @@ def worth_of(errors: Floats, size: int) -> float:
 
 def apart(edits: Sequence[Edit]) -> list[Edit]:
     """Those that cost least for what they spare, no two of them with pixels in common."""
-    chosen: list[Edit] = []
-    changed: set[tuple[int, int]] = set()
-    for edit in sorted(edits, key=lambda e: (e.off / e.saved, e.key)):
-        if not changed & edit.cells:
-            chosen.append(edit)
-            changed |= edit.cells
-    return chosen
+    ranked = sorted(edits, key=lambda e: (e.off / e.saved, e.key))
+    return [ranked[i] for i in first_apart(edit.cells for edit in ranked)]
 
 
 def drawing_grid(target: FloatArray, drawing: Drawing, backend: Backend, finest: float) -> float:

@@ -70,6 +70,14 @@ class TimeLeft:
 
 Report = Callable[[Progress], None]
 
+Expected = float | Callable[[Progress], float]
+"""A number, or what a report lets expect."""
+
+
+def expected(value: Expected, now: Progress) -> float:
+    """The number, at a report."""
+    return value(now) if callable(value) else value
+
 
 class Meter:
     """The progress of work that is done in stages, some of which only show on the way (``fit.costs``)."""
@@ -78,20 +86,29 @@ class Meter:
         """``after``: what is to be done once all stages are over."""
         self._report, self._after = report, after
         self._done = 0.0
+        self._now = 0.0
+        """What the stage that goes on has cost: all of it where it tells nothing."""
         self._started = time.monotonic()
 
-    def stage(self, cost: float, rest: float | Callable[[Progress], float]) -> Report | None:
-        """What the next stage reports to: it costs ``cost``, and then ``rest`` is to be done, as far as is
-        known, or as a report lets expect. The stages before it are over.
+    def stage(self, cost: float, rest: Expected, *, likely: Expected = 1.0) -> Report | None:
+        """What the next stage reports to. The stages before it are over: one that ended early has cost what
+        its last report said, so that it does not make the pace seem faster than it was.
+
+        Args:
+            cost: of all of it.
+            rest: what is to be done then, as far as is known.
+            likely: share of what is left of it that is done in the mean: it may end early.
         """
-        report, before, started = self._report, self._done, self._started
-        self._done += cost
-        if report is None:
+        self._done, self._now = self._done + self._now, cost
+        if self._report is None:
             return None
+        report, before, started = self._report, self._done, self._started
 
         def told(now: Progress) -> None:
-            later = self._after + (rest(now) if callable(rest) else rest)
-            work = (before + cost * now.work) / (before + cost + later)
-            report(replace(now, work=work, seconds=time.monotonic() - started))
+            self._now = cost * now.work
+            own = expected(likely, now) * (cost - self._now)
+            later = own + expected(rest, now) + self._after
+            done = before + self._now
+            report(replace(now, work=done / (done + later), seconds=time.monotonic() - started))
 
         return told

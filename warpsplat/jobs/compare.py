@@ -14,8 +14,10 @@ from PIL import Image
 from warpsplat._version import __version__
 from warpsplat.errors import ImageError, Stopped, printable
 from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.jobs.figures import has_time_for_eyes
+from warpsplat.jobs.result import Result
 from warpsplat.jobs.tracer import Tracer
-from warpsplat.jobs.vectorize import Result, has_time_for_eyes, vectorize
+from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import Score, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.errors import ImageError
-from warpsplat.fit.costs import LINES, PIXELS, serial
+from warpsplat.fit.costs import PIXELS, serial
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.schedule import phases
@@ -20,7 +20,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.trace.ink import Ink, find_ink
 from warpsplat.trace.lines import TracedLines, rejoined, trace_ink
-from warpsplat.trace.tour import BEGINS, FEW, LOOK_AHEAD, toured
+from warpsplat.trace.tour import BEGINS, FEW, MANY, toured
 
 STEPS = 80
 """Of the refinement, at the most: the strokes are where they should be but for fractions of a pixel."""
@@ -31,8 +31,14 @@ POINT_RATE = 0.12
 WIDTH_RATE = 0.06
 """Of widths [px]."""
 
-TOUR_STROKE, TOUR_PAIR = 1.0, 0.0034
-"""What finding the order of strokes costs: of each stroke, of each pair of strokes (``fit.costs``)."""
+STEP_PIXELS, STEP_POINT = 1.45, 0.0022
+"""What a step of the refinement costs: of ``costs.PIXELS``, of a point (``fit.costs``)."""
+
+TOUR_STROKE, TOUR_PAIR = 0.3, 0.0021
+"""What improving a tour costs, until nothing shortens it: of each stroke, of each pair of strokes."""
+
+LONG_STROKE, LONG_PAIR = 0.25, 0.00006
+"""The same of a tour of many strokes, which is improved once."""
 
 THIN = 1.0
 """Width below which a stroke keeps it [px]: the least of a training."""
@@ -107,9 +113,9 @@ def _fitted(
         ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
     fitted = line_settings(settings, len(lines))
     plan = phases(fitted, lines.canvas.width, lines.canvas.height)
-    cost = fitted.iterations * LINES.cost(plan[-1].width * plan[-1].height / PIXELS, len(lines))
-    tours = BEGINS + 1 if len(lines) <= FEW else 1
-    order = serial(backend) * len(lines) * (TOUR_STROKE + TOUR_PAIR * tours * min(len(lines), LOOK_AHEAD))
+    size = plan[-1].width * plan[-1].height / PIXELS
+    cost = fitted.iterations * (STEP_PIXELS * size + STEP_POINT * len(lines.points))
+    order = serial(backend) * sum(tour_cost(count) for count in np.bincount(lines.layer).tolist())
     made = fit(
         inked(ink, lines),
         fitted,
@@ -125,6 +131,14 @@ def _fitted(
     widths = np.where(lines.widths < THIN, lines.widths, made.scene.widths)
     scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
     return replace(made, scene=toured(rejoined(lines, scene)))
+
+
+def tour_cost(count: int) -> float:
+    """Of finding the order of the strokes of a pen (``fit.costs``)."""
+    if count > MANY:
+        return count * (LONG_STROKE + LONG_PAIR * count)
+    tours = BEGINS + 2 if count <= FEW else 2  # from several places, and that of the drawing
+    return tours * count * (TOUR_STROKE + TOUR_PAIR * count)
 
 
 def line_settings(settings: Settings, count: int) -> Settings:

@@ -16,7 +16,9 @@ from warpsplat.fit.loop import fit
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.fit.work import Meter, Progress
 from warpsplat.jobs.checkpoint import CheckpointFile, identity
-from warpsplat.jobs.vectorize import Result, has_time_for_eyes, missed_goals, noting, training_seconds
+from warpsplat.jobs.figures import has_time_for_eyes, missed_goals
+from warpsplat.jobs.result import Result
+from warpsplat.jobs.training import noting, training_seconds
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene

@@ -12,8 +12,12 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.several import Series
 from warpsplat.fit.work import Report
 from warpsplat.jobs.formats import write_named
-from warpsplat.jobs.vectorize import Prepared, Result, make, prepare
+from warpsplat.jobs.prepare import Prepared, prepare
+from warpsplat.jobs.result import Result
+from warpsplat.jobs.vectorize import make
 from warpsplat.rendering.backend import Backend
+from warpsplat.scene import FloatArray
+from warpsplat.trace.subject import guess_subject
 
 MOST_NUMBERS = 16
 """Of shapes, in one run."""
@@ -86,7 +90,7 @@ def vectorize_several(
             f"a {OWN_NUMBER[subject]} has a number of shapes of its own: one file is all there is of it; "
             "--subject photo fits shapes"
         )
-    series = Series(work.settings, numbers, *work.size, backend)
+    series = Series(work.settings, numbers, *work.size, backend, shares=can_share(work.target))
     results: dict[int, Result] = {}
     for number in sorted(numbers):
         output = outputs[numbers.index(number)] if outputs else None
@@ -101,6 +105,14 @@ def vectorize_several(
 
 OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
 """Subjects whose pictures say how many shapes there are, as messages call them."""
+
+
+def can_share(image: FloatArray) -> bool:
+    """Whether fits to ``image`` lose nothing where they go on from fits with fewer shapes.
+
+    Those to drawings lose half a decibel and more, from wherever in their schedule (docs/experiments.md).
+    """
+    return guess_subject(image).subject == "photo"
 
 
 def _made(

@@ -18,7 +18,7 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.tidy import finish_drawing
-from warpsplat.fit.work import Report
+from warpsplat.fit.work import Meter, Report
 from warpsplat.jobs.line import draw_lines
 from warpsplat.jobs.thin import THIN, THINNEST, best_of_thin, continued, cut, margins
 from warpsplat.metrics import psnr
@@ -26,6 +26,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
+from warpsplat.svg.write import write_svg
 from warpsplat.trace.pixels import cell_size, trace_pixels
 from warpsplat.trace.subject import guess_subject
 from warpsplat.trace.trace import trace
@@ -81,10 +82,12 @@ def draw(
             target, settings, backend, seconds=seconds, report=report, after=after, stop=stop, stages=stages
         )
     most = None if settings.simplify else settings.curves
+    tries = Tries(report, settings.max_bytes) if settings.max_bytes else None
 
     def drawn(most: int | None) -> Fit:
+        told = tries.begun if tries else lambda traced: report
         across, down = margins(target, THIN)
-        ways = [lambda: _drawn(target, settings, backend, most, over, stop, report, after)]
+        ways = [lambda: _drawn(target, settings, backend, most, over, stop, told, after)]
         if across or down:
             ways.append(lambda: _drawn_beyond(target, settings, backend, most, over, stop))
             ways += [lambda: _cells(target, settings, backend)] if most is None else []
@@ -100,6 +103,8 @@ def draw(
         count = min(max(low + round(share * (high - low)), low + 1), high - 1)
         if count <= low or over():
             break
+        if tries:
+            tries.left = min(tries.left - 1, math.log2(high - low))
         made = drawn(count)
         size = _size(made, settings)
         if size <= settings.max_bytes:
@@ -123,7 +128,9 @@ def _drawn_beyond(
 ) -> Fit:
     """As ``_drawn``, of the picture continued beyond its borders."""
     across, down = margins(target, THIN)
-    made = _drawn(continued(target, across, down), settings, backend, most, over, stop, None, 0.0)
+    made = _drawn(
+        continued(target, across, down), settings, backend, most, over, stop, lambda traced: None, 0.0
+    )
     scene = cut(made.scene, across, down)
     return _made(scene, made.per_pixel, target, backend, interrupted=made.interrupted)
 
@@ -137,6 +144,30 @@ FEWER_ROUNDS = 5
 """Numbers of regions at the most that are tried for ``max_bytes``."""
 
 
+class Tries:
+    """The progress of drawings of fewer and fewer regions, until a file has its size."""
+
+    def __init__(self, report: Report | None, most: int) -> None:
+        """``most``: bytes of the file."""
+        self._meter, self._most = Meter(report), most
+        self._regions = 0
+        self.left = float(FEWER_ROUNDS)
+        """How many follow."""
+
+    def begun(self, traced: Scene) -> Report | None:
+        """What the next one reports to."""
+        if not self._regions:
+            self._regions = max(len(traced), 1)
+            fits = FINISHED * len(write_svg(traced)) <= self._most
+            self.left = 0.0 if fits else min(self.left, math.log2(self._regions + 1))
+        return self._meter.stage(math.sqrt(len(traced) / self._regions), self.left * SMALLER)
+
+
+FINISHED, SMALLER = 0.8, 0.7
+"""Bytes of a drawing over those as it was traced; work on one of the right size over that on the first. For
+progress: in the mean."""
+
+
 def _drawn(
     target: FloatArray,
     settings: Settings,
@@ -144,10 +175,10 @@ def _drawn(
     most: int | None,
     over: Stop,
     stop: Stop | None,
-    report: Report | None,
+    told: Callable[[Scene], Report | None],
     after: float,
 ) -> Fit:
-    """A drawing of ``most`` regions, finished."""
+    """A drawing of ``most`` regions, finished. ``told``: what is reported to, by what was traced."""
     size, whole = enlargement(target), (target.shape[1], target.shape[0])
     shown, target = target, np.ascontiguousarray(target[::size, ::size])
     traced = trace(target, most=most)
@@ -161,7 +192,7 @@ def _drawn(
         backend,
         Refinement(),
         finest=finest(settings),
-        report=report,
+        report=told(drawing.scene),
         after=after,
         stop=over,
     )

@@ -16,14 +16,22 @@ from warpsplat.fit.knee import knee
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
-from warpsplat.jobs.vectorize import prepare
+from warpsplat.jobs.prepare import prepare
+from warpsplat.jobs.several import OWN_NUMBER
 from warpsplat.rendering.backend import Backend
+from warpsplat.trace.subject import guess_subject
+
+CALLED = {"drawing": "drawing", **OWN_NUMBER}
+"""Subjects that are traced, as messages call them."""
 
 TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Shapes of the rows of a table, over those suggested."""
 
 SAMPLES = 513
 """Numbers of shapes among which the knee is looked for."""
+
+EXACT = 58.0
+"""Decibels at which a picture of 8 bits a channel has no error but that of rounding."""
 
 FINE = 0.05
 """Steps that a suggestion is rounded to, at the most, over itself: it is no more exact than that."""
@@ -37,6 +45,11 @@ class Expected:
     psnr: float
     """[dB]"""
     bytes: int
+
+    def __str__(self) -> str:
+        """As the beginning of a sentence."""
+        size = f"{self.bytes / 1000:.0f} kB" if self.bytes >= 10_000 else f"{self.bytes / 1000:.1f} kB"
+        return f"{self.shapes} shapes are expected to give {self.psnr:.1f} dB in {size}"
 
 
 @dataclass(frozen=True)
@@ -55,8 +68,6 @@ class Suggestion:
     """The knee of quality against shapes ..."""
     by_bytes: int | None
     """... and against bytes, in shapes."""
-    misfit: float
-    """How far measured decibels lie from the parabola, root of the mean square [dB]."""
     seconds: float
 
     def as_dict(self) -> dict[str, Any]:
@@ -64,7 +75,6 @@ class Suggestion:
         return {
             **{name: value for name, value in vars(self).items() if name != "expected"},
             "expected": [asdict(one) for one in self.expected],
-            "misfit": round(self.misfit, 3),
             "seconds": round(self.seconds, 2),
         }
 
@@ -111,35 +121,41 @@ def suggest_curves(
     work = prepare(source, settings, name=name, importance=importance)
     subject = work.settings.subject
     if subject != "photo":
-        reason = f"{work.why}. " if work.why else ""
-        why = f"{reason}It is traced: the picture says how many shapes there are; --subject photo fits them."
-        return Suggestion(None, subject, why, (), None, None, 0.0, time.monotonic() - started)
+        seen = f" ({work.why})" if work.why else ""
+        why = (
+            f"A {CALLED[subject]}{seen}, which is traced: the picture says how many shapes there are. "
+            "--subject photo fits a number of shapes to it."
+        )
+        return Suggestion(None, subject, why, (), None, None, time.monotonic() - started)
     worth = survey(work.target, work.settings, backend, importance=work.importance, report=report, stop=stop)
     if worth is None:
         return None
-    return replace(suggestion(worth), seconds=time.monotonic() - started)
+    made = suggestion(worth)
+    guess = guess_subject(work.target)
+    if guess.subject != "photo":
+        rough = f"It looks like a {CALLED[guess.subject]} ({guess.why}), of which this is a rough guess."
+        made = replace(made, why=f"{made.why} {rough}")
+    return replace(made, seconds=time.monotonic() - started)
 
 
 def suggestion(worth: Worth) -> Suggestion:
-    """What is suggested: the fewer shapes of its two knees."""
+    """What is suggested: the fewer shapes of its two knees, or the fewest where more are worth nothing."""
     shapes = np.geomspace(worth.fewest, worth.most, SAMPLES)
     quality, sizes = worth.psnr(shapes), worth.size(shapes)
     found = [knee(cost, quality) for cost in (shapes, sizes)]
     by_shapes, by_bytes = (None if at is None else rounded(float(shapes[at])) for at in found)
     known = [number for number in (by_shapes, by_bytes) if number is not None]
-    chosen = min(known) if known else worth.most
-    rows = sorted({round(share * chosen) for share in TABLE})
-    expected = tuple(expect(worth, row) for row in rows if worth.fewest <= row <= worth.most)
-    return Suggestion(
-        chosen,
-        "photo",
-        reason(worth, chosen, is_knee=bool(known)),
-        expected,
-        by_shapes,
-        by_bytes,
-        worth.misfit,
-        0.0,
-    )
+    chosen, why = worth.fewest, ""
+    if worth.fewest == worth.most:
+        why = f"The picture is so small that there is no room for more than {worth.most} shapes."
+    elif not known or quality[0] > EXACT:
+        why = f"{expect(worth, chosen)}; more are expected to add nothing that can be seen."
+    else:
+        chosen = min(known)
+        why = reason(worth, chosen)
+    rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in TABLE})
+    expected = tuple(expect(worth, row) for row in rows)
+    return Suggestion(chosen, "photo", why, expected, by_shapes, by_bytes, 0.0)
 
 
 def expect(worth: Worth, shapes: int) -> Expected:
@@ -147,19 +163,18 @@ def expect(worth: Worth, shapes: int) -> Expected:
     return Expected(shapes, round(float(worth.psnr(shapes)), 2), round(float(worth.size(shapes))))
 
 
-def reason(worth: Worth, chosen: int, *, is_knee: bool) -> str:
-    """Why it is this number."""
+def reason(worth: Worth, chosen: int) -> str:
+    """Why it is this number, which is at the knee."""
     one, two = expect(worth, chosen), expect(worth, 2 * chosen)
-    first = f"{chosen} shapes: {one.psnr:.1f} dB, {one.bytes / 1000:.0f} kB"
-    more = (two.bytes - one.bytes) / 1000
-    first += f"; twice as many buy {two.psnr - one.psnr:.1f} dB for {more:.0f} kB more."
-    if not is_knee:
-        return f"{first} Up to {worth.most} shapes each further one buys as much as those before."
+    first = str(one)
+    if 2 * chosen <= worth.most:
+        more = (two.bytes - one.bytes) / 1000
+        first += f", and twice as many {two.psnr - one.psnr:.1f} dB more for {more:.0f} kB more"
     fewest, most = expect(worth, worth.fewest), expect(worth, worth.most)
     average = (most.psnr - fewest.psnr) / ((most.bytes - fewest.bytes) / 1000)
     return (
-        f"{first} Up to there a kB buys more than the {average:.2g} dB that it buys on the average from "
-        f"{worth.fewest} to {worth.most:,} shapes, beyond it less: this is the knee."
+        f"{first}. From {worth.fewest} to {worth.most:,} shapes a kB buys {average:.2g} dB on the average: "
+        f"up to {chosen} shapes it buys more, beyond them less. This is the knee."
     )
 
 

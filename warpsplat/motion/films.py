@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import io
 import itertools
+import math
 import struct
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -43,7 +44,7 @@ LEAST_SIDE = 320
 """Longest side of the film of a smaller picture [px]: shapes have no pixels."""
 
 Frame = tuple[Image.Image, float]
-"""A picture, RGBA, and how long it is shown [s]."""
+"""A picture, RGB or RGBA, and how long it is shown [s]."""
 
 
 def check_format(path: Path) -> None:
@@ -106,12 +107,27 @@ def _held(frames: Iterable[Frame]) -> Iterator[Frame]:
 
 def _opaque(picture: Image.Image) -> Image.Image:
     """On white."""
+    if picture.mode == "RGB":
+        return picture
     white = Image.new("RGBA", picture.size, "white")
-    return Image.alpha_composite(white, picture.convert("RGBA")).convert("RGB")
+    return Image.alpha_composite(white, picture).convert("RGB")
 
 
 COLORS = 255
 """Of a picture of a GIF; one of 256 is left for what did not change since the picture before."""
+
+
+ENOUGH_PIXELS = 10_000
+"""From which the colours of a picture of a GIF are chosen: chosen from all they take nine times as long, and
+are nearer by half a decibel."""
+
+
+def _few_colors(picture: Image.Image) -> Image.Image:
+    """With a table of ``COLORS``."""
+    step = max(1, math.isqrt(picture.width * picture.height // ENOUGH_PIXELS))
+    some = picture.resize([max(1, side // step) for side in picture.size], Image.Resampling.NEAREST)
+    table = some.quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    return table if step == 1 else picture.quantize(palette=table, dither=Image.Dither.NONE)
 
 
 def _gif(frames: Iterable[Frame]) -> bytes:
@@ -120,8 +136,7 @@ def _gif(frames: Iterable[Frame]) -> bytes:
     """
     pictures, times = [], []
     for picture, seconds in frames:
-        opaque = _opaque(picture)
-        pictures.append(opaque.quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE))
+        pictures.append(_few_colors(_opaque(picture)))
         times.append(round(100 * seconds) * 10)
     packed = io.BytesIO()
     pictures[0].save(
@@ -139,6 +154,9 @@ def _gif(frames: Iterable[Frame]) -> bytes:
 
 WEBP_QUALITY = 80
 
+WEBP_METHOD = 2
+"""Of 0 to 6: twice as quick as the usual 4, for 4 % more bytes; 1 and 0 take 30 % more."""
+
 
 def _webp(frames: Iterable[Frame]) -> bytes:
     pictures = list(frames)
@@ -151,14 +169,15 @@ def _webp(frames: Iterable[Frame]) -> bytes:
         duration=[round(1000 * seconds) for _, seconds in pictures],
         loop=0,
         quality=WEBP_QUALITY,
-        method=4,
+        method=WEBP_METHOD,
     )
     data = packed.getvalue() + WEBP_MARK
     return data[:4] + struct.pack("<I", len(data) - 8) + data[8:]
 
 
-CRF = 18
-"""Of H.264: what an eye hardly tells from the source, as its authors say."""
+H264 = {"crf": "17", "preset": "veryfast"}
+"""Of x264, whose authors say that an eye hardly tells 18 from the source. Films are as large as with 18 and
+the usual preset, half a decibel further from the source, and take a third of the time."""
 
 
 def _mp4(frames: Iterable[Frame]) -> bytes:
@@ -178,7 +197,7 @@ def _encode_h264(path: Path, frames: Iterable[Frame]) -> None:
     first = next(frames)
     width, height = (max(2, side // 2 * 2) for side in first[0].size)
     with av.open(str(path), "w", options={"movflags": "faststart"}) as film:
-        stream = film.add_stream("libx264", rate=rate, options={"crf": str(CRF)})
+        stream = film.add_stream("libx264", rate=rate, options=H264)
         stream.width, stream.height = width, height
         stream.pix_fmt = "yuv420p"
         for picture, seconds in itertools.chain([first], frames):

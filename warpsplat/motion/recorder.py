@@ -12,9 +12,12 @@ import numpy as np
 from warpsplat.errors import UsageError
 from warpsplat.files.output import write_result
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.motion import drawing, films, training
 from warpsplat.motion.timing import LONGEST, SECONDS, SHORTEST, kept
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.rendering.turns import turn
 from warpsplat.scene import Scene
 
 What = Literal["training", "drawing"]
@@ -83,6 +86,8 @@ class Recorder:
         what: What | None = None,
         width: int | None = None,
         seconds: float = SECONDS,
+        device: str = "auto",
+        threads: int | None = None,
     ) -> int:
         """Write the animation of the run that made ``result``; its last picture is the file's.
 
@@ -94,6 +99,8 @@ class Recorder:
             width: of the picture [px], 16 to 2048; default: that of the file, within bounds that depend on
                 the ending. An SVG is as large as the file.
             seconds: of the movement, 0.5 to 60; then the finished picture stays.
+            device: that draws, see ``vectorize``.
+            threads: see there.
 
         Returns:
             bytes of the file.
@@ -117,9 +124,11 @@ class Recorder:
         if what == "training" and vector:
             data = training.vector(self.scenes, self.moments, result, seconds).encode()
         elif what == "training":
-            data = films.encoded(
-                path, training.pictures(self.scenes, self.moments, result, path, width, seconds)
-            )
+            start_warp()
+            backend = Backend.on(choose_device(device), threads)
+            with turn(backend.device):
+                frames = training.pictures(self.scenes, self.moments, result, path, width, seconds, backend)
+                data = films.encoded(path, frames)
         elif vector:
             data = drawing.vector(result.svg, seconds).encode()
         else:

@@ -8,13 +8,15 @@ from pathlib import Path
 
 from warpsplat.fit.export import export
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.motion.films import Frame, ticks_of, zoom_of
+from warpsplat.motion.painter import Painter
 from warpsplat.motion.shown import picture, screen, size_of
 from warpsplat.motion.timing import showings
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 from warpsplat.svg.numbers import number
-from warpsplat.svg.write import GRIDS, MARK, resized
+from warpsplat.svg.write import GRIDS, MARK
 
 
 def pictures(
@@ -24,19 +26,19 @@ def pictures(
     path: Path,
     width: int | None,
     seconds: float,
+    backend: Backend,
 ) -> Iterator[Frame]:
-    """The frames of a film of scenes and their moments; the last one is the file as a viewer shows it."""
+    """The frames of a film of scenes and their moments, drawn on ``backend``; the last one is the file as a
+    viewer shows it.
+    """
     end = finished(result)
     zoom = zoom_of(path, size_of(end), width)
     size = screen(end, zoom)
+    painter = Painter(backend, Settings(renderer=result.renderer), size)
     for showing in showings(moments, ticks_of(path, size, seconds), seconds):
         scene = scenes[showing.index]
         scale = zoom * result.scene.canvas.width / scene.canvas.width  # runs may be on reduced images
-        text = page(scene, result, GRIDS[-1])
-        if scene.pictures:
-            yield picture(text, size, scale), showing.seconds
-        else:
-            yield picture(resized(text, *size, scale), size), showing.seconds
+        yield painter.paint(scene, scale), showing.seconds
     yield picture(end, size, zoom), 0.0
 
 

@@ -12,8 +12,3 @@ def image_uri(data: bytes) -> str:
     """The bytes of a PNG, JPEG or WebP file."""
     kind = next(kind for head, kind in TYPES.items() if data.startswith(head))
     return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
-
-
-def svg_uri(text: str) -> str:
-    """Any SVG, ours or not. Base64: whatever is in the text, no character of it is left."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(text.encode('utf-8', 'replace')).decode()}"

@@ -36,6 +36,9 @@ class BinBuffers:
     tile_last: wp.array = buffer(wp.int32, "tiles")
     tile_stop: wp.array = buffer(wp.int32, "tiles")
     """End of a tile's visible slots in the two lists."""
+    tile_shapes: wp.array = buffer(wp.int32, "tiles")
+    tile_still: wp.array = buffer(wp.int32, "tiles")
+    """0, ``constants.STILL`` or ``SAME``."""
     list_slot: wp.array = buffer(wp.int32, "slots")
     list_paint: wp.array = buffer(wp.vec4, "slots")
 
@@ -94,6 +97,7 @@ class Bins:
             self.buffers,
             self._parameters.arrays,
             most=self._most,
+            keeps_colors=int(self._parameters.keeps_colors),
             split=True,
             **self.paint,
         )

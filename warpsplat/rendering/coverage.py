@@ -6,7 +6,7 @@ Two models fill the same arrays: the area that a viewer computes for a path, and
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import warp as wp
 
@@ -234,6 +234,8 @@ class SplatCoverage:
     """The paper's Gaussians: 1 - product of 1 - g."""
 
     law = constants.PRODUCT
+    kernels: ClassVar[tuple[wp.Kernel, wp.Kernel]] = (splat.splat_forward, splat.splat_backward)
+    """Gaussians -> coverages, and its adjoint."""
 
     def __init__(self, backend: Backend, grid: Grid, bins: Bins, slots: int) -> None:
         self._backend, self._grid, self._slots = backend, grid, slots
@@ -243,7 +245,7 @@ class SplatCoverage:
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
         program.launch(
-            splat.splat_forward,
+            self.kernels[0],
             (self._slots, self._backend.lanes),
             *self._sources,
             lanes=self._backend.lanes,
@@ -254,9 +256,9 @@ class SplatCoverage:
         """See ``Coverage``: all are there."""
 
     def backward(self, program: Program) -> None:
-        """See ``Coverage``: gradients of means and conics."""
+        """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
         program.launch(
-            splat.splat_backward,
+            self.kernels[1],
             self._grid.buffers.mean.shape[0],
             *self._sources,
             sum_grad=self.buffers.coverage,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -64,42 +65,35 @@ class Film:
         """Where the adjoints of opaque shapes keep what light arrives at each slot."""
         return self._backend.array(column, bins.buffers.list_slot.shape[0], self._backend.lanes)
 
+    def _launch(
+        self,
+        program: Program,
+        kernel: wp.Kernel,
+        bins: Bins,
+        coverage: Coverage,
+        paint: Painting,
+        **more: Any,
+    ) -> None:
+        """Record a kernel that goes through each tile's list."""
+        sources = (self.buffers, bins.buffers, coverage.buffers, paint.buffers)
+        columns = self._backend.lane_size
+        program.launch(kernel, self._dim, *sources, lane_columns=columns, split=True, **more)
+
     def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record lists and coverages -> ``image``."""
         plain = self._is_plain(paint)
-        program.launch(
-            composite.composite_forward if plain else composite_paint.paint_forward,
-            self._dim,
-            self.buffers,
-            bins.buffers,
-            coverage.buffers,
-            paint.buffers,
-            lane_columns=self._backend.lane_size,
-            background=self._background,
-            split=True,
-        )
+        kernel = composite.composite_forward if plain else composite_paint.paint_forward
+        self._launch(program, kernel, bins, coverage, paint, background=self._background)
 
     def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
         plain = self._is_plain(paint)
         kernel = composite.composite_backward if plain else composite_paint.paint_backward
-        more = {}
+        more = {"law": coverage.law, "sum_grad": coverage.buffers.coverage}
         if self._opaque:
             kernel = composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward
-            more = {"background": self._background, "light": self._light(bins)}
-        program.launch(
-            kernel,
-            self._dim,
-            self.buffers,
-            bins.buffers,
-            coverage.buffers,
-            paint.buffers,
-            lane_columns=self._backend.lane_size,
-            law=coverage.law,
-            sum_grad=coverage.buffers.coverage,
-            split=True,
-            **more,
-        )
+            more |= {"background": self._background, "light": self._light(bins)}
+        self._launch(program, kernel, bins, coverage, paint, **more)
 
     def removal_cost(
         self,
@@ -112,19 +106,9 @@ class Film:
         slot_cost: wp.array,
     ) -> None:
         """Record what the squared error against ``target`` would grow by without each slot."""
-        program.launch(
-            composite.removal_cost,
-            self._dim,
-            self.buffers,
-            bins.buffers,
-            coverage.buffers,
-            paint.buffers,
-            lane_columns=self._backend.lane_size,
-            target=target,
-            importance=self.buffers.inside if importance is None else importance,
-            slot_cost=slot_cost,
-            split=True,
-        )
+        importance = self.buffers.inside if importance is None else importance
+        more = {"target": target, "importance": importance, "slot_cost": slot_cost}
+        self._launch(program, composite.removal_cost, bins, coverage, paint, **more)
 
     def visibility(
         self, program: Program, bins: Bins, coverage: Coverage, paint: Painting, seen: wp.array
@@ -151,31 +135,10 @@ class StraightFilm(Film):
 
     def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """See ``Film``."""
-        program.launch(
-            composite_straight.straight_forward,
-            self._dim,
-            self.buffers,
-            bins.buffers,
-            coverage.buffers,
-            paint.buffers,
-            lane_columns=self._backend.lane_size,
-            hit=self._hit,
-            split=True,
-        )
+        self._launch(program, composite_straight.straight_forward, bins, coverage, paint, hit=self._hit)
 
     def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """See ``Film``."""
-        program.launch(
-            composite_straight.straight_backward,
-            self._dim,
-            self.buffers,
-            bins.buffers,
-            coverage.buffers,
-            paint.buffers,
-            lane_columns=self._backend.lane_size,
-            law=coverage.law,
-            hit=self._hit,
-            light=self._light(bins),
-            sum_grad=coverage.buffers.coverage,
-            split=True,
-        )
+        more = {"law": coverage.law, "sum_grad": coverage.buffers.coverage}
+        more |= {"hit": self._hit, "light": self._light(bins)}
+        self._launch(program, composite_straight.straight_backward, bins, coverage, paint, **more)

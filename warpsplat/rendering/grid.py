@@ -78,6 +78,9 @@ GRIDS = {
 class Grid:
     """Puts a grid of Gaussians along and across each shape."""
 
+    owned: type[GridBuffers] = GridBuffers
+    """Of which kind its buffers are."""
+
     def __init__(
         self,
         backend: Backend,
@@ -98,9 +101,7 @@ class Grid:
         self._through_scales, self._fold = through_scales, fold
         self._capacity, self._needed = capacity, needed
         parameters.check_chains()
-        self.buffers = backend.allocate(
-            GridBuffers, {"shapes": parameters.shape_count, "gaussians": capacity}
-        )
+        self.buffers = backend.allocate(self.owned, {"shapes": parameters.shape_count, "gaussians": capacity})
 
     def samples(self) -> dict[str, wp.array]:
         """What tiles are found by: ``bins.rectangles``'s parameters."""
@@ -112,29 +113,29 @@ class Grid:
             "extent": b.extent,
         }
 
+    @property
+    def _sources(self) -> tuple[object, ...]:
+        return self.buffers, self._parameters.arrays, self._viewport
+
+    def _number(self, program: Program) -> None:
+        """Record counts of Gaussians -> where those of each shape are."""
+        b = self.buffers
+        ranges = (b.gaussian_count, b.gaussian_ends, b.gaussian_first, b.gaussian_last)
+        record_ranges(program, *ranges, self._needed, capacity=self._capacity)
+
     def forward(self, program: Program) -> None:
         """Record points, widths -> Gaussians."""
         b, p = self.buffers, self._parameters
-        sources = (b, p.arrays, self._viewport)
         for kind in sorted(p.kinds):
-            program.launch(GRIDS[kind].plan, p.shape_count, *sources, split=True)
-        record_ranges(
-            program,
-            b.gaussian_count,
-            b.gaussian_ends,
-            b.gaussian_first,
-            b.gaussian_last,
-            self._needed,
-            capacity=self._capacity,
-        )
+            program.launch(GRIDS[kind].plan, p.shape_count, *self._sources, split=True)
+        self._number(program)
         for kind in sorted(p.kinds):
-            program.launch(GRIDS[kind].forward, self._capacity, *sources, split=True)
+            program.launch(GRIDS[kind].forward, self._capacity, *self._sources, split=True)
         program.launch(gaussians.gaussians_forward, self._capacity, b, split=True)
 
     def backward(self, program: Program) -> None:
         """Record gradients of means and conics -> gradients of points and widths."""
         b, p = self.buffers, self._parameters
-        sources = (b, p.arrays, self._viewport)
         program.launch(
             gaussians.differences_backward,
             self._capacity,
@@ -145,5 +146,5 @@ class Grid:
         )
         program.launch(gaussians.positions_backward, self._capacity, b, split=True)
         for kind in sorted(p.kinds):
-            program.launch(GRIDS[kind].stations_backward, self._capacity, *sources, split=True)
-            program.launch(GRIDS[kind].points_backward, p.point_count, *sources, split=True)
+            program.launch(GRIDS[kind].stations_backward, self._capacity, *self._sources, split=True)
+            program.launch(GRIDS[kind].points_backward, p.point_count, *self._sources, split=True)

@@ -61,6 +61,8 @@ class Parameters:
         self.backend = backend
         self.revision = 0
         """Counts ``rearrange``: launches recorded on arrays of an earlier revision are out of date."""
+        self.keeps_colors = False
+        """Whether colours and opacities stay: where nothing but these is to be found, nothing is computed."""
         zeros = {a.name: np.zeros(scene.shape_of(a), np.float32) for a in ATTRIBUTES}
         self._upload(
             scene, moments or (zeros, zeros), np.zeros(len(scene), np.int32) if ages is None else ages

@@ -111,8 +111,7 @@ class Renderer:
         self.paint = Painting(backend, p, v, self.bins, capacity.slots)
         self.forward_program = backend.program()
         self._record_forward(self.forward_program)
-        self.backward_program = backend.program("backward")
-        self._record_backward(self.backward_program)
+        self._backward_program: Program | None = None
         self._revision = p.revision
 
     def check_current(self) -> None:
@@ -135,6 +134,14 @@ class Renderer:
         self.coverage.values(program)  # lists, samples -> coverages
         self.paint.forward(program)  # frames, stops -> colours of pixels, where there are gradients
         self.film.forward(program, self.bins, self.coverage, self.paint)  # -> image
+
+    @property
+    def backward_program(self) -> Program:
+        """The adjoint, recorded when it is first asked for: many a renderer only renders."""
+        if self._backward_program is None:
+            self._backward_program = self.backend.program("backward")
+            self._record_backward(self._backward_program)
+        return self._backward_program
 
     def _record_backward(self, program: Program) -> None:
         self.film.backward(program, self.bins, self.coverage, self.paint)  # image_grad -> by slot

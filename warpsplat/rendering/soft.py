@@ -6,16 +6,13 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels import constants
 from warpsplat.kernels.coverage import gaussian
 from warpsplat.kernels.grid import fill, gaussians, soft
 from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.bins import Bins
-from warpsplat.rendering.coverage import CoverageBuffers
-from warpsplat.rendering.grid import GridBuffers
+from warpsplat.rendering.coverage import SplatCoverage
+from warpsplat.rendering.grid import Grid, GridBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
-from warpsplat.rendering.ranges import record_ranges
 from warpsplat.scene import GRADIENTS, Kind
 
 
@@ -31,8 +28,11 @@ class SoftBuffers(GridBuffers):
     """1: what compositing takes for the shapes' opacities, which are in their coverages."""
 
 
-class SoftGrid:
+class SoftGrid(Grid):
     """Puts a grid of Gaussians along and across each fill, a row along each stroke."""
+
+    buffers: SoftBuffers
+    owned = SoftBuffers
 
     def __init__(
         self,
@@ -55,43 +55,17 @@ class SoftGrid:
         """
         if parameters.paints & set(GRADIENTS):
             raise ValueError("soft Gaussians have flat colours, no gradients")
-        self._parameters, self._viewport = parameters, viewport
-        self._softness, self._density = softness, density
-        self._through_scales, self._fold = through_scales, fold
-        self._capacity, self._needed = capacity, needed
-        parameters.check_chains()
-        self.buffers = backend.allocate(
-            SoftBuffers, {"shapes": parameters.shape_count, "gaussians": capacity}
+        super().__init__(
+            backend, parameters, viewport, capacity, needed, through_scales=through_scales, fold=fold
         )
+        self._softness, self._density = softness, density
         self.buffers.paint_opacities.fill_(1.0)
-
-    @property
-    def _sources(self) -> tuple[object, ...]:
-        return self.buffers, self._parameters.arrays, self._viewport
-
-    def samples(self) -> dict[str, wp.array]:
-        """What tiles are found by: ``bins.rectangles``'s parameters."""
-        b = self.buffers
-        return {
-            "sample_first": b.gaussian_first,
-            "sample_last": b.gaussian_last,
-            "position": b.mean,
-            "extent": b.extent,
-        }
 
     def forward(self, program: Program) -> None:
         """Record points, widths, opacities -> Gaussians."""
-        b, p = self.buffers, self._parameters
+        p = self._parameters
         program.launch(soft.plan_soft, p.shape_count, *self._sources, density=self._density, split=True)
-        record_ranges(
-            program,
-            b.gaussian_count,
-            b.gaussian_ends,
-            b.gaussian_first,
-            b.gaussian_last,
-            self._needed,
-            capacity=self._capacity,
-        )
+        self._number(program)
         kernels = {Kind.FILL: fill.fill_grid_forward, Kind.STROKE: soft.soft_stroke_forward}
         for kind in sorted(p.kinds):
             program.launch(kernels[kind], self._capacity, *self._sources, split=True)
@@ -120,36 +94,7 @@ class SoftGrid:
         program.launch(soft.soft_shapes_backward, p.shape_count, *self._sources, split=True)
 
 
-class GaussianCoverage:
+class GaussianCoverage(SplatCoverage):
     """1 - product of 1 - o g."""
 
-    law = constants.PRODUCT
-
-    def __init__(self, backend: Backend, grid: SoftGrid, bins: Bins, slots: int) -> None:
-        self._backend, self._grid, self._slots = backend, grid, slots
-        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
-        self._sources = (self.buffers, bins.buffers, grid.buffers)
-
-    def states(self, program: Program) -> None:
-        """See ``Coverage``."""
-        program.launch(
-            gaussian.gaussian_forward,
-            (self._slots, self._backend.lanes),
-            *self._sources,
-            lanes=self._backend.lanes,
-            split=True,
-        )
-
-    def values(self, program: Program) -> None:
-        """See ``Coverage``: all are there."""
-
-    def backward(self, program: Program) -> None:
-        """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
-        program.launch(
-            gaussian.gaussian_backward,
-            self._grid.buffers.mean.shape[0],
-            *self._sources,
-            sum_grad=self.buffers.coverage,
-            split=True,
-        )
-        self._grid.backward(program)
+    kernels = (gaussian.gaussian_forward, gaussian.gaussian_backward)

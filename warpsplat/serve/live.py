@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from warpsplat.api import save_svg
+from warpsplat.api.svg import save_svg
 from warpsplat.fit.work import Progress, Snapshot, TimeLeft
 
 SHARE = 0.07

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.serve.live import Live
 from warpsplat.serve.pictures import Picture
 

@@ -7,15 +7,28 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeVar
 
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.serve.limits import Limits, Refused
 from warpsplat.serve.live import Live
 from warpsplat.serve.pictures import Picture
 from warpsplat.serve.runs import Run
 from warpsplat.serve.session import Session
+
+Thing = TypeVar("Thing")
+
+
+def _held(things: dict[str, Thing], name: str, what: str) -> Thing:
+    """One of what a session has.
+
+    Raises:
+        Refused: there is none of that name.
+    """
+    if name not in things:
+        raise Refused(404, f"no such {what}: only the latest are held")
+    return things[name]
 
 
 class Store:
@@ -127,10 +140,7 @@ class Store:
             Refused: there is none of that name.
         """
         with self._lock:
-            found = self._session(name).pictures.get(image)
-            if not found:
-                raise Refused(404, "no such image: only the latest are held")
-            return found
+            return _held(self._session(name).pictures, image, "image")
 
     def remove_picture(self, name: str, image: str) -> None:
         """Forget an image and its runs.
@@ -173,10 +183,7 @@ class Store:
             Refused: there is none of that name.
         """
         with self._lock:
-            found = self._session(name).runs.get(run)
-            if not found:
-                raise Refused(404, "no such run: only the latest are held")
-            return found
+            return _held(self._session(name).runs, run, "run")
 
     def stop_run(self, name: str, run: str) -> None:
         """Have a run end with the shapes as they are; one that waits leaves the queue.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import warpsplat
 from warpsplat.errors import explain
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.native import release_memory
 from warpsplat.serve.live import Live
 from warpsplat.serve.runs import Run

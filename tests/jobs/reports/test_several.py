@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ from PIL import Image
 
 import warpsplat
 from warpsplat.jobs.reports.several import knee_of, plots, several_page, versions_of
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
+from warpsplat.pages.plot import BOTTOM, HEIGHT
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +39,8 @@ def test_the_knee_is_marked(results: list[Result]) -> None:
     text = several_page(versions, Image.new("RGB", (24, 16)), name="a.png", command="warpsplat ...")
     assert "Of these, 4 shapes are at the knee: up to there a kB buys" in text
     assert text.count("the knee</span>") == 1
+    labels = [float(y) for y in re.findall(r'<circle class="mark[^>]*/>\s*<text [^>]*y="([\d.]+)"', text)]
+    assert len(labels) == 6 and max(labels) < HEIGHT - BOTTOM, "the axis has figures of its own below"
 
 
 def test_versions_without_figures_have_no_plots(results: list[Result]) -> None:
@@ -45,3 +49,5 @@ def test_versions_without_figures_have_no_plots(results: list[Result]) -> None:
     text = several_page(versions, Image.new("RGB", (24, 16)), name="a.png")
     assert "What shapes and bytes buy" not in text
     assert "The run was stopped" in text
+    alone = several_page(versions[:1], Image.new("RGB", (24, 16)), name="a.png")
+    assert "in 1 version<" in alone and "in 3 versions<" in text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import re
 from pathlib import Path
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import warpsplat
-from tests.pages.test_environment import NASTY, Tags
+from tests.pages.helpers import NASTY, Tags, data_of
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.reports.pictures import (
     PAGE_PIXELS,
@@ -46,11 +45,10 @@ def grain(channels: int = 3) -> np.ndarray:
     return np.random.default_rng(1).integers(0, 256, (32, 48, channels)).astype(np.uint8)
 
 
-def data_of(text: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
-    assert found
-    values: dict[str, Any] = json.loads(found[1])
-    return values
+@pytest.fixture(scope="module")
+def page() -> str:
+    """The report on ``SVG``."""
+    return warpsplat.report(SVG, grain(), name="a", svg_name="a.svg", command="a", device="cpu")
 
 
 @pytest.mark.parametrize(
@@ -79,8 +77,8 @@ def test_worth_is_what_goes_with_a_shape(svg: str, channels: int) -> None:
         assert worth == pytest.approx(figure(svg) - figure(svg.replace(shape, "")), abs=0.02)
 
 
-def test_what_the_list_knows() -> None:
-    values = data_of(warpsplat.report(SVG, grain(), device="cpu"))["listing"]
+def test_what_the_list_knows(page: str) -> None:
+    values = data_of(page)["listing"]
     assert values["kinds"] == ["fill", "fill", "stroke"]
     assert values["colors"] == [["#a33"], ["#000"], ["#3a3"]]
     assert values["opacities"] == [0.8, 1.0, 1.0]
@@ -93,22 +91,18 @@ def test_what_cannot_be_listed_is_said() -> None:
     only = re.sub(r"<g id.*</g>", "", text)
     kept = data_of(warpsplat.report(text, grain(), device="cpu"))["listing"]
     assert kept["kinds"][-1] == "kept" and kept["worth"][-1] is None
-    page = warpsplat.report(only, grain(), device="cpu")
-    assert data_of(page)["listing"] is None
-    assert "The shapes of this file are not listed" in page
-
-
-@pytest.fixture(scope="module")
-def plain() -> Tags:
-    return Tags(warpsplat.report(SVG, grain(), name="a", svg_name="a.svg", command="a", device="cpu"))
+    bare = warpsplat.report(only, grain(), device="cpu")
+    assert data_of(bare)["listing"] is None
+    assert "The shapes of this file are not listed" in bare
 
 
 @pytest.mark.parametrize("text", NASTY)
-def test_nasty_names_and_titles(text: str, plain: Tags) -> None:
+def test_nasty_names_and_titles(text: str, page: str) -> None:
     titled = SVG.replace('id="far"', 'id="far" data-x="&lt;/script>"')
     made = warpsplat.report(titled, grain(), name=text, svg_name=text, command=text, device="cpu")
     # Each word of the command has an element of its own, so that lines end between them.
-    assert [tag for tag in Tags(made).tags if tag != "span"] == [tag for tag in plain.tags if tag != "span"]
+    nasty, plain = ([tag for tag in Tags(each).tags if tag != "span"] for each in (made, page))
+    assert nasty == plain
     assert data_of(made)["svg"] == titled
 
 
@@ -155,13 +149,13 @@ def test_the_course_of_a_run() -> None:
     assert plots([Progress(0, 9, math.inf, 0.0, 0.0, fine=True)])[0] is None
 
 
-def test_a_page_has_a_limit() -> None:
+def test_a_page_has_a_limit(page: str) -> None:
     """However little its image weighs, and whatever it shows."""
     noise = np.random.default_rng(0).random((300, 300, 3), np.float32)
     assert len(encoded(noise, 2000)) < 2000 * 4 / 3 + 40
     assert len(encoded_map(straight(noise), 2000)) < 2000 * 4 / 3 + 40
     # Of the pictures, each stands in the page once.
-    pictures = re.findall(r"data:image/webp;base64,[\w+/=]+", warpsplat.report(SVG, grain(), device="cpu"))
+    pictures = re.findall(r"data:image/webp;base64,[\w+/=]+", page)
     assert len(pictures) == len(set(pictures)) == 2
     small = io.BytesIO()
     Image.fromarray(grain()).save(small, "JPEG", quality=5)

@@ -107,6 +107,9 @@ def checked(key: str, value: Any, place: Place) -> None:
         elif key in TEXT_KEYS:
             if not isinstance(value, str):
                 raise UsageError(f"must be text, not {value!r}")
+        elif key == "curves" and isinstance(value, str) and "," in value:
+            numbers = ", ".join(word.strip() for word in value.split(","))
+            raise UsageError(f"takes one number; for one job with each, {MATRIX}: {{{key}: [{numbers}]}}")
         else:
             settings_from({key.replace("-", "_"): value})
     except (UsageError, TypeError) as error:

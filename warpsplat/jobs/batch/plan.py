@@ -70,15 +70,6 @@ class _Planned:
     importance: Path | None
 
 
-def load_jobs(path: Path, command: Layer | None = None) -> list[Job]:
-    """Read and check a batch file.
-
-    Raises:
-        UsageError: anything wrong with the file; the message names its line and key.
-    """
-    return _jobs(list(_of_file(path, command or {})))
-
-
 def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Job]:
     """The jobs that names on the command line mean: batch files, images, folders of them and patterns.
 
@@ -87,7 +78,7 @@ def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Job]:
         command: what the command line says of settings, see ``layers.command_layer``.
 
     Raises:
-        UsageError: anything wrong with them.
+        UsageError: anything wrong with them; of a file the message names its line and key.
     """
     planned: list[_Planned] = []
     named: dict[Path, Found] = {}

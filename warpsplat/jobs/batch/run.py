@@ -23,7 +23,7 @@ from warpsplat.jobs.batch.reports import Reports
 from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, ReportWish, Source, Stop, Task
 from warpsplat.jobs.executors.work import digest, failure, make_folder
 from warpsplat.jobs.formats import is_picture
-from warpsplat.jobs.vectorize import STOPPED, job_key
+from warpsplat.jobs.keys import STOPPED, job_key
 from warpsplat.svg.inspect import svg_text
 from warpsplat.svg.write import read_metadata
 

@@ -19,6 +19,8 @@ RARE = ("stopped", "planned")
 class Totals:
     """Sums, as reports come in."""
 
+    asked: int
+    """Images of the batch."""
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*COUNTED, *RARE), 0))
     psnr: list[float] = field(default_factory=list)
     """Of each image that has one [dB]; of one that is shown exactly there is none."""
@@ -44,13 +46,19 @@ class Totals:
 
     def shown_counts(self) -> dict[str, int]:
         """The counts that are worth a word."""
-        return {name: n for name, n in self.counts.items() if n or name in COUNTED}
+        counts = {**self.counts, "not started": self.not_started}
+        return {name: n for name, n in counts.items() if n or name in COUNTED}
+
+    @property
+    def not_started(self) -> int:
+        """Images of which nothing was reported: those that an interrupted batch did not come to."""
+        return self.asked - sum(self.counts.values())
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "images": sum(self.counts.values()),
-            **self.shown_counts(),
+            "images": self.asked,
+            **{name.replace(" ", "_"): n for name, n in self.shown_counts().items()},
             "psnr_mean": _rounded(statistics.fmean(self.psnr)) if self.psnr else None,
             "psnr_median": _rounded(statistics.median(self.psnr)) if self.psnr else None,
             "bytes": sum(self.bytes),

@@ -14,9 +14,11 @@ from warpsplat.files.remote import is_remote
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.jobs.formats import named_bytes
+from warpsplat.jobs.keys import STOPPED, job_key
+from warpsplat.jobs.prepare import load_target
 from warpsplat.jobs.reports.command import vectorize_command
 from warpsplat.jobs.reports.single import Facts, report_page
-from warpsplat.jobs.vectorize import STOPPED, job_key, load_target, vectorize_image
+from warpsplat.jobs.vectorize import vectorize_image
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp

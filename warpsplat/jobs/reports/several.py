@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from warpsplat.errors import printable
-from warpsplat.files.sources import ImageSource, Readable, source_bytes
+from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.knee import knee
 from warpsplat.jobs.reports.pictures import ROOM, ROOM_SHARE, encoded, shown_image
 from warpsplat.jobs.reports.single import Facts, headline, notes, picture_view, with_view
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.pages import page
 from warpsplat.pages.plot import Mark, Plot, plot
 
@@ -57,8 +56,7 @@ def several_page(results: Sequence[Version], image: ImageSource, *, name: str, c
         ImageError: the image cannot be read.
         TypeError: an image of no known form.
     """
-    if isinstance(image, (str, os.PathLike, Readable)):
-        image = source_bytes(image)
+    image = held(image)
     shown = shown_image(image, name)
     height, width = shown.pixels.shape[:2]
     room = ROOM + ROOM_SHARE * len(image) if isinstance(image, bytes) else math.inf

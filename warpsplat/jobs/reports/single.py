@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from warpsplat.errors import ImageError, printable
-from warpsplat.files.sources import ImageSource, Readable, source_bytes
+from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.reports.pictures import (
     MOST_ERROR,
@@ -27,7 +26,7 @@ from warpsplat.jobs.reports.pictures import (
     thumbnails,
 )
 from warpsplat.jobs.reports.shapes import decibels, listing, matched
-from warpsplat.jobs.vectorize import Result
+from warpsplat.jobs.result import Result
 from warpsplat.pages import page
 from warpsplat.pages.embed import image_uri
 from warpsplat.pages.plot import Plot, plot
@@ -95,8 +94,7 @@ def report_page(
         ImageError: the image cannot be read, or the SVG cannot be drawn at its size.
         TypeError: an image of no known form.
     """
-    if isinstance(image, (str, os.PathLike, Readable)):
-        image = source_bytes(image)
+    image = held(image)
     shown = shown_image(image, name, SHORT_PIXELS if facts.figures.get("reduced") else PAGE_PIXELS)
     height, width = shown.pixels.shape[:2]
     view = picture_view(svg, shown.width, shown.height)

@@ -1,0 +1,119 @@
+"""SVGs as users give them; scenes from them and to them; their score."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from warpsplat.errors import ImageError
+from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
+from warpsplat.fit.export import export
+from warpsplat.fit.rounding import finest
+from warpsplat.fit.settings import make_settings
+from warpsplat.jobs.formats import write_named
+from warpsplat.metrics import Score, score_svg
+from warpsplat.scene import Scene
+from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.write import minified
+
+SvgSource = str | os.PathLike[str] | bytes | Readable
+"""An SVG: its text (a string with a ``<`` in it), its file's path, its bytes, or a file open for reading;
+gzipped or not."""
+
+
+def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
+    """The paths of any SVG as a scene, at the SVG's own size.
+
+    Args:
+        svg: as for ``refine``.
+        keep: hold text, images, filters ... as pictures, which are drawn and written as they are.
+
+    Raises:
+        ImageError: not an SVG, one without a size or without paths, or one with something that a scene
+            cannot hold.
+    """
+    name = svg_name_of(svg)
+    text = text_of(svg, name)
+    try:
+        size = svg_size(inspect_svg(text).root)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+    if size is None:
+        raise ImageError(f"{name}: says neither its size nor a viewBox")
+    width, height = (max(1, math.floor(side + 0.5)) for side in size)
+    if keep:
+        kept = load_kept(text, width, height, name)
+        scene, has_background = kept.scene, kept.has_background
+    else:
+        scene, has_background = load_scene(text, width, height, name)
+    return scene if has_background else replace(scene, canvas=replace(scene.canvas, background=None))
+
+
+def save_svg(
+    scene: Scene,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    precision: int | None = None,
+    title: str = "",
+    ids: bool = False,
+    minify: bool = False,
+) -> str:
+    """The SVG of a scene, written to ``path`` where one is given, which is replaced in one step.
+
+    Args:
+        scene: what to write.
+        path: says by its ending what is written, see ``Result.save``.
+        precision: decimals of a pixel in coordinates; default: two.
+        title: as for ``vectorize``, as are ``ids`` and ``minify``.
+        ids: see there.
+        minify: see there.
+
+    Raises:
+        UsageError: a value out of range.
+        OutputError: ``path`` cannot be written.
+    """
+    settings = make_settings(precision=precision, title=title, ids=ids)
+    text = export(scene, settings, finest(settings))
+    text = minified(text) if minify else text
+    if path is not None:
+        write_named(Path(path), text)
+    return text
+
+
+def score(svg: SvgSource, image: ImageSource) -> Score:
+    """How well an SVG, as a viewer shows it at the image's size, shows the image, and what it is made of.
+
+    Where the image has opacity, on black and on white, and the lower figures count.
+
+    Raises:
+        ImageError: either cannot be read, or their proportions differ.
+    """
+    name = svg_name_of(svg)
+    target, text = image_of(image), text_of(svg, name)
+    try:
+        return score_svg(text, target)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+
+
+def svg_name_of(svg: object) -> str:
+    """How messages call an SVG."""
+    return "the SVG" if isinstance(svg, str) and "<" in svg else source_name(svg, "the SVG")
+
+
+def text_of(svg: SvgSource, name: str) -> str:
+    """The text of an SVG, which messages call ``name``.
+
+    Raises:
+        ImageError: it cannot be read.
+        TypeError: it is no ``SvgSource``.
+    """
+    if isinstance(svg, str) and "<" in svg:
+        return svg
+    if not isinstance(svg, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
+        raise TypeError(f"an SVG is its text, a path, bytes or a file, not {type(svg).__name__}")
+    return svg_text(source_bytes(svg, "an SVG"), name)
