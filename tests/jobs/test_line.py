@@ -127,7 +127,6 @@ def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
     assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
 
 
-<<<<<<< HEAD
 def test_a_line_thinner_than_a_pixel_is_one_thin_stroke(device: str) -> None:
     image = drawn('<path d="M8 10L88 31" stroke-width=".4"/><path d="M8 50H88"/><path d="M8 60H88"/>')
     result = lines_of(image, device)
@@ -159,10 +158,10 @@ def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
     ink = 1 - image[..., 0]
     assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
     assert np.clip(painted - ink, 0, None).sum() < 0.03 * painted.sum()
-=======
+
+
 def test_tours_cost_by_how_thoroughly_they_are_sought() -> None:
     costs = [tour_cost(count) for count in (0, 20, FEW, MANY)]
     assert costs == sorted(costs) and costs[0] == 0 < costs[1]
     assert tour_cost(FEW) > 2 * tour_cost(FEW + 1), "from several places"
     assert tour_cost(MANY) > 5 * tour_cost(MANY + 1), "until nothing shortens it"
->>>>>>> main
