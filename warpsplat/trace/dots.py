@@ -42,6 +42,10 @@ LONGEST = 2.5
 """Length of a dot over its width, at the most: what is longer is a line."""
 
 
+BESIDE, NARROWER = 1.6, 0.65
+"""How far beside a dot its ink is looked at, over its width, and how broad it may be there, over the same."""
+
+
 class Dot(NamedTuple):
     """A short line, as broad as it is long or nearly so."""
 
@@ -74,9 +78,24 @@ def round_dots(ink: Ink, width: float) -> tuple[list[Dot], Bools]:
             continue
         ends, thick = dot
         ends = ends + (left, top)
+        if _goes_on(depth, ends, thick):
+            continue
         _stroke(covered, ends, thick)
         dots.append(Dot((ends + 0.5) / FINE, thick / FINE))
     return dots, cv2.resize(covered, ink.mask.shape[::-1], interpolation=cv2.INTER_AREA) > 0
+
+
+def _goes_on(depth: Floats, ends: Floats, width: float) -> bool:
+    """Whether the ink beside a dot on the fine grid is about as broad: then it is a part of a line."""
+    reach = math.ceil(width) + 2
+    left, top = np.maximum(np.floor(ends.min(axis=0)).astype(int) - reach, 0)
+    right, bottom = np.ceil(ends.max(axis=0)).astype(int) + reach
+    near = depth[top:bottom, left:right]
+    around, inner = np.zeros(near.shape, np.uint8), np.zeros(near.shape, np.uint8)
+    _stroke(around, ends - (left, top), BESIDE * width)
+    _stroke(inner, ends - (left, top), width)
+    ring = (around > 0) & (inner == 0)
+    return bool(ring.any() and near[ring].max() > NARROWER * 0.5 * width)
 
 
 def _round(own: Bools, radius: float) -> tuple[Floats, float] | None:
