@@ -79,7 +79,13 @@ class Shard(click.ParamType):
     help="Folder for the results, or their names: out/{stem}-{curves}.svg.  [default: beside each image]",
 )
 @overwrite_option
-@click.option("--set", "sets", multiple=True, metavar="KEY=VALUE", help="Any key of batch files.")
+@click.option(
+    "--set",
+    "sets",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Any key of batch files, as curves=64; may be there several times.",
+)
 @click.option("-n", "--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
 @click.option("--retry-failed", is_flag=True, help="Try again what failed in an earlier run.")
 @click.option(
@@ -89,12 +95,17 @@ class Shard(click.ParamType):
     help="Images at the same time, each in a process.  [default: one a core, if that pays]",
 )
 @cluster_options
-@click.option("--shard", type=Shard(), default=(1, 1), help="Do the I-th of N parts of the images.")
+@click.option(
+    "--shard",
+    type=Shard(),
+    default=(1, 1),
+    help="Do part I of N of the images: 1/4.",
+)
 @click.option(
     "--manifest",
     type=FILE,
     metavar="FILE",
-    help="What was made, as JSON lines.  [default: warpsplat-manifest.jsonl, with the results]",
+    help="Notes of what was made, as JSON lines.  [default: warpsplat-manifest.jsonl, with the results]",
 )
 @index_option
 @quality_options
@@ -128,6 +139,10 @@ def command(
 ) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
 
+    An image that fails is reported and the rest are done (exit 5). A result
+    that is there already, made by the same settings from the same image, is not
+    made again. A YAML file says what is to be done with which images:
+
     \b
     defaults:
       curves: 512          # keys are the long flags of vectorize
@@ -137,10 +152,7 @@ def command(
       - images: [logo.png, icons/*.png]
         curves: 64
 
-    Paths are relative to the file. What the command line says is stronger than
-    the file. An image that fails is reported and the rest are done (exit 5). A
-    result that is there already, made by the same settings from the same
-    image, is not made again.
+    Its paths are relative to it. What the command line says is stronger.
     """  # noqa: D301
     flags = {
         **flags_of(given),

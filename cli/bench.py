@@ -54,16 +54,46 @@ def table(values: dict[str, Any], verbose: int) -> str:
 
 
 @click.command("bench", context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--curves", type=click.IntRange(1, 100_000), default=512, show_default=True, metavar="N")
+@click.option(
+    "--curves", type=click.IntRange(1, 100_000), default=512, show_default=True, metavar="N", help="Shapes."
+)
 @click.option("--size", default="768x512", show_default=True, metavar="WxH", help="Of the canvas [px].")
-@click.option("--kind", type=click.Choice(["closed", "open"]), default="closed", show_default=True)
-@click.option("--renderer", type=click.Choice(get_args(Renderer)), default="exact", show_default=True)
-@click.option("--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True)
+@click.option(
+    "--kind",
+    type=click.Choice(["closed", "open"]),
+    default="closed",
+    show_default=True,
+    help="Fills, or strokes.",
+)
+@click.option(
+    "--renderer",
+    type=click.Choice(get_args(Renderer)),
+    default="exact",
+    show_default=True,
+    help="How shapes are seen, as in vectorize.",
+)
+@click.option(
+    "--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True, help="Of each shape."
+)
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, or cuda:N.")
 @threads_option
-@click.option("--repeats", type=click.IntRange(1, 10_000), default=20, show_default=True, metavar="N")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, metavar="N")
-@click.option("--torch", "through_torch", is_flag=True, help="Time PyTorch's passes beside the own ones.")
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 10_000),
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="Steps that are timed.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**32 - 1),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Of the random scene.",
+)
+@click.option("--torch", "through_torch", is_flag=True, help="Time the passes through PyTorch as well.")
 @click.option("-v", "--verbose", count=True, help="List the kernels as well.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:

@@ -14,7 +14,9 @@ MARKS = {"ok": "ok", "note": "note", "broken": "BROKEN"}
 
 
 @click.command("doctor", context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--device", default="auto", show_default=True, help="That the self-test runs on.")
+@click.option(
+    "--device", default="auto", show_default=True, help="Where the self-test runs: auto, cpu, or cuda:N."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(device: str, as_json: bool) -> None:
     """Check that all that a run needs is there and works.

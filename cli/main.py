@@ -103,6 +103,9 @@ class LazyGroup(click.Group):
 def cli() -> None:
     """Turn raster images into SVGs of Bézier shapes by gradient descent.
 
+    "warpsplat photo.jpg" writes photo.svg; "warpsplat COMMAND --help" says what a
+    command can do.
+
     \b
     Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
     or checkpoint, 4 result could not be written, 5 some images of a batch failed,

@@ -47,7 +47,7 @@ def motion_options(function: Function) -> Function:
             "--animate-width",
             type=int,
             metavar="PX",
-            help="Of an animation of pixels.  [default: the image's, but 800 px, 480 of a GIF, at the most]",
+            help="Width of a .gif, .webp or .mp4.  [default: the image's; at most 800, of a GIF 480]",
         ),
         preview_option,
     ]

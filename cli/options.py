@@ -60,7 +60,7 @@ def checkpoint_options(function: Function) -> Function:
             default="30s",
             show_default=True,
             metavar="TIME",
-            help="Time between two times that the state is kept.",
+            help="How often the state is kept.",
         ),
     ]
     for option in reversed(options):

@@ -29,7 +29,12 @@ from warpsplat.errors import ImageError, UsageError
     show_default=True,
     help="viewer: resvg. exact, splat: those that shapes are fitted with, for SVGs of paths.",
 )
-@click.option("--device", default="auto", show_default=True, help="Of exact and splat.")
+@click.option(
+    "--device",
+    default="auto",
+    show_default=True,
+    help="For exact and splat: auto (a GPU if there is one), cpu, or cuda:N.",
+)
 @threads_option
 def command(
     svg: Path, output: Path, overwrite: bool, scale: float, renderer: Any, device: str, threads: int | None

@@ -65,10 +65,11 @@ class Pair:
 
 def psnr(a: Floats, b: Floats) -> float:
     """Peak signal-to-noise ratio [dB] of two arrays in 0..255; infinite where they are equal."""
-    return _decibels(float(np.mean((a - b) ** 2, dtype=np.float64)))
+    return decibels(float(np.mean((a - b) ** 2, dtype=np.float64)))
 
 
-def _decibels(error: float) -> float:
+def decibels(error: float) -> float:
+    """PSNR [dB] of a mean squared error in levels of 0..255; infinite where it is 0."""
     return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
 
 
@@ -109,7 +110,7 @@ def _figures(pairs: Iterable[Pair], stop: Stop | None = None) -> tuple[float, fl
     if len(similar) == len(MS_SSIM_WEIGHTS):
         factors = np.append(similar[:-1, 1], similar[-1, 0])
         multiple = float(np.prod(np.maximum(factors, 0.0) ** MS_SSIM_WEIGHTS))
-    return _decibels(float(np.mean(errors))), single, multiple
+    return decibels(float(np.mean(errors))), single, multiple
 
 
 def _squared_error(pair: Pair) -> float:
@@ -261,7 +262,7 @@ def score_svg(
     papers = (255,) if target.shape[2] == 3 else (0, 255)
     paper = papers[0]
     if len(papers) > 1:
-        paper = min(papers, key=lambda level: _decibels(_error(shown, target, level)))
+        paper = min(papers, key=lambda level: decibels(_error(shown, target, level)))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check(stop)
     seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None

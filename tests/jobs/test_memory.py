@@ -221,6 +221,11 @@ def test_a_small_mask_loses_nothing() -> None:
         assert mask_factor(HUGE, replace(HUGE, width=width), 4) == factor
 
 
+def test_opacity_takes_more_memory_to_refine() -> None:
+    wanted = [memory.need_refined(replace(HUGE, channels=channels), Settings()) for channels in (3, 4)]
+    assert wanted[0] < 0.6 * wanted[1]
+
+
 def test_refining_against_what_takes_too_much_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -232,7 +237,9 @@ def test_refining_against_what_takes_too_much_is_refused(
         '<path d="M9 9H40V30H9z" fill="#853"/></svg>'
     )
     arguments = ("refine", svg, image, "-o", output, "--iterations", 1, "--device", "cpu")
-    limit = memory.PROGRAM + memory.REFINED * WIDTH * HEIGHT
+    facts = image_facts(image.read_bytes())
+    assert facts
+    limit = memory.need_refined(facts, make_settings())
     assert run(*arguments, "--max-memory", limit) == 0
     monkeypatch.setattr("warpsplat.api.refine.load_target", None)
     capsys.readouterr()

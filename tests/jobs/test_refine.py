@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.jobs.refine import refine
+from warpsplat.jobs.refine import likeness, refine
 from warpsplat.jobs.result import Result
-from warpsplat.metrics import score_svg
+from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind
@@ -64,6 +65,16 @@ def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
     result, _ = improved(text, target, make_settings(iterations=10), device)
     assert result.score
     assert result.score.nodes <= 20
+
+
+def test_pictures_are_compared_strip_by_strip(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    a, b = (Image.fromarray(rng.integers(0, 256, (23, 40, 4), dtype=np.uint8)) for _ in range(2))
+    whole = psnr(on_white(a), on_white(b))
+    for pixels in (1, 100, 10_000):
+        monkeypatch.setattr("warpsplat.svg.strips.STRIP_PIXELS", pixels)
+        assert likeness(a, b) == pytest.approx(whole, abs=1e-9)
+    assert likeness(a, a) == float("inf")
 
 
 def test_no_improvement_changes_nothing(device: str) -> None:

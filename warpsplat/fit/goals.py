@@ -67,7 +67,7 @@ TRIES = 3
 MAIN_TIME = 0.7
 """Share of a time budget that is left after the pilots; the rest is for the rounds."""
 
-ENDING = 0.17
+ENDING = 0.15
 """Share of rounds on the way to a PSNR after which there is no other, whatever was missing before."""
 
 LAST_ROUNDS = {"grow": 0.75, "shrink": 0.5}

@@ -31,7 +31,7 @@ PILOTS = 4
 PILOT_TIME = 0.15
 """Share of a time budget, of all pilots."""
 
-USUAL_ROUNDS = {"target_psnr": 4.0, "max_bytes": 1.3}
+USUAL_ROUNDS = {"target_psnr": 4.2, "max_bytes": 1.3}
 """How many there are in the mean, as progress is shown before anything is known."""
 
 PILOT_EQUAL, PILOT_RISE = 0.37, 10.5

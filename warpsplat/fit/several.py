@@ -23,9 +23,6 @@ BEGIN = 0.25, 0.375
 between, it begins where there would be as many shapes by now (docs/experiments.md).
 """
 
-MANY = 256
-"""Shapes to go on from with which a fit leaves out the most: what few ones have come to is worth less."""
-
 TURNS = 5
 """In which the number of shapes grows from where it goes on, at the least: many at a time find bad places.
 Runs of few steps have fewer, and begin anew.
@@ -122,8 +119,7 @@ def begin_of(settings: Settings, shapes: int) -> int:
         return 0
     growth = math.log(density.surplus / density.start)
     missing = math.log(density.surplus * settings.curves / shapes) / growth if growth > 0 else 0.0
-    least = BEGIN[1] if shapes >= MANY else BEGIN[0]
-    share = min(max(density.grown * (1 - missing), least), BEGIN[1])
+    share = min(max(density.grown * (1 - missing), BEGIN[0]), BEGIN[1])
     latest = max(density.grown * steps - TURNS * density.interval, 0)
     return round(min(share * steps, latest)) // density.interval * density.interval
 

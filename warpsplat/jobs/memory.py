@@ -58,8 +58,13 @@ what a file adds that is not drawn in strips."""
 EYES = 500
 """Of a pixel, to measure SSIMULACRA2."""
 
-REFINED = 150
-"""Of a pixel of the image that an SVG is refined against: pictures of what was given and of what was read."""
+REFINED = 40
+"""Of a pixel of the image that an SVG is refined against, besides: pictures of what was given and of what was
+read, a file that is not drawn in strips, and the image on a colour."""
+
+CLEARED = 150
+"""Of a pixel of an image with opacity that an SVG is refined against, of whose size is what finds pixels that
+should be empty (``fit.clear``)."""
 
 SHARE = 0.9
 """Of the machine's memory, where no limit is given: others are there."""
@@ -204,6 +209,13 @@ def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1, mask
     return factor
 
 
+def need_refined(facts: Facts, settings: Settings) -> int:
+    """What refining an SVG of as many shapes as usual takes [bytes]."""
+    pixels = facts.width * facts.height
+    cleared = PROGRAM + CLEARED * pixels if facts.channels == 4 else 0
+    return max(need(facts, settings).most + REFINED * pixels, cleared)
+
+
 def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
     """Whether there is memory to refine an SVG against an image. That is done at the image's own size:
     whether a result is better is for all of its pixels to say.
@@ -214,7 +226,7 @@ def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
     facts, limit = facts_of(source), memory_limit(settings)
     if facts is None or limit is None:
         return
-    wanted = PROGRAM + REFINED * facts.width * facts.height
+    wanted = need_refined(facts, settings)
     if wanted > limit:
         given = "max-memory is" if settings.max_memory else "memory for it is"
         size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"

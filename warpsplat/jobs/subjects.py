@@ -104,7 +104,7 @@ def draw(
         if count <= low or over():
             break
         if tries:
-            tries.left = min(tries.left - 1, math.log2(high - low))
+            tries.left = max(min(tries.left, math.log2(high - low)) - 1, 0.0)
         made = drawn(count)
         size = _size(made, settings)
         if size <= settings.max_bytes:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
+import numpy as np
 import warp as wp
 
 from warpsplat.kernels import constants
@@ -14,6 +17,10 @@ from warpsplat.rendering.program import Program
 from warpsplat.rendering.tiles import tile_counts
 
 Buffers = TypeVar("Buffers")
+
+LARGE = 1 << 20
+"""Bytes of a CPU array from on which it takes the system's zeroed pages, each when it is first used: many an
+array is made for a need that a scene has not, and clearing them was a third of a drawing's renders."""
 
 THREADS_PER_CORE = 8
 """Most threads that a split launch is cut for: more only wait, and cost memory for pieces and stacks."""
@@ -84,7 +91,17 @@ class Backend:
 
     def array(self, dtype: Any, *shape: int) -> wp.array:
         """A zeroed array."""
-        return wp.zeros(shape, dtype=dtype, device=self.device)
+        size = math.prod(shape) * wp.types.type_size_in_bytes(dtype)
+        if not self.device.is_cpu or size < LARGE:
+            return wp.zeros(shape, dtype=dtype, device=self.device)
+        memory = np.zeros(size, np.uint8)
+        return wp.array(
+            ptr=memory.ctypes.data,
+            dtype=dtype,
+            shape=shape,
+            device=self.device,
+            deleter=functools.partial(_release, memory),
+        )
 
     def allocate(self, buffers: type[Buffers], sizes: Mapping[str, int]) -> Buffers:
         """Zeroed arrays for all fields of a dataclass made of ``buffer`` fields.
@@ -99,6 +116,10 @@ class Backend:
             shape = tuple(sizes[d] if isinstance(d, str) else d for d in dimensions)
             arrays[item.name] = view(arrays[memory], dtype, shape) if memory else self.array(dtype, *shape)
         return buffers(**arrays)
+
+
+def _release(memory: np.ndarray, pointer: int, size: int) -> None:
+    """Keeps the memory of an array as long as Warp has the array, which calls this at its end."""
 
 
 def buffer(dtype: Any, *dimensions: str | int, memory_of: str = "") -> Any:

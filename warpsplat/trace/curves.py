@@ -332,9 +332,9 @@ def _chain(
 def _candidates(spans: list[_Span], pairs: Ints) -> tuple[Floats, Floats, Floats]:
     """A cubic for each pair of knots, its largest error and that of a straight line."""
     starts, ends, ways, backs, samples = [], [], [], [], []
-    for number, group in itertools.groupby(range(len(pairs)), lambda k: int(pairs[k, 0])):
-        rows = pairs[list(group), 1:]
-        span = spans[number]
+    firsts = np.flatnonzero(np.diff(pairs[:, 0], prepend=-1))
+    for first, rows in zip(firsts.tolist(), np.split(pairs[:, 1:], firsts[1:]), strict=True):
+        span = spans[int(pairs[first, 0])]
         starts.append(span.knots[rows[:, 0]])
         ends.append(span.knots[rows[:, 1]])
         ways.append(span.tangents[rows[:, 0]])

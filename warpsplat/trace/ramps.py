@@ -130,12 +130,19 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     """Values at ``knots`` of the broken line nearest to the colours, a little stiff where nothing is."""
     low = np.clip(np.searchsorted(knots, t, "right") - 1, 0, len(knots) - 2)
     share = (t - knots[low]) / (knots[low + 1] - knots[low])
-    rows = np.zeros((len(t), len(knots)))
-    rows[np.arange(len(t)), low] = 1 - share
-    rows[np.arange(len(t)), low + 1] = share
+    count = len(knots)
+
+    def sums(weights: Floats) -> Floats:
+        return np.asarray(np.bincount(low, weights, count), np.float64)
+
+    # What is at t is a share of two knots that are neighbours: the sums of products are three diagonals.
+    beside = sums(share * (1 - share))[:-1]
+    here = sums((1 - share) ** 2) + np.roll(sums(share**2), 1)
+    right = np.stack([sums((1 - share) * c) + np.roll(sums(share * c), 1) for c in colors.T], axis=1)
     stiff = 1e-3 * np.diff(np.eye(len(knots)), n=2, axis=0) if len(knots) > 2 else np.zeros((0, len(knots)))
-    matrix = rows.T @ rows + len(t) * (stiff.T @ stiff) + 1e-9 * np.eye(len(knots))
-    return np.asarray(np.linalg.solve(matrix, rows.T @ colors))
+    matrix = np.diag(here) + np.diag(beside, 1) + np.diag(beside, -1)
+    matrix += len(t) * (stiff.T @ stiff) + 1e-9 * np.eye(count)
+    return np.asarray(np.linalg.solve(matrix, right))
 
 
 def _fewest(knots: Floats, values: Floats) -> Floats:

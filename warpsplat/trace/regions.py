@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, Sets, linked_parts
+from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, Sets, largest, linked_parts
 from warpsplat.trace.mixtures import REACH, explain
 from warpsplat.trace.ramps import Ramp, fit_ramp
 from warpsplat.trace.seeds import find_seeds, noise_of
@@ -209,13 +209,9 @@ def _modes(image: Floats, labels: Ints, count: int) -> Floats:
 
 def _sums(values: Floats, labels: Ints, count: int) -> Floats:
     inside = labels >= 0
-    return np.stack(
-        [
-            np.bincount(labels[inside], values[inside][:, c], count).astype(np.float64)
-            for c in range(values.shape[2])
-        ],
-        axis=1,
-    )
+    owners = labels[inside]
+    sums = [np.bincount(owners, values[..., c][inside], count) for c in range(values.shape[2])]
+    return np.stack(sums, axis=1).astype(np.float64)
 
 
 def _palette(image: Floats, labels: Ints, noise: float) -> tuple[Ints, Ints, list[Coloring]]:
@@ -223,13 +219,13 @@ def _palette(image: Floats, labels: Ints, noise: float) -> tuple[Ints, Ints, lis
     count = int(labels.max()) + 1
     if count <= 0:
         count, labels = 1, np.zeros(labels.shape, np.int32)
-    sizes = np.maximum(np.bincount(labels[labels >= 0], minlength=count), 1)
+    inside = labels >= 0
+    owners = labels[inside]
+    sizes = np.maximum(np.bincount(owners, minlength=count), 1)
     means = _sums(image, labels, count) / sizes[:, None]
     modes = _modes(image, labels, count)
-    inside = labels >= 0
-    off = np.zeros(labels.shape, np.float32)
-    off[inside] = np.abs(image[inside] - modes[labels[inside]]).max(axis=1)
-    square = np.bincount(labels[inside], off[inside].astype(np.float64) ** 2, count) / sizes
+    off = largest(np.abs(image[inside] - modes[owners])).astype(np.float32)
+    square = np.bincount(owners, off.astype(np.float64) ** 2, count) / sizes
     uneven = np.sqrt(square) > RAMP + 3 * noise
     flat_colors = modes if noise == 0 else means
     paint = np.full(count, NOBODY, np.int32)
