@@ -12,8 +12,10 @@ import numpy as np
 from warpsplat.trace.grids import Bools, Floats
 from warpsplat.trace.ink import Ink
 
-FINE = 4
-"""Pixels on a pixel's side where ink and lines are compared."""
+FINE, ROOM = 4, 16_000_000
+"""Pixels on a pixel's side where ink and lines are compared, and how many there may be; a large picture has
+fewer on a side.
+"""
 
 DEEP, SHARE = 0.8, 0.09
 """Half the width of bare ink from which on it is seen [px], and over the width of the broadest dot."""
@@ -61,15 +63,16 @@ def round_dots(ink: Ink, width: float) -> tuple[list[Dot], Bools]:
     Returns:
         the dots, and the pixels that they cover, shape (height, width).
     """
-    inside = _inked(ink)
+    fine = _fineness(ink)
+    inside = _inked(ink, fine)
     depth = _depth(inside)
-    radius = 0.5 * max(BROADER * width, LEAST) * FINE
+    radius = 0.5 * max(BROADER * width, LEAST) * fine
     core = depth > radius
     wide = (inside & (_depth(~core) <= radius)).astype(np.uint8) if core.any() else core.astype(np.uint8)
     _, parts, boxes, _ = cv2.connectedComponentsWithStats(wide)
     dots, covered = [], np.zeros(wide.shape, np.uint8)
     for number, (left, top, across, down, _) in enumerate(boxes.tolist()):
-        if number == 0 or number > MOST or min(across, down) > FINE * max(BROADEST * width, BROAD_DOT):
+        if number == 0 or number > MOST or min(across, down) > fine * max(BROADEST * width, BROAD_DOT):
             continue
         box = (slice(top, top + down), slice(left, left + across))
         own = parts[box] == number
@@ -81,7 +84,7 @@ def round_dots(ink: Ink, width: float) -> tuple[list[Dot], Bools]:
         if _goes_on(depth, ends, thick):
             continue
         _stroke(covered, ends, thick)
-        dots.append(Dot((ends + 0.5) / FINE, thick / FINE))
+        dots.append(Dot((ends + 0.5) / fine, thick / fine))
     return dots, cv2.resize(covered, ink.mask.shape[::-1], interpolation=cv2.INTER_AREA) > 0
 
 
@@ -135,29 +138,30 @@ def bare_dots(ink: Ink, lines: list[tuple[Floats, Floats, bool]], broadest: floa
         lines: places [px], widths [px], and whether the last place joins the first.
         broadest: width of a dot [px], at the most.
     """
-    inside = _inked(ink)
-    bare = (inside & (_drawn(lines, inside.shape) == 0)).astype(np.uint8)
+    fine = _fineness(ink)
+    inside = _inked(ink, fine)
+    bare = (inside & (_drawn(lines, inside.shape, fine) == 0)).astype(np.uint8)
     found: list[Dot] = []
     depth = _depth(inside)
-    least = max(DEEP, SHARE * broadest) * FINE
+    least = max(DEEP, SHARE * broadest) * fine
     _, parts, boxes, _ = cv2.connectedComponentsWithStats((_depth(bare > 0) > least).astype(np.uint8))
     for number, (left, top, width, height, _) in enumerate(boxes.tolist()):
         if number == 0 or len(found) >= MOST:
             continue
-        reach = math.ceil(broadest * FINE)
+        reach = math.ceil(broadest * fine)
         rows = slice(max(0, top - reach), top + height + reach)
         columns = slice(max(0, left - reach), left + width + reach)
         own = parts[rows, columns] == number
         for _ in range(ROUNDS):
-            place = _dot(bare[rows, columns], own, depth[rows, columns], least, 0.5 * broadest * FINE)
+            place = _dot(bare[rows, columns], own, depth[rows, columns], least, 0.5 * broadest * fine)
             if place is None:
                 break
             x, y, radius = place
             window = np.ascontiguousarray(bare[rows, columns])
             cv2.circle(window, (x, y), round(radius), 0, -1)
             bare[rows, columns] = window
-            at = np.array([columns.start + x + 0.5, rows.start + y + 0.5]) / FINE
-            found.append(Dot(np.stack([at, at]), 2 * radius / FINE))
+            at = np.array([columns.start + x + 0.5, rows.start + y + 0.5]) / fine
+            found.append(Dot(np.stack([at, at]), 2 * radius / fine))
     return found
 
 
@@ -178,20 +182,25 @@ def _dot(
     return int(column), int(row), float(best[row, column])
 
 
-def _inked(ink: Ink) -> Bools:
+def _fineness(ink: Ink) -> int:
+    """Pixels of the fine grid on a pixel's side."""
+    return max(1, min(FINE, math.isqrt(ROOM // ink.mask.size)))
+
+
+def _inked(ink: Ink, fine: int) -> Bools:
     """Where ink is, on the fine grid."""
-    size = (ink.mask.shape[1] * FINE, ink.mask.shape[0] * FINE)
+    size = (ink.mask.shape[1] * fine, ink.mask.shape[0] * fine)
     near = cv2.dilate(ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     cover = cv2.resize(np.where(near, ink.cover, 0), size, interpolation=cv2.INTER_CUBIC)
     return np.asarray(cover > 0.5, np.bool_)
 
 
-def _drawn(lines: list[tuple[Floats, Floats, bool]], shape: tuple[int, int]) -> np.ndarray:
+def _drawn(lines: list[tuple[Floats, Floats, bool]], shape: tuple[int, int], fine: int) -> np.ndarray:
     """Where strokes are, on the fine grid."""
     drawn = np.zeros(shape, np.uint8)
     for points, widths, closed in lines:
-        places = np.round(points * FINE - 0.5).astype(np.int32)
-        thick = np.maximum(1, np.round(widths * FINE)).astype(np.int32).tolist()
+        places = np.round(points * fine - 0.5).astype(np.int32)
+        thick = np.maximum(1, np.round(widths * fine)).astype(np.int32).tolist()
         pairs = range(-1 if closed else 0, len(places) - 1)
         for i in pairs:
             cv2.line(drawn, tuple(places[i].tolist()), tuple(places[i + 1].tolist()), 1, thick[i])
@@ -201,4 +210,4 @@ def _drawn(lines: list[tuple[Floats, Floats, bool]], shape: tuple[int, int]) -> 
 def _depth(inside: np.ndarray) -> Floats:
     """Distance of each pixel from those not inside."""
     padded = np.pad(inside, 1).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1], np.float64)
+    return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1], np.float32)
