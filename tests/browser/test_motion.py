@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,11 @@ import pytest
 from PIL import Image
 
 from tests.motion.helpers import recording
+from tests.scenes import mixed_scene
 from warpsplat import Recorder, Result
 from warpsplat.motion.timing import HOLD
+from warpsplat.scene import Basis, Kind
+from warpsplat.scene.geometry import bounds
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -68,6 +72,49 @@ def test_an_svg_plays_in_an_image(
     tab.emulate_media(reduced_motion="reduce")
     tab.goto((tmp_path / "a.svg").as_uri())
     assert np.array_equal(shot(tab, "svg"), file)
+
+
+def at(tab: Page, seconds: float) -> np.ndarray:
+    """What an SVG shows at a time."""
+    tab.evaluate(
+        """time => {
+            const svg = document.documentElement;
+            svg.pauseAnimations();
+            svg.setCurrentTime(time);
+            for (const play of document.getAnimations()) {
+                play.pause();
+                play.currentTime = 1000 * time;
+            }
+        }""",
+        seconds,
+    )
+    return shot(tab, "svg")
+
+
+def test_a_shape_is_between_its_places(tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path) -> None:
+    """And between its colours; what comes is half there."""
+    scene = replace(mixed_scene(48, 36), opacities=np.ones(len(mixed_scene()), np.float32))
+    one = scene.take(np.flatnonzero((scene.kind == Kind.FILL) & (scene.basis == Basis.SPLINE))[:1])
+    box = bounds(one)[0]
+    centre, size = (box[:2] + box[2:]) / 2, (box[2:] - box[:2]).min()
+    disc = replace(one, points=(one.points - centre) * 8 / size + np.float32(18), colors=one.colors * 0)
+    moved = replace(
+        disc,
+        points=disc.points + np.array([3, 0], np.float32),
+        colors=disc.colors + np.array([0.2, 0, 0], np.float32),
+    )
+    comes = moved.append(replace(disc, points=disc.points + np.array([20, 0], np.float32)))
+    white = replace(disc.canvas, background=np.ones(3, np.float32))
+    made = Recorder()
+    made.scenes = [replace(made, canvas=white) for made in (disc, moved, comes, comes)]
+    made.moments = list(range(4))
+    made.save(tmp_path / "a.svg", replace(recorded[1], scene=made.scenes[-1]), what="training", seconds=3)
+    tab.goto((tmp_path / "a.svg").as_uri())
+    dark = [(at(tab, time) < 200)[..., 1].nonzero()[1].mean() for time in (0.01, 0.5, 0.99)]
+    assert np.diff(dark) == pytest.approx(1.5, abs=0.4)
+    assert at(tab, 0.5)[18, 19] == pytest.approx([25, 0, 0], abs=8)
+    assert at(tab, 1.5)[18, 38] == pytest.approx(128, abs=20)
+    assert at(tab, 2.5)[18, 38] == pytest.approx(0, abs=8)
 
 
 @pytest.mark.parametrize("ending", ["webp", "gif"])

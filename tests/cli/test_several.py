@@ -221,28 +221,45 @@ def test_a_suggestion_in_words(
 ) -> None:
     from warpsplat.cli import run as runs
 
-    made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
+    made = suggestion(Worth(16, 1024, 256, 26.0, 1.0, 0.0, 64.0))
     monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == f"{image}: {made.curves} shapes"
-    assert any(line.startswith("  ->") and "+2.0 dB for" in line for line in lines)
+    assert any(line.startswith("  ->") and "+1.0 dB for" in line for line in lines)
     assert lines[-1].strip() == f"warpsplat vectorize {image} --curves {made.curves} -o photo.svg"
 
 
 def test_the_suggestion_is_the_knee() -> None:
     made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
-    assert made.by_shapes == made.by_bytes == made.curves == 240
-    assert "twice as many 2.0 dB more" in made.why and "up to 240 shapes it buys more" in made.why
-    assert [one.shapes for one in made.expected] == [60, 120, 240, 480, 960]
+    # Decibels a shape are 2 / (shapes ln 2): a hundred buy half of one at 577, 10 kB (156 shapes) at 902.
+    assert (made.by_shapes, made.by_bytes, made.curves) == (580, 900, 580)
+    assert "Up to there 100 more buy 0.5 dB at least" in made.why
+    assert [one.shapes for one in made.expected] == [145, 290, 580, 1024]
+    assert all(
+        one.psnr == pytest.approx(26 + 2 * np.log2(one.shapes / 256), abs=0.01) for one in made.expected
+    )
+
+
+def test_pictures_that_gain_less_are_worth_fewer_shapes() -> None:
+    little, heavy = Worth(16, 1024, 256, 20.0, 0.8, 0.0, 64.0), Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0)
+    assert suggestion(little).curves == 230
+    made = suggestion(heavy)
+    assert (made.by_shapes, made.by_bytes, made.curves) == (580, 290, 290)
+    assert "10 kB more buy 0.5 dB" in made.why and "twice as many 2.0 dB more" in made.why
 
 
 @pytest.mark.parametrize(
     ("worth", "curves", "words"),
     [
         (Worth(7, 7, 7, 20.0, 0.0, 0.0, 64.0), 7, "no room for more than 7 shapes"),
-        (Worth(16, 99, 99, 20.0, 0.0, 0.0, 64.0), 16, "more are expected to add nothing"),
+        (Worth(16, 99, 99, 20.0, 0.0, 0.0, 64.0), 16, "100 more buy less than 0.5 dB"),
+        (
+            Worth(16, 99, 99, 20.0, 2.0, 0.0, 64.0),
+            99,
+            "All the way to 99 shapes 100 more buy 0.5 dB at least",
+        ),
         (Worth(16, 32, 32, 99.0, 2.0, 0.0, 64.0), 16, "more are expected to add nothing"),
     ],
 )

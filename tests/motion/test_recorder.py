@@ -67,19 +67,19 @@ def test_a_film_ends_with_the_file(
     assert not may_replace(path), "somebody else's"
 
 
-def test_an_svg_turns_pages_and_is_the_file_without_them(recorded: Recorded, tmp_path: Path) -> None:
+def test_an_svg_moves_and_is_the_file_where_nothing_does(recorded: Recorded, tmp_path: Path) -> None:
     made, result = recorded
     path = tmp_path / "a.svg"
     made.save(path, result)
     text = path.read_text()
     assert may_replace(path)
-    assert text.count('class="p"') == len(made.scenes)
+    assert text.count('<animate attributeName="d"') >= len(result.scene) / 2
     assert "<script" not in text and "prefers-reduced-motion" in text
     assert np.array_equal(np.asarray(render_own(text)), np.asarray(render_own(result.svg)))
-    # A viewer that shows a page sees the scene of then.
-    page = re.sub(r"<style>.*</style>", "", text.partition('<g class="e">')[0] + "</svg>")
-    first = page.partition("</g>\n")[0] + "</g></svg>"
-    assert psnr(on_white(render_own(first)), on_white(render_own(result.svg))) < 40
+    # What moves ends where the run did.
+    moving = re.sub(r"<style>.*</style>", "", text.partition('<g class="e">')[0] + "</svg>")
+    moving = re.sub(r'<path[^>]*forwards".*', "", moving)  # what goes before the end
+    assert psnr(on_white(render_own(moving)), on_white(render_own(result.svg))) > 28
 
 
 def snapshots(made: Recorder, scenes: list[Scene]) -> None:
@@ -89,7 +89,7 @@ def snapshots(made: Recorder, scenes: list[Scene]) -> None:
         made(Progress(step, len(scenes), 20.0, 0.0, 0.0, True, len(scene), now))
 
 
-def test_pages_keep_their_gradients_apart(recorded: Recorded, tmp_path: Path) -> None:
+def test_gradients_are_kept_apart(recorded: Recorded, tmp_path: Path) -> None:
     """And those of a run on a smaller image fill the picture."""
     scene = with_gradients(mixed_scene(48, 36))
     small = replace(enlarged(scene, 1, 24, 18), points=scene.points / 2, frames=scene.frames / 2)
@@ -101,7 +101,7 @@ def test_pages_keep_their_gradients_apart(recorded: Recorded, tmp_path: Path) ->
     assert len(names) > 3 and len(names) == len(set(names))
     assert set(re.findall(r"url\(#([^)]*)\)", text)) == set(names)
     scales = [float(scale) for scale in re.findall(r"scale\(([\d.]+)\)", text)]
-    assert scales[0] == pytest.approx(scales[1] * 2, rel=0.01) or len(set(scales)) == 1
+    assert scales[1:] == [1] * (len(scales) - 1), "each has about as many units, within those of the whole"
 
 
 def test_what_is_kept_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""How many shapes an image is worth: the knee of its quality against shapes and bytes."""
+"""How many shapes an image is worth: as many as still buy what can be seen, with their bytes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.knee import knee
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
@@ -29,6 +28,14 @@ TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 SAMPLES = 513
 """Numbers of shapes among which the knee is looked for."""
+
+SEEN = 0.5
+"""Decibels from which on an eye tells two pictures apart: a rule of thumb of image coding."""
+
+MORE_SHAPES, MORE_BYTES = 100, 10_000
+"""That are to buy as much. It is one price for all pictures: their quality grows about evenly with doublings,
+and by the mean slope of each one's own curve (Satopää et al. 2011) all would get the same number.
+"""
 
 EXACT = 58.0
 """Decibels at which a picture of 8 bits a channel has no error but that of rounding."""
@@ -140,22 +147,22 @@ def suggest_curves(
 
 def suggestion(worth: Worth) -> Suggestion:
     """What is suggested: the fewer shapes of its two knees, or the fewest where more are worth nothing."""
-    shapes = np.geomspace(worth.fewest, worth.most, SAMPLES)
-    quality, sizes = worth.psnr(shapes), worth.size(shapes)
-    found = [knee(cost, quality) for cost in (shapes, sizes)]
-    by_shapes, by_bytes = (None if at is None else rounded(float(shapes[at])) for at in found)
-    known = [number for number in (by_shapes, by_bytes) if number is not None]
-    chosen, why = worth.fewest, ""
-    if worth.fewest == worth.most:
-        why = f"The picture is so small that there is no room for more than {worth.most} shapes."
-    elif not known or quality[0] > EXACT:
-        why = f"{expect(worth, chosen)}; more are expected to add nothing that can be seen."
-    else:
-        chosen = min(known)
-        why = reason(worth, chosen)
+    by_shapes, by_bytes = knee(worth, MORE_SHAPES), knee(worth, MORE_BYTES / worth.bytes_each)
+    chosen = min(by_shapes, by_bytes)
+    why = reason(worth, chosen, "100 more" if by_shapes <= by_bytes else "10 kB more")
     rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in TABLE})
     expected = tuple(expect(worth, row) for row in rows)
     return Suggestion(chosen, "photo", why, expected, by_shapes, by_bytes, 0.0)
+
+
+def knee(worth: Worth, more: float) -> int:
+    """The most shapes at which ``more`` of them buy ``SEEN``, at the rate there; the fewest if none do."""
+    shapes = np.geomspace(worth.fewest, worth.most, SAMPLES)
+    if worth.fewest == worth.most:
+        return worth.most
+    rate = np.gradient(np.minimum(worth.psnr(shapes), EXACT), shapes)
+    at = np.flatnonzero(more * rate >= SEEN)
+    return min(rounded(float(shapes[at[-1]])), worth.most) if len(at) else worth.fewest
 
 
 def expect(worth: Worth, shapes: int) -> Expected:
@@ -163,19 +170,25 @@ def expect(worth: Worth, shapes: int) -> Expected:
     return Expected(shapes, round(float(worth.psnr(shapes)), 2), round(float(worth.size(shapes))))
 
 
-def reason(worth: Worth, chosen: int) -> str:
-    """Why it is this number, which is at the knee."""
+def reason(worth: Worth, chosen: int, more: str) -> str:
+    """Why it is this number; ``more``: what buys less from there on."""
+    if worth.fewest == worth.most:
+        return f"The picture is so small that there is no room for more than {worth.most} shapes."
     one, two = expect(worth, chosen), expect(worth, 2 * chosen)
+    if one.psnr > EXACT:
+        return f"{one}; more are expected to add nothing that can be seen."
     first = str(one)
     if 2 * chosen <= worth.most:
-        more = (two.bytes - one.bytes) / 1000
-        first += f", and twice as many {two.psnr - one.psnr:.1f} dB more for {more:.0f} kB more"
-    fewest, most = expect(worth, worth.fewest), expect(worth, worth.most)
-    average = (most.psnr - fewest.psnr) / ((most.bytes - fewest.bytes) / 1000)
-    return (
-        f"{first}. From {worth.fewest} to {worth.most:,} shapes a kB buys {average:.2g} dB on the average: "
-        f"up to {chosen} shapes it buys more, beyond them less. This is the knee."
-    )
+        size = (two.bytes - one.bytes) / 1000
+        first += f", and twice as many {two.psnr - one.psnr:.1f} dB more for {size:.0f} kB more"
+    if chosen >= worth.most:
+        return (
+            f"{first}. All the way to {worth.most:,} shapes {more} buy {SEEN} dB at least, which can be seen."
+        )
+    if chosen == worth.fewest:
+        return f"{first}. From there on {more} buy less than {SEEN} dB, which can hardly be seen."
+    seen = f"{more} buy {SEEN} dB at least, which can be seen"
+    return f"{first}. Up to there {seen}, beyond it less. This is the knee."
 
 
 def rounded(number: float) -> int:

@@ -1,22 +1,25 @@
-"""How the shapes came to be: the scenes of a run as pictures, or as an SVG that turns its own pages."""
+"""How the shapes came to be: the scenes of a run as pictures, or as an SVG that moves."""
 
 from __future__ import annotations
 
+import functools
+import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from warpsplat.fit.export import export
+from warpsplat.fit.export import export, shown_paths
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.result import Result
+from warpsplat.motion import moving
 from warpsplat.motion.films import Frame, ticks_of, zoom_of
 from warpsplat.motion.painter import Painter
 from warpsplat.motion.shown import picture, screen, size_of
-from warpsplat.motion.timing import showings
+from warpsplat.motion.timing import kept, showings
 from warpsplat.rendering.backend import Backend
-from warpsplat.scene import Scene
-from warpsplat.svg.numbers import number
-from warpsplat.svg.write import GRIDS, MARK
+from warpsplat.scene import Canvas, Scene
+from warpsplat.svg.numbers import hex_colors, number
+from warpsplat.svg.write import GRIDS, MARK, write_svg
 
 
 def pictures(
@@ -57,59 +60,70 @@ def page(scene: Scene, result: Result, per_pixel: float) -> str:
 
 # An SVG.
 
-MOST_PAGES = 20
+MOST_KEYS = 20
 """Scenes in an SVG."""
 
-FEWEST_PAGES = 6
+FEWEST_KEYS = 6
 
 MOST_TEXT = 3 << 20
-"""Of these scenes [bytes], where that leaves ``FEWEST_PAGES``."""
+"""Of these scenes [bytes], where that leaves ``FEWEST_KEYS``."""
 
 UNITS = 1000
-"""Of the view box of a scene in between, along its longer side, at the least: it is seen for a moment."""
+"""Of the coordinates of what moves, along the longer side, at the least: it is seen for a moment."""
 
-FADE = 0.6
-"""Share of a page's time in which it comes, over the one before it."""
+FADE = 0.3
+"""Time in which the file comes over what moved [s], in place of which it then is."""
 
 STYLE = (
-    "<style>"
-    ".p{{visibility:hidden;animation:i {fade}s both,o 1ms forwards}}"
-    ".e{{animation:e {fade}s {end}s both}}"
-    "@keyframes i{{from{{opacity:0;visibility:hidden}}1%{{visibility:visible}}"
-    "to{{opacity:1;visibility:visible}}}}"
-    "@keyframes o{{to{{visibility:hidden}}}}"
+    ".m{{visibility:hidden;animation:m {end}s}}"
+    ".e{{animation:e {fade}s {start}s backwards}}"
+    "@keyframes m{{from,to{{visibility:visible}}}}"
     "@keyframes e{{from{{opacity:0}}}}"
-    "@media(prefers-reduced-motion:reduce){{.p{{display:none}}.e{{animation:none}}}}"
-    "</style>"
+    "@media(prefers-reduced-motion:reduce){{.m{{display:none}}.e{{animation:none}}}}"
 )
 
 
 def vector(scenes: Sequence[Scene], moments: Sequence[int], result: Result, seconds: float) -> str:
-    """An SVG that shows scenes of the run, each coming over the one before it, and then stays the file.
+    """An SVG whose shapes move as they did in the run, and that then stays the file.
 
-    It is played by style sheets alone, once, also in ``<img>``. Where nothing is animated, or readers ask for
-    less motion, it is the file. Pages, not shapes that move: as a run goes on a tenth of the shapes is placed
-    anew every 25 steps, so that few could be followed, and paths that change take as many bytes as new ones.
+    It plays once, also in ``<img>``, without a script: shapes go their ways by SMIL, style sheets show
+    them and then the file. Where nothing is animated, or readers ask for less motion, it is the file.
     """
     end = finished(result)
     head, inside = _parts(end)
-    count = max(FEWEST_PAGES, min(MOST_PAGES, MOST_TEXT // max(1, len(end))))
-    shown = showings(moments, count, seconds)
-    box = [float(value) for value in VIEW_BOX.findall(head)[0].split()]
-    pages, now = [], 0.0
-    fade = FADE * seconds / count
-    for number_of, showing in enumerate(shown):
-        starts, now = now, now + showing.seconds
-        scene = scenes[showing.index]
-        per_pixel = _coarse(scene)
-        zoom = box[2] / (scene.canvas.width * per_pixel)
-        times = f"{number(starts, 2)}s,{number(now + fade, 2)}s"
-        pages.append(
-            f'<g class="p" style="animation-delay:{times}" transform="scale({zoom:.9g})">'
-            f"{_named(_parts(page(scene, result, per_pixel))[1], f'p{number_of}')}</g>\n"
-        )
-    style = STYLE.format(fade=number(fade, 3), end=number(now, 2))
-    return f'{head}{MARK}-->\n{style}\n{"".join(pages)}<g class="e">{inside}</g></svg>\n'
+    count = max(FEWEST_KEYS, min(MOST_KEYS, MOST_TEXT // max(1, len(end))))
+    keys = kept(moments, count)
+    settings, canvas = Settings(renderer=result.renderer), result.scene.canvas
+    units = canvas.width * _coarse(canvas)
+    shown = [shown_paths(scene, settings) for scene in scenes[: keys[-1] + 1]]
+    box = float(VIEW_BOX.findall(head)[0].split()[2])
+    height = number(units * canvas.height / canvas.width, 0)
+    behind = ""
+    if canvas.background is not None:
+        fill = hex_colors(canvas.background[None])[0]
+        behind = f'<rect width="{number(units, 0)}" height="{height}" fill="{fill}"/>\n'
+    tick = seconds / max(1, len(keys) - 1)
+    shapes, rules = moving.elements(shown, keys, tick, units, _still(units))
+    style = STYLE.format(start=number(seconds, 2), fade=number(FADE, 2), end=number(seconds + FADE, 2))
+    group = f'<g class="m" transform="scale({box / units:.9g})">{behind}{shapes}</g>'
+    return f'{head}{MARK}-->\n<style>{style}{rules}</style>\n{group}\n<g class="e">{inside}</g></svg>\n'
+
+
+def _still(width: float) -> Callable[[Scene], str]:
+    """What gives the markup of scenes on a canvas of ``width`` units; the same for the same ones."""
+    names = itertools.count()
+
+    @functools.cache
+    def apart(markup: str) -> str:
+        return _named(markup, f"p{next(names)}-")
+
+    def still(scene: Scene) -> str:
+        grid = _coarse(scene.canvas)
+        markup = _parts(write_svg(scene, per_pixel=grid, background=False))[1]
+        zoom = number(width / (scene.canvas.width * grid), 6)
+        return f'<g transform="scale({zoom})">{apart(markup)}</g>'
+
+    return still
 
 
 VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
@@ -131,7 +145,7 @@ def _named(text: str, prefix: str) -> str:
     return re.sub(r'(url\(#|href="#)', rf"\g<1>{prefix}", text)
 
 
-def _coarse(scene: Scene) -> float:
-    """Units a pixel of a scene that is seen for a moment."""
-    side = max(scene.canvas.width, scene.canvas.height)
+def _coarse(canvas: Canvas) -> float:
+    """Units a pixel of what is seen for a moment."""
+    side = max(canvas.width, canvas.height)
     return next((units for units in GRIDS if units * side >= UNITS), GRIDS[-1])

@@ -156,18 +156,37 @@ def spline_data(half: list[Pair], closed: bool, *, turns: bool = True) -> str:
         closed: whether they are a ring.
         turns: whether a ring is written from where that takes the fewest characters.
     """
-    if closed:
-        start = _cheapest_start(half) if turns else 0
-        ring = half[start:] + half[:start]
-        ring = [ring[-1], *ring, ring[0]]
-    else:
-        ring = half
+    if closed and turns:
+        start = _cheapest_start(half)
+        half = half[start:] + half[:start]
+    joints, control = _joints(half, closed)
+    if max(abs(value) for joint in joints for value in joint) <= SMALL:
+        return shortest_smooth(joints, control)
+    return _relative(joints, control)
+
+
+def even_spline_data(half: list[Pair], closed: bool) -> str:
+    """As ``spline_data``, with commands that depend on the number of points alone."""
+    return _relative(*_joints(half, closed))
+
+
+def even_cubic_data(grid: list[Pair], closed: bool) -> str:
+    """As ``cubic_data``, with commands that depend on the number of points alone; rings are not closed."""
+    chain = [*grid, grid[0]] if closed else grid
+    ways = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
+    return f"M{integers(grid[:1])}c{integers(ways)}"
+
+
+def _joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
+    """Where the quadratics of a spline meet, and the first one's control point."""
+    ring = [half[-1], *half, half[0]] if closed else half
     joints = [(a + c, b + d) for (a, b), (c, d) in itertools.pairwise(ring)]
     if not closed:
         joints = [(2 * half[0][0], 2 * half[0][1]), *joints[1:-1], (2 * half[-1][0], 2 * half[-1][1])]
-    control = (2 * ring[1][0], 2 * ring[1][1])
-    if max(abs(value) for joint in joints for value in joint) <= SMALL:
-        return shortest_smooth(joints, control)
+    return joints, (2 * ring[1][0], 2 * ring[1][1])
+
+
+def _relative(joints: list[Pair], control: Pair) -> str:
     steps = [minus(after, before) for before, after in itertools.pairwise(joints)]
     text = f"M{integers(joints[:1])}q{integers([minus(control, joints[0]), steps[0]])}"
     return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text
