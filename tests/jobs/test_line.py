@@ -127,6 +127,39 @@ def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
     assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
 
 
+def test_a_line_thinner_than_a_pixel_is_one_thin_stroke(device: str) -> None:
+    image = drawn('<path d="M8 10L88 31" stroke-width=".4"/><path d="M8 50H88"/><path d="M8 60H88"/>')
+    result = lines_of(image, device)
+    assert len(result.scene) == 3
+    assert sorted(result.scene.widths.round(1).tolist())[0] < 0.7
+
+
+@pytest.mark.parametrize("radius", [1.5, 4, 8])
+def test_dots_are_strokes_of_no_length(radius: float, device: str) -> None:
+    image = drawn(
+        f'<circle cx="30.3" cy="30.4" r="{radius}" fill="#000" stroke="none"/><path d="M8 60H88M60 10V50"/>'
+    )
+    result = lines_of(image, device)
+    assert (result.scene.kind == Kind.STROKE).all()
+    assert len(result.scene) == 3
+    assert result.score
+    assert result.score.psnr > 30
+
+
+def test_dots_alone(device: str) -> None:
+    result = lines_of(drawn('<circle cx="30" cy="30" r="6" fill="#000" stroke="none"/>'), device)
+    assert result.score
+    assert result.score.psnr > 26
+
+
+def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
+    image = drawn('<path d="M8 36H70"/><path d="M66 28L82 36L66 44Z" fill="#000" stroke="none"/>')
+    painted = shown(lines_of(on_clear(image), device).svg)
+    ink = 1 - image[..., 0]
+    assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
+    assert np.clip(painted - ink, 0, None).sum() < 0.03 * painted.sum()
+
+
 def test_tours_cost_by_how_thoroughly_they_are_sought() -> None:
     costs = [tour_cost(count) for count in (0, 20, FEW, MANY)]
     assert costs == sorted(costs) and costs[0] == 0 < costs[1]

@@ -40,6 +40,9 @@ TOUR_STROKE, TOUR_PAIR = 0.3, 0.0021
 LONG_STROKE, LONG_PAIR = 0.25, 0.00006
 """The same of a tour of many strokes, which is improved once."""
 
+THIN = 1.0
+"""Width below which a stroke keeps it [px]: the least of a training."""
+
 FINE_PIXELS = 1_000_000
 """Largest size of the image that the refinement sees [pixels]."""
 
@@ -124,7 +127,9 @@ def _fitted(
         stop=stop,
         stages=stages,
     )
-    scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas)
+    # A training knows no strokes thinner than a pixel; how wide they are was measured.
+    widths = np.where(lines.widths < THIN, lines.widths, made.scene.widths)
+    scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
     return replace(made, scene=toured(rejoined(lines, scene)))
 
 

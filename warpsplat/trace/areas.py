@@ -40,10 +40,6 @@ class Areas:
     def __len__(self) -> int:
         return int(self.labels.max())
 
-    def away(self) -> Floats:
-        """Distance of each pixel from them [px], shape (height, width)."""
-        return _away(self.labels > 0)
-
     def color(self, shown: FloatArray, numbers: Ints) -> FloatArray:
         """The usual colour of some areas, shape (3,).
 
@@ -72,14 +68,14 @@ def parted(ink: Ink) -> tuple[Ink, Areas | None]:
     An area is somewhere much broader than the lines and nowhere as narrow, but for corners and tips.
     """
     width = min(pen_width(ink.mask), 2 * max(LINE, THIN * max(ink.mask.shape)))
-    depth = _away(~np.pad(ink.mask, 1))[1:-1, 1:-1]
+    depth = away_from(~np.pad(ink.mask, 1))[1:-1, 1:-1]
     if (depth <= BROAD * width).all():
         return ink, None
     radius = 0.5 * NARROW * width + 0.5
-    wide = ink.mask & (_away(depth > radius) <= radius)
+    wide = ink.mask & (away_from(depth > radius) <= radius)
     _, parts = cv2.connectedComponents(wide.astype(np.uint8), connectivity=4)
     area = wide & np.isin(parts, np.unique(parts[depth > BROAD * width]))
-    area |= _corners(ink.mask & ~area, _away(area), TIP * width)
+    area |= _corners(ink.mask & ~area, away_from(area), TIP * width)
     lines = ink.mask & ~area
     cover = _cover(ink.shown, area, lines)
     _, labels = cv2.connectedComponents(area.astype(np.uint8), connectivity=8)
@@ -110,7 +106,7 @@ def _around(shown: FloatArray, where: Bools) -> FloatArray:
     return np.asarray(np.where(count > 0.5, sums / np.maximum(count, 1), mean), np.float32)
 
 
-def _away(inside: Bools) -> Floats:
+def away_from(inside: Bools) -> Floats:
     """Distance of each pixel from those inside [px]."""
     return np.asarray(cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5), np.float64)
 

@@ -16,6 +16,9 @@ BROAD = 2.0
 USUAL = 0.75
 """Share of the lines' length that is no broader than what counts as their width: much is texture."""
 
+FILLING = 1.2
+"""Width of the lines that fill areas, at the least [px]."""
+
 OVERLAP = 0.15
 """Of neighbouring rings, over their width."""
 
@@ -36,7 +39,7 @@ def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:
     Returns:
         The ink; closed rings, shape (point, 2) each [px]; and their width [px].
     """
-    width = pen_width(ink.mask)
+    width = max(pen_width(ink.mask), FILLING)
     padded = np.pad(ink.mask, 1).astype(np.uint8)
     away = cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1]
     inner = away > width

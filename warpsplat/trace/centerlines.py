@@ -8,12 +8,14 @@ import cv2
 import numpy as np
 
 from warpsplat.scene import FloatArray
-from warpsplat.trace.areas import Areas, is_beside, parted, reaching
-from warpsplat.trace.blobs import hollowed
-from warpsplat.trace.grids import Floats, Ints
+from warpsplat.trace.areas import Areas, away_from, is_beside, parted, reaching
+from warpsplat.trace.blobs import BROAD, hollowed, pen_width
+from warpsplat.trace.dots import Dot, bare_dots, round_dots, without
+from warpsplat.trace.grids import Bools, Floats, Ints
 from warpsplat.trace.ink import Ink
 from warpsplat.trace.measure import measured
 from warpsplat.trace.pens import find_pens, line_colors
+from warpsplat.trace.ridges import FAINT, across, middles, with_thin
 from warpsplat.trace.skeleton import Edge, Graph, find_graph
 
 STRAIGHT = 50.0
@@ -70,12 +72,18 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Drawing:
     """
     whole = ink
     rings: list[Floats] = []
+    dots: list[Dot] = []
     width, areas = 0.0, None
+    apart: Bools | None = None
     if mixed:
         ink, areas = parted(whole)
+        apart = areas.labels > 0 if areas else None
     else:
-        ink, rings, width = hollowed(whole)
-    outlines, away = (areas.outlines(), areas.away()) if areas else ([], None)
+        if not whole.textured:
+            dots, dotted = round_dots(whole, pen_width(whole.mask))
+            ink, apart = without(whole, dotted), dotted if dots else None
+        ink, rings, width = hollowed(ink)
+    outlines, away = areas.outlines() if areas else [], None if apart is None else away_from(apart)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
     mask = ink.mask if fine == 1 else _enlarged(ink, fine)
     graph, radii = find_graph(mask)
@@ -83,7 +91,7 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Drawing:
         longest = np.argsort([-edge.length() for edge in graph.edges], kind="stable")[:MOST]
         graph = Graph([graph.edges[i] for i in np.sort(longest)], graph.places, graph.radii)
     edges = [edge.points / fine for edge in graph.edges]
-    colors, weights = line_colors([*edges, *rings, *outlines], whole)
+    colors, weights = line_colors([*edges, *rings, *outlines, *(dot.ends for dot in dots)], whole)
     pens, owner = find_pens(colors, weights)
     lines = []
     for chain in _chains(graph, owner):
@@ -91,6 +99,8 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Drawing:
         if line is not None:
             points, widths, closed = line
             points, widths = measured(points / fine, widths / fine, closed, ink.cover)
+            if rings and _is_around(points, whole.cover - ink.cover):
+                widths = np.maximum(widths, width)
             if away is not None and is_beside(points, widths, away):
                 continue
             if away is not None and not closed:
@@ -100,11 +110,35 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Drawing:
     for ring, pen in zip(rings, filled[: len(rings)].tolist(), strict=True):
         points, widths, closed = _smoothed(ring, np.full(len(ring), width), closed=True)
         lines.append(Line(points, widths, closed, pen))
-    area_pens = filled[len(rings) :]
+    area_pens, dot_pens = np.split(filled[len(rings) :], [len(outlines)])
+    lines += [_dot(dot, pen) for dot, pen in zip(dots, dot_pens.tolist(), strict=True)]
+    if len(pens) and not whole.textured:
+        broadest = 2 * BROAD * pen_width(whole.mask)
+        drawn = [(line.points, line.widths, line.closed) for line in lines]
+        for dot in bare_dots(ink if areas else whole, drawn, broadest):
+            lines.append(_dot(dot, _pen_at(dot, whole, pens)))
     if areas:  # which show their colour better than lines do
         for pen in np.unique(area_pens):
             pens[pen] = areas.color(whole.shown, 1 + np.flatnonzero(area_pens == pen))
     return Drawing(lines, pens, areas, area_pens)
+
+
+def _dot(dot: Dot, pen: int) -> Line:
+    return Line(dot.ends, np.full(2, dot.width), False, pen)
+
+
+def _pen_at(dot: Dot, ink: Ink, pens: FloatArray) -> int:
+    """The pen whose colour is the most like that in the middle of a dot."""
+    size = np.array(ink.mask.shape[::-1])
+    column, row = np.clip(dot.ends.mean(axis=0).astype(np.intp), 0, size - 1)
+    return int(np.linalg.norm(pens - ink.shown[row, column], axis=1).argmin())
+
+
+def _is_around(points: Floats, hollow: FloatArray) -> bool:
+    """Whether most of a line is the edge of what is ``hollow``, shape (height, width)."""
+    near = cv2.dilate(hollow, np.ones((5, 5), np.uint8))
+    columns, rows = np.clip(points.T.astype(np.intp), 0, np.array(near.shape[::-1])[:, None] - 1)
+    return bool((near[rows, columns] > 0).mean() > 0.5)
 
 
 FINE = 1100
@@ -117,7 +151,10 @@ def _enlarged(ink: Ink, factor: int) -> np.ndarray:
     cover = cv2.resize(ink.cover, size, interpolation=cv2.INTER_CUBIC)
     held = cv2.resize(cv2.dilate(ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)), size, interpolation=0)
     core = cv2.erode(cv2.resize(ink.mask.astype(np.uint8), size, interpolation=0), np.ones((3, 3), np.uint8))
-    return np.asarray(((cover > 0.5) & (held > 0)) | (core > 0), np.bool_)
+    if ink.textured:
+        return np.asarray(((cover > 0.5) & (held > 0)) | (core > 0), np.bool_)
+    thin = middles(across(ink.cover, factor), FAINT, factor)
+    return with_thin(((cover > 0.5) & (held > 0)) | (core > 0), thin & (held > 0), factor)
 
 
 Chain = list[tuple[int, bool]]

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpsplat.scene import FloatArray
 from warpsplat.trace.grids import Bools
+from warpsplat.trace.ridges import FAINT, NOISY, SURE, across, middles, with_thin
 
 BROAD = 0.05
 """Width from which on what is dark is paper of another colour, over the longer side of the picture."""
@@ -42,8 +43,8 @@ BESIDE = 31
 SOLID = 0.9
 """Contrast with the picture's paper from which on what is broad is ink, over that of lines."""
 
-FULL = 0.7
-"""Contrast of full ink over that of strong ink, at the least."""
+FULL, TEXTURED_FULL = 0.9, 0.7
+"""Contrast of full ink over that of strong ink, at the least; and in a picture that is coloured in."""
 
 TINT, PAINTED = 0.05, 0.05
 """How far a channel of an area differs from the paper more than the others do, if it is coloured in, and the
@@ -54,6 +55,9 @@ CLEAR = 0.02
 
 SPECK, SMALLEST = 0.7, 3.0
 """Area of the least piece of ink, over the square of a line's width, and at the least [px]."""
+
+DARK, LEAST_DOT = 0.6, 2
+"""Contrast of a small dot that is no dirt, over that of strong ink, and its size at the least [px]."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,8 @@ class Ink:
     """The picture without transparency, sRGB in [0, 1], shape (height, width, 3)."""
     paper: FloatArray | None
     """The paper's colour, sRGB in [0, 1], shape (3,); None: transparent."""
+    textured: bool = False
+    """Whether crayons leave what cannot be told from thin lines and dots."""
 
 
 def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
@@ -94,15 +100,22 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     seed = max(floor, (TEXTURED_SEED if is_textured else SEED) * strong)
     near = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(near, seed), floor)
+    seeds = contrast > seed
+    if not is_textured:
+        mass = across(contrast / np.float32(strong))
+        grain = NOISY * noise / strong
+        mask = with_thin(mask, middles(mass, max(FAINT, grain)))
+        seeds |= mass > max(SURE, 2 * grain)
     speck, share = (TEXTURED_SPECK, TEXTURED_SHARE) if is_textured else (SPECK, 0.0)
-    mask = _held(mask, contrast > seed, speck, share)
+    sure = contrast > (np.inf if is_textured else DARK * strong)
+    mask = _held(mask, seeds, sure, speck, share)
     full = cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8))
     # What is lighter than ink elsewhere is thinner than a pixel, to some extent.
-    full = np.maximum(cv2.blur(full, (NEAR, NEAR)), FULL * strong)
+    full = np.maximum(cv2.blur(full, (NEAR, NEAR)), (TEXTURED_FULL if is_textured else FULL) * strong)
     around = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
     cover[cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0] = 1
-    return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper)
+    return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper, is_textured)
 
 
 def _shown(image: FloatArray) -> tuple[FloatArray, bool]:
@@ -169,13 +182,16 @@ def _noise(contrast: FloatArray) -> float:
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
-def _held(mask: Bools, seeds: Bools, speck: float, share: float) -> Bools:
-    """The parts of ``mask`` that are no specks and more than a ``share`` seeds, without pinholes."""
+def _held(mask: Bools, seeds: Bools, dark: Bools, speck: float, share: float) -> Bools:
+    """The parts of ``mask`` that are no specks, or ``dark`` ones, and more than a ``share`` seeds, without
+    pinholes.
+    """
     edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
     width = 2 * mask.sum() / max(1, edge.sum())
     least = max(SMALLEST, speck * width**2)
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     held = stats[:, cv2.CC_STAT_AREA] >= least
+    held |= (np.bincount(parts[dark], minlength=len(stats)) > 0) & (stats[:, cv2.CC_STAT_AREA] >= LEAST_DOT)
     held &= np.bincount(parts[seeds], minlength=len(stats)) > share * stats[:, cv2.CC_STAT_AREA]
     held[0] = False
     inked = held[parts]

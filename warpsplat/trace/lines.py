@@ -18,8 +18,8 @@ from warpsplat.trace.pens import width_steps
 TOLERANCE = 0.45
 """Largest distance of a centre line from its curve [px]."""
 
-LEAST_WIDTH = 1.0
-"""Of a stroke [px]."""
+LEAST_WIDTH, LONG = 0.3, 6.0
+"""Of a stroke, if it is so long [px]; else one pixel."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def trace_lines(image: FloatArray) -> Scene:
 def trace_ink(ink: Ink, *, mixed: bool = False) -> TracedLines:
     """The same, of ink that is known; if ``mixed``, of what is no filled area."""
     drawing = find_lines(ink, mixed=mixed)
-    strokes = [stroke for line in drawing.lines for stroke in _strokes(line)]
+    strokes = [stroke for line in drawing.lines for stroke in _strokes(line, thin=not ink.textured)]
     strokes.sort(key=lambda stroke: stroke.pen)
     fitted = fit_runs([_run(stroke) for stroke in strokes], TOLERANCE)
     height, width = ink.mask.shape
@@ -87,16 +87,17 @@ def rejoined(before: Scene, after: Scene) -> Scene:
     return replace(after, points=points)
 
 
-def _strokes(line: Line) -> list[_Stroke]:
-    """A line, in parts of one width."""
+def _strokes(line: Line, *, thin: bool) -> list[_Stroke]:
+    """A line, in parts of one width; ``thin``: or less than a pixel."""
     length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())
     steps = width_steps(line.widths, length / max(1, len(line.points) - 1))
+    least = LEAST_WIDTH if thin and length >= LONG else 1.0
     if len(steps) == 1:
-        return [_Stroke(line.points, line.closed, max(LEAST_WIDTH, steps[0][2]), line.pen)]
+        return [_Stroke(line.points, line.closed, max(least, steps[0][2]), line.pen)]
     points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
     ends = [*(low for low, _, _ in steps[1:]), len(points) - 1]
     return [
-        _Stroke(points[low : end + 1], False, max(LEAST_WIDTH, width), line.pen)
+        _Stroke(points[low : end + 1], False, max(least, width), line.pen)
         for (low, _, width), end in zip(steps, ends, strict=True)
     ]
 

@@ -42,7 +42,7 @@ def measured(points: Floats, widths: Floats, closed: bool, cover: Floats) -> tup
     for sign in (1, -1):
         places = (points[:, None] + sign * steps[None, :, None] * normals[:, None]).astype(np.float32) - 0.5
         seen = cv2.remap(
-            cover.astype(np.float32),
+            cover.astype(np.float32, copy=False),
             places[..., 0],
             places[..., 1],
             cv2.INTER_LINEAR,

@@ -12,6 +12,9 @@ from warpsplat.trace.ink import Ink
 ALIKE = 30.0
 """Distance in CIELAB, lightness counted by half, up to which two inks are one pen."""
 
+WHOLE, LEAST_SHARE = 0.85, 0.1
+"""Cover of a line's pixels from which on they have its colour, and from which on that can be told."""
+
 SELDOM = 0.015
 """Share of the length of all lines that a pen has at the least."""
 
@@ -37,12 +40,18 @@ def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
     """
     height, width = ink.mask.shape
     colors = np.zeros((len(lines), 3), np.float32)
+    paper = np.median(ink.shown[~ink.mask], axis=0) if not ink.mask.all() else np.ones(3)
     for number, line in enumerate(lines):
         columns = np.clip(line[:, 0].astype(np.intp), 0, width - 1)
         rows = np.clip(line[:, 1].astype(np.intp), 0, height - 1)
         cover = ink.cover[rows, columns]
         best = cover >= np.quantile(cover, 0.7)
-        colors[number] = np.median(ink.shown[rows[best], columns[best]], axis=0)
+        seen = np.median(ink.shown[rows[best], columns[best]], axis=0)
+        share = float(np.median(cover[best]))
+        # What covers no pixel is mixed with the paper.
+        colors[number] = (
+            np.clip(paper + (seen - paper) / share, 0, 1) if LEAST_SHARE < share < WHOLE else seen
+        )
     return colors, np.array([len(line) for line in lines], np.float64)
 
 
