@@ -17,6 +17,7 @@ from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.drawing_costs import Costs, RoundsWatch
 from warpsplat.fit.nodes import Edit, Outlines, applied, turned
+from warpsplat.fit.settings import make_settings
 from warpsplat.fit.tidy import Judge, apart, finish_drawing, rounds_for, tidied
 from warpsplat.fit.work import Meter
 from warpsplat.rendering.backend import Backend, Viewport
@@ -222,6 +223,18 @@ def test_a_logo_has_its_nodes_again(device: str) -> None:
     text = write_svg(drawn.scene, per_pixel=finished.per_pixel)
     back, _ = load_scene(text, 64, 64, "a.svg")
     assert write_svg(replace(back, canvas=drawn.scene.canvas), per_pixel=finished.per_pixel) == text
+
+
+def test_a_draft_keeps_its_nodes(device: str) -> None:
+    """What takes most of the time is left out: outlines are fitted and rounded all the same."""
+    backend = Backend.on(device, 1)
+    exact = logo(None)
+    target = render(exact.scene, backend=backend)
+    made = split(logo(None, spread=0.15))
+    assert not make_settings("draft").tidy and make_settings().tidy
+    finished = finish_drawing(target, made, backend, tidy=False)
+    assert nodes(finished.drawing) == nodes(made)
+    assert psnr(finished.drawing.scene, target, backend) > max(45, psnr(made.scene, target, backend) + 3)
 
 
 def test_what_is_seen_stays(device: str) -> None:

@@ -204,6 +204,8 @@ class Settings:
     """The only colours that the file may have, ``#rrggbb``; its fills are opaque then."""
     opaque: bool = False
     """Whether no shape is translucent."""
+    tidy: bool = True
+    """Whether drawings lose nodes that are worth less than their bytes, which takes most of their time."""
     levels: tuple[int, ...] = ()
     """Numbers of shapes, ascending: the first so many are a picture of their own (``fit.layered``)."""
     level_weight: float = 0.3
@@ -358,7 +360,13 @@ def levels_of(curves: int) -> tuple[int, ...]:
 
 
 PRESETS: dict[Quality, dict[str, Any]] = {
-    "draft": {"iterations": 200, "coarse": 0.9, "coarse_pixels": 65_000, "fine_pixels": 400_000},
+    "draft": {
+        "iterations": 200,
+        "coarse": 0.9,
+        "coarse_pixels": 65_000,
+        "fine_pixels": 400_000,
+        "tidy": False,
+    },
     "balanced": {},
     "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
 }

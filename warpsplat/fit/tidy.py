@@ -71,6 +71,7 @@ def finish_drawing(
     how: Refinement | None = None,
     *,
     finest: float = GRIDS[-1],
+    tidy: bool = True,
     report: Report | None = None,
     after: float = 0.0,
     stop: Stop | None = None,
@@ -84,6 +85,7 @@ def finish_drawing(
         backend: where to compute.
         how: rates and steps of the first refinement.
         finest: most units of the view box a pixel.
+        tidy: whether nodes are removed.
         report: called every few steps.
         after: work that comes then (``fit.costs``).
         stop: asked after every step and round; once true, what there is is rounded.
@@ -104,10 +106,10 @@ def finish_drawing(
     refit = costs.refit(REFIT)
     last = DONE * costs.refit(second) + costs.grid() + refit
     watch = RoundsWatch(meter, costs, after_round(target), WORTHWHILE, last)
-    found = Outlines(drawing).edits() if report else []
+    found = Outlines(drawing).edits() if report and tidy else []
     later = watch.ahead(found, apart(found), rounds_for(target[..., 0].size))
     drawing = refined(drawing, how, meter.stage(costs.refit(how), later, likely=Ending()))
-    drawing = tidied(target, drawing, backend, watch, stop)
+    drawing = tidied(target, drawing, backend, watch, stop) if tidy else drawing
     told_second = meter.stage(costs.refit(second), costs.grid() + refit, likely=Ending())
     drawing = refined(drawing, second, told_second)
     meter.stage(costs.grid(), refit)  # of which nothing shows on the way

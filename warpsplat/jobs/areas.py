@@ -28,7 +28,12 @@ class Filled(NamedTuple):
 
 
 def filled(
-    traced: TracedLines, backend: Backend, finest: float, stop: Callable[[], bool] | None = None
+    traced: TracedLines,
+    backend: Backend,
+    finest: float,
+    stop: Callable[[], bool] | None = None,
+    *,
+    tidy: bool = True,
 ) -> Filled:
     """The areas of ``traced`` in the colours of their pens, traced as a drawing is.
 
@@ -37,6 +42,7 @@ def filled(
         backend: where to compute.
         finest: most units of the view box a pixel.
         stop: asked after every step; once true, what there is is taken.
+        tidy: whether their outlines lose needless nodes.
     """
     scene, per_pixel = traced.scene.take(np.zeros(0, np.intp)), 1.0
     if traced.areas is None:
@@ -49,7 +55,7 @@ def filled(
         ink[..., 3] = np.where(near, traced.areas.cover, 0)
         found = trace(ink)
         drawing = Drawing(found.scene, found.joints, found.same)
-        done = finish_drawing(ink, drawing, backend, Refinement(), finest=finest, stop=stop)
+        done = finish_drawing(ink, drawing, backend, Refinement(), finest=finest, tidy=tidy, stop=stop)
         shapes, count = done.drawing.scene, len(done.drawing.scene)
         shapes = replace(
             shapes,

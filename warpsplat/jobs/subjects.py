@@ -192,6 +192,7 @@ def _drawn(
         backend,
         Refinement(),
         finest=finest(settings),
+        tidy=settings.tidy,
         report=told(drawing.scene),
         after=after,
         stop=over,
