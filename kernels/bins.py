@@ -151,7 +151,6 @@ def list_visible(
     tile_last: wp.array[wp.int32],  # [tile_count]
     most: wp.float32,  # of an opacity, for what lies behind; below 1, the lists go further back
     keeps_colors: wp.int32,  # 1 where no gradient of colours and opacities is asked for
-    keeps_paints: wp.int32,  # 1 where none of gradients' frames and stops is
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] HIDDEN added
     tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
@@ -182,7 +181,7 @@ def list_visible(
                 shapes = 31 * shapes + shape + 1
                 if paint[shape] == FLAT:
                     light *= 1.0 - wp.min(opacities[shape], most)
-            if state != FULL or (paint[shape] != FLAT and keeps_paints == 0):
+            if state != FULL or paint[shape] != FLAT:
                 is_still = 0
             n += 1
     tile_stop[tile] = n

@@ -183,7 +183,7 @@ are not unrolled before; unrolled, they also take ten times as long to compile. 
 once for all modules whose options for the compiler are the same."""
 
 STILL = 1
-"""A tile that shows nothing but paints that are kept and cover it: of outlines nothing is to be found ..."""
+"""A tile that shows nothing but flat colours which cover it: of outlines there is nothing to be found ..."""
 
 SAME = 2
 """... and did so in the last pass."""

@@ -166,18 +166,3 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
     same = np.stack(still[1]) == constants.SAME
     assert same[1:].any(axis=1).all(), "where nothing is to be found"
     assert (same[1:-1] != same[2:]).any(), "outlines come and go"
-
-
-def test_gradients_that_are_kept_stay_to_the_bit(device: str) -> None:
-    made = logo(None, 0.4)
-    scene = with_gradients(made.scene, seed=3)
-    target = render(replace(scene, points=logo(None).scene.points))
-    drawn = replace(made, scene=scene)
-    step = start(target, drawn, Backend.on(device, 1), Refinement(paints="held"))
-    before = step.measured_error()
-    for _ in range(10):
-        step.advance()
-    step.render()
-    assert step.measured_error() < 0.7 * before
-    for name in ("frames", "stop_offsets", "stop_colors", "stop_opacities"):
-        np.testing.assert_array_equal(getattr(step.state.scene(), name), getattr(scene, name))

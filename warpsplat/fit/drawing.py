@@ -48,8 +48,6 @@ class Refinement:
     """[px] at the start."""
     colors: Colors = "held"
     """Whether colours stay or are fitted and then snapped to those of the picture."""
-    paints: Colors = "fitted"
-    """Whether gradients stay or are fitted."""
 
     def settings(self, scene: Scene) -> Settings:
         """As a run has them: nothing comes, goes or is weighed but the squared error."""
@@ -157,8 +155,6 @@ def start(
     if how.colors == "held":
         state.parameters.hold("colors", every)
         state.parameters.keeps_colors = True
-        if how.paints == "held":
-            state.parameters.hold_paints()
     height, width = target.shape[:2]
     goal = Target(target, Phase(width, height, slack=1.0))
     return Step(state, how.settings(drawing.scene), goal, capacity=capacity)

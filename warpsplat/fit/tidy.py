@@ -33,7 +33,7 @@ ROUND_PIXELS = 26_000_000
 """Pixels that all rounds together look at: of a large picture each takes long, and the first find most."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
-"""At the end; after each round gradients stay besides."""
+"""After each round."""
 
 LARGE = 100_000
 """Pixels from which on half of these steps do: with as many more pixels, outlines have fewer that matter."""
@@ -183,8 +183,7 @@ def tidied(
 
 def after_round(target: FloatArray) -> Refinement:
     """How a drawing is fitted anew after each round."""
-    steps = REFIT.steps // 2 if target[..., 0].size > LARGE else REFIT.steps
-    return replace(REFIT, steps=steps, paints="held")
+    return replace(REFIT, steps=REFIT.steps // 2) if target[..., 0].size > LARGE else REFIT
 
 
 def rounds_for(pixels: int) -> int:

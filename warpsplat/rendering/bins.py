@@ -98,7 +98,6 @@ class Bins:
             self._parameters.arrays,
             most=self._most,
             keeps_colors=int(self._parameters.keeps_colors),
-            keeps_paints=int(self._parameters.keeps_paints),
             split=True,
             **self.paint,
         )

@@ -89,7 +89,7 @@ class Painting:
 
     def backward(self, program: Program) -> None:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
-        if self.has_gradients and not self._parameters.keeps_paints:
+        if self.has_gradients:
             shapes = self._parameters.shape_count
             for kernel in (ramp.ramp_backward, stops.stops_backward, gradient.gradient_backward):
                 program.launch(kernel, shapes, *self._sources, split=True)

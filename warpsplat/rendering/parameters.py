@@ -63,8 +63,6 @@ class Parameters:
         """Counts ``rearrange``: launches recorded on arrays of an earlier revision are out of date."""
         self.keeps_colors = False
         """Whether colours and opacities stay: where nothing but these is to be found, nothing is computed."""
-        self.keeps_paints = False
-        """Whether gradients do, too; only with ``keeps_colors``."""
         zeros = {a.name: np.zeros(scene.shape_of(a), np.float32) for a in ATTRIBUTES}
         self._upload(
             scene, moments or (zeros, zeros), np.zeros(len(scene), np.int32) if ages is None else ages
@@ -262,12 +260,6 @@ class Parameters:
     def hold(self, name: str, rows: npt.NDArray[np.bool_]) -> None:
         """From now on only the other rows of attribute ``name`` are updated; until the next ``rearrange``."""
         self.groups[name].held.assign(rows.astype(np.int32))
-
-    def hold_paints(self) -> None:
-        """From now on frames and stops stay; programs that are recorded then find no gradients of theirs."""
-        for name in ("frames", "stop_offsets", "stop_colors", "stop_opacities"):
-            self.hold(name, np.ones(self.groups[name].value.shape[0], np.bool_))
-        self.keeps_paints = True
 
     def take_broken(self) -> npt.NDArray[np.bool_]:
         """Which shapes an update left out since the last call, as a number was not finite, shape (shape,).
