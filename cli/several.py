@@ -61,6 +61,8 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
             for path, result in made
         ]
         say(json.dumps(each))
+        for line in _missing(numbers, begun):
+            say(f"warpsplat: {line}", err=True)
     elif not request.quiet:
         say("\n".join([table(made), *_missing(numbers, begun)] if made else _missing(numbers, begun)))
     if request.report and made:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +28,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
 
     Raises:
         UsageError: settings that say how many shapes there are, or an output.
+        Abort: interrupted.
     """
     if request.output or request.report:
         raise UsageError(NOTHING_ELSE)
@@ -44,7 +44,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     check_suggesting(settings)
     made = suggest_file(request, settings, read_input(image))
     if made is None:
-        return
+        raise click.Abort  # which says "interrupted"
     command = _command(request, settings, made)
     if request.as_json:
         say(json.dumps({"image": str(image), "command": command, **made.as_dict()}))
@@ -64,9 +64,7 @@ def _command(request: Request, settings: Settings, made: Suggestion) -> str:
 
     image = request.image
     output = "FILE.svg" if image == STANDARD else str(Path(image.name).with_suffix(".svg"))
-    if made.curves is None:
-        return shlex.join(["warpsplat", "vectorize", str(image), "-o", output])
-    chosen = replace(settings, curves=made.curves, simplify=False)
+    chosen = settings if made.curves is None else replace(settings, curves=made.curves, simplify=False)
     return vectorize_command(chosen, str(image), output, *request.flags)
 
 

@@ -276,3 +276,19 @@ def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest
     said = capsys.readouterr().out
     assert "A picture of cells (2 colours in cells of 4x4 px), which is traced" in said
     assert "the picture says how many shapes there are. --subject photo fits a number of shapes" in said
+
+
+def test_the_command_of_a_drawing_keeps_its_settings(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("vectorize", image, "--suggest", "--subject", "line", "--json") == 0
+    command = json.loads(capsys.readouterr().out)["command"]
+    assert command == f"warpsplat vectorize {image} --subject line -o photo.svg"
+
+
+def test_an_interrupted_suggestion_says_so(
+    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpsplat.cli.run.suggest_file", lambda *a, **k: None)
+    assert run("vectorize", image, "--suggest", "--json") == 130
+    said = capsys.readouterr()
+    assert json.loads(said.out) == {"error": "interrupted", "exit_code": 130}
+    assert "warpsplat: interrupted" in said.err

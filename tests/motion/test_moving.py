@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.scenes import mixed_scene, with_gradients
 from warpsplat.motion.moving import elements, kept_points
@@ -52,6 +53,35 @@ def test_what_is_not_there_comes_and_goes() -> None:
     fading = [line for line in lines if "animation:" in line]
     assert len(fading) == 1 and fading[0] is not lines[-1]
     assert 'animation:i 1s linear 0s backwards,o 1s linear 2s forwards"' in fading[0]
+
+
+def test_what_comes_is_where_it_is_first_while_it_comes() -> None:
+    scene = mixed_scene()
+    less, moved = scene.take(np.arange(1, len(scene))), replace(scene, points=scene.points + np.float32(1))
+    lines, _ = made(less, less, scene, moved)
+    late = next(line for line in lines if "animation:i 1s linear 1s backwards" in line)
+    found = re.search(r'begin="1s" dur="2s" values="([^"]*)"', late)
+    assert found
+    first, second, third = found[1].split(";")
+    assert first == second != third and f'd="{third}"' in late
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.9, 0.6])
+def test_what_covers_stays_below_what_comes_in_its_place(opacity: float) -> None:
+    scene = with_gradients(mixed_scene())
+    scene = replace(
+        scene,
+        opacities=np.full_like(scene.opacities, opacity),
+        stop_opacities=np.ones_like(scene.stop_opacities),
+    )
+    number = int((scene.paint != 0).sum())
+    count = iter(range(9 * number))
+    text, _ = elements([scene, scene], range(2), 1.0, UNITS, lambda _: f"<still{next(count)}/>")
+    groups = [line for line in text.splitlines() if "<still" in line]
+    assert len(groups) == 2 * number
+    assert sum("animation:gi 1s linear 0s backwards" in line for line in groups) == number
+    goes = "go 0s linear 1s forwards" if opacity > 0.8 else "go 1s linear 0s forwards"
+    assert sum(goes in line for line in groups) == number
 
 
 def test_colours_change_when_they_differ_enough() -> None:

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.scenes import mixed_scene, with_gradients
-from warpsplat import Recorder, Result, Scene, UsageError
+from warpsplat import Canvas, Recorder, Result, Scene, UsageError
 from warpsplat.files.output import may_replace
 from warpsplat.fit.work import Progress, Snapshot
 from warpsplat.metrics import psnr
@@ -80,6 +80,16 @@ def test_an_svg_moves_and_is_the_file_where_nothing_does(recorded: Recorded, tmp
     moving = re.sub(r"<style>.*</style>", "", text.partition('<g class="e">')[0] + "</svg>")
     moving = re.sub(r'<path[^>]*forwards".*', "", moving)  # what goes before the end
     assert psnr(on_white(render_own(moving)), on_white(render_own(result.svg))) > 28
+
+
+def test_what_is_translucent_is_not_seen_twice(recorded: Recorded, tmp_path: Path) -> None:
+    """The file takes the place of the last set at once, where nothing is behind it."""
+    scene = replace(mixed_scene(48, 36), canvas=Canvas(48, 36, None))
+    made = Recorder()
+    snapshots(made, [scene, scene, scene])
+    made.save(tmp_path / "a.svg", replace(recorded[1], scene=scene), seconds=2)
+    text = (tmp_path / "a.svg").read_text()
+    assert "animation:m 2s}" in text and "animation:e 0s 2s backwards" in text
 
 
 def snapshots(made: Recorder, scenes: list[Scene]) -> None:

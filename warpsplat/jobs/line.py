@@ -72,7 +72,7 @@ def draw_lines(
         ink = replace(ink, paper=color)
     traced = trace_ink(ink, mixed=settings.mixed)
     if not len(traced.scene) and not traced.areas:
-        raise ImageError("no lines found: nothing is darker than the paper around it")
+        raise ImageError("no lines found: nothing but specks is darker than the paper around it")
     fills = filled(traced, backend, finest(settings), stop, tidy=settings.tidy) if traced.areas else None
     made = _fitted(
         ink, traced, settings, backend, after, seconds=seconds, report=report, stop=stop, stages=stages

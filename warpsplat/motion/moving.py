@@ -51,6 +51,10 @@ class Piece:
     """The last key that it is in."""
     markup: str = ""
     """Of what stays."""
+    covers: bool = False
+    """Whether nearly nothing is seen through it."""
+    followed: bool = False
+    """Whether its life goes on in another piece."""
 
 
 def elements(
@@ -92,15 +96,33 @@ def _add(
         if not movable[row]:
             markup = still(scene.take(np.arange(row, row + 1 + twins[row])))
             if not (life and life[-1].markup == markup):
-                life.append(Piece(key, None, np.zeros(0, np.intp), markup=markup))
-            life[-1].end = key
+                _begin(life, Piece(key, None, np.zeros(0, np.intp), markup=markup))
+            life[-1].end, life[-1].covers = key, _opacity(scene, row) >= COVERING
             continue
         form, points = _form(scene, row), zoom * scene.points[scene.first[row] : scene.first[row + 1]]
         if not (life and _goes_on(life[-1], form, points)):
-            life.append(Piece(key, form, np.arange(len(points)), [points]))
-        life[-1].end = key
+            _begin(life, Piece(key, form, np.arange(len(points)), [points]))
+        life[-1].end, life[-1].covers = key, bool(scene.opacities[row] >= COVERING)
         for name, value in _look(scene, row, colors[row], zoom).items():
             life[-1].values.setdefault(name, []).append(value)
+
+
+def _begin(life: list[Piece], piece: Piece) -> None:
+    if life:
+        life[-1].followed = life[-1].end == piece.key - 1
+    life.append(piece)
+
+
+COVERING = 0.8
+"""Opacity from which on it is better that a piece stays below the next one until that is there, than that one
+goes as the other comes: then more of what is behind them would be seen than of translucent ones too little.
+"""
+
+
+def _opacity(scene: Scene, row: int) -> float:
+    """Of a shape where it is most translucent."""
+    own = scene.take(np.arange(row, row + 1))
+    return float(own.opacities[0] * own.stop_opacities.min(initial=1.0))
 
 
 def _look(scene: Scene, row: int, color: str, zoom: float) -> dict[str, Value]:
@@ -202,7 +224,9 @@ def _element(piece: Piece, name: str, tick: float, last: int) -> tuple[str, str]
         plays.append(_play(name, piece.key + first, end - first, tick, "backwards"))
     if piece.key:
         plays.append(_play(f"{group}i", piece.key - 1, 1, tick, "backwards"))
-    if piece.end < last:
+    if piece.end < last and piece.followed and piece.covers:
+        plays.append(_play(f"{group}o", piece.end + 1, 0, tick, "forwards"))
+    elif piece.end < last:
         plays.append(_play(f"{group}o", piece.end, 1, tick, "forwards"))
     style = f' style="animation:{",".join(plays)}"' if plays else ""
     if piece.form is None:
@@ -216,12 +240,14 @@ def _element(piece: Piece, name: str, tick: float, last: int) -> tuple[str, str]
 
 
 def _path(data: list[str], attributes: str, key: int, tick: float) -> str:
-    """A path that moves from a key on. Before and after it has its last place: before, it is not seen, and
-    animations that are over cost no time.
+    """A path that moves from a key on; while it comes, before that, it is where it is first. Before and after
+    it has its last place: before, it is not seen, and animations that are over cost no time.
     """
     head = f'<path d="{data[-1]}"{attributes}'
     if len(set(data)) == 1:
         return f"{head}/>\n"
+    if key:
+        key, data = key - 1, [data[0], *data]
     times = f'begin="{_seconds(key * tick)}" dur="{_seconds((len(data) - 1) * tick)}"'
     return f'{head}><animate attributeName="d" {times} values="{";".join(data)}"/></path>\n'
 

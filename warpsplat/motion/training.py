@@ -72,7 +72,7 @@ UNITS = 1000
 """Of the coordinates of what moves, along the longer side, at the least: it is seen for a moment."""
 
 FADE = 0.3
-"""Time in which the file comes over what moved [s], in place of which it then is."""
+"""Time in which a file with a background comes over what moved [s], in place of which it then is."""
 
 STYLE = (
     ".m{{visibility:hidden;animation:m {end}s}}"
@@ -104,7 +104,8 @@ def vector(scenes: Sequence[Scene], moments: Sequence[int], result: Result, seco
         behind = f'<rect width="{number(units, 0)}" height="{height}" fill="{fill}"/>\n'
     tick = seconds / max(1, len(keys) - 1)
     shapes, rules = moving.elements(shown, keys, tick, units, _still(units))
-    style = STYLE.format(start=number(seconds, 2), fade=number(FADE, 2), end=number(seconds + FADE, 2))
+    fade = 0.0 if canvas.background is None else FADE  # what is translucent would be seen twice
+    style = STYLE.format(start=number(seconds, 2), fade=number(fade, 2), end=number(seconds + fade, 2))
     group = f'<g class="m" transform="scale({box / units:.9g})">{behind}{shapes}</g>'
     return f'{head}{MARK}-->\n<style>{style}{rules}</style>\n{group}\n<g class="e">{inside}</g></svg>\n'
 
