@@ -12,7 +12,7 @@ from tests.fit.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, poly
 from tests.fit.test_drawing import assert_clean, psnr
 from tests.fit.test_merge import halves
 from warpsplat.fit import tidy
-from warpsplat.fit.cells import by_cell, cells_around, cells_at, columns_and_rows, joined, sum_within
+from warpsplat.fit.cells import SPAN, ZERO, Cells, by_cell, cells_around, columns_and_rows, joined, sum_within
 from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.drawing import Refinement, start
 from warpsplat.fit.drawing_costs import Costs, RoundsWatch
@@ -26,6 +26,12 @@ from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
+
+
+def cells_at(places: Sequence[tuple[int, int]]) -> Cells:
+    """Those in columns and rows."""
+    columns, rows = np.array(places).T
+    return np.unique((columns + ZERO) * SPAN + rows + ZERO)
 
 
 def split(made: Drawing) -> Drawing:
@@ -143,7 +149,7 @@ def test_cells_around_cubics() -> None:
     assert sorted(zip(columns.tolist(), rows.tolist(), strict=True)) == [
         (x, y) for x in range(-1, 5) for y in range(-1, 2)
     ]
-    assert second.tolist() == cells_at(np.array([(x, y) for x in (-2, -1, 0) for y in (-2, -1, 0)])).tolist()
+    assert second.tolist() == cells_at([(x, y) for x in (-2, -1, 0) for y in (-2, -1, 0)]).tolist()
 
 
 def test_errors_within_an_edit() -> None:
@@ -155,7 +161,7 @@ def test_errors_within_an_edit() -> None:
         ([(-1, 0), (-2, -2), (5, 1), (1, 4), (9, 9)], 0),
         ([(2, 1)], errors[2:4, 4:6].sum()),
     ):
-        assert sum_within(sums, cells_at(np.array(cells))) == pytest.approx(want)
+        assert sum_within(sums, cells_at(cells)) == pytest.approx(want)
 
 
 def test_a_drawing_like_the_last_one_needs_no_second_renderer(

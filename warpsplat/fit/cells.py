@@ -29,11 +29,6 @@ AROUND = np.array([i * SPAN + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
 """Steps from a cell to those that an outline in it may change as well."""
 
 
-def cells_at(places: npt.NDArray[np.integer[Any]]) -> Cells:
-    """The cells in columns and rows, shape (cell, 2)."""
-    return np.unique((places[:, 0] + ZERO) * SPAN + places[:, 1] + ZERO)
-
-
 def columns_and_rows(cells: Cells) -> tuple[Cells, Cells]:
     """Where cells are."""
     return cells // SPAN - ZERO, cells % SPAN - ZERO
