@@ -3,6 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.elementary import power, sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -33,12 +34,12 @@ def advance(
     """
     i = offset + wp.tid()
     ages[i] = ages[i] + 1
-    bias1[i] = 1.0 - wp.pow(BETA1, float(ages[i]))
-    bias2[i] = 1.0 - wp.pow(BETA2, float(ages[i]))
+    bias1[i] = 1.0 - power(BETA1, ages[i])
+    bias2[i] = 1.0 - power(BETA2, ages[i])
     if i == 0:
         clock[0] = clock[0] + 1
         progress = wp.min(float(clock[0]) / float(step_count), 1.0)
-        decay[0] = final + (1.0 - final) * 0.5 * (1.0 + wp.cos(PI * progress))
+        decay[0] = final + (1.0 - final) * 0.5 * (1.0 + sine_and_cosine(PI * progress)[1])
 
 
 @wp.kernel

@@ -176,11 +176,13 @@ PRODUCT = 1
 MODULE_OPTIONS = {
     "enable_backward": False,
     "optimization_level": 3,
-    "cpu_compiler_flags": "-march=native -mllvm=-inline-threshold=9000 -mllvm=-unroll-full-max-count=4",
+    "cpu_compiler_flags": "-march=native -ffp-contract=off"
+    " -mllvm=-inline-threshold=9000 -mllvm=-unroll-full-max-count=4",
 }
-"""Of every kernel module. Loops over the 16 elements of a column become vector instructions only where they
-are not unrolled before; unrolled, they also take ten times as long to compile. Warp's headers are precompiled
-once for all modules whose options for the compiler are the same."""
+"""Options of every kernel module. A CPU contracts no products and sums, or results would depend on whether
+it has fused multiply-adds. Loops over the 16 elements of a column become vector instructions only where
+they are not unrolled before; unrolled, they also take ten times as long to compile. Warp's headers are
+precompiled once for all modules whose options for the compiler are the same."""
 
 STILL = 1
 """A tile that shows nothing but flat colours which cover it: of outlines there is nothing to be found ..."""

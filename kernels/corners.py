@@ -14,6 +14,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.coverage.stroke import half_width
+from warpsplat.kernels.elementary import angle_of, sine_and_cosine
 from warpsplat.kernels.outline import within_reach
 from warpsplat.kernels.ranges import find_range
 
@@ -40,13 +41,13 @@ def segment_direction(
 @wp.func
 def turn_between(before: wp.vec2, after: wp.vec2) -> wp.float32:
     """Angle from one unit vector to another, positive from x to y."""
-    return wp.atan2(before[0] * after[1] - before[1] * after[0], wp.dot(before, after))
+    return angle_of(wp.dot(before, after), before[0] * after[1] - before[1] * after[0])
 
 
 @wp.func
 def miter_ratio(turn: wp.float32) -> wp.float32:
     """Length of a mitre over the width (SVG 1.1, 11.4)."""
-    return 1.0 / wp.max(wp.cos(0.5 * turn), 1.0e-6)
+    return 1.0 / wp.max(sine_and_cosine(0.5 * turn)[1], 1.0e-6)
 
 
 @wp.func
@@ -97,8 +98,9 @@ def place_corners(
             rotation += place[1] * turn
             if radius == MITERED:
                 radius = miter_ratio(turn)
-    x = wp.cos(rotation)
-    y = wp.sin(rotation)
+    direction = sine_and_cosine(rotation)
+    x = direction[1]
+    y = direction[0]
     side = (radius * half_width(widths[shape], scale)) * wp.vec2(x * t[0] - y * t[1], y * t[0] + x * t[1])
     at = corner_centre(vertex, vertex_next, before, place[0]) + side
     corner_shape[i] = shape
@@ -142,7 +144,8 @@ def add_corner_grad(
         if place[3] == MITERED:
             t = segment_direction(vertex, vertex_next, before)
             turn = turn_between(t, segment_direction(vertex, vertex_next, after))
-            growth = 0.5 * outwards * wp.tan(0.5 * turn)
+            half_turn = sine_and_cosine(0.5 * turn)
+            growth = 0.5 * outwards * half_turn[0] / half_turn[1]
             second += growth
             first -= growth
         segment_grad[before] = segment_grad[before] + wp.vec3(first, 0.0, 0.0)

@@ -15,6 +15,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.corners import miter_ratio, segment_direction, turn_between
 from warpsplat.kernels.coverage.stroke import half_width
+from warpsplat.kernels.elementary import sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -82,7 +83,8 @@ def meet(turn: wp.float32, room: wp.float32, half: wp.float32, join: wp.int32, l
     ``room``: how far from the joint their inner corners may be.
     """
     ratio = miter_ratio(turn)
-    fits = half * wp.abs(wp.tan(0.5 * turn)) <= room
+    half_turn = sine_and_cosine(0.5 * turn)
+    fits = half * wp.abs(half_turn[0]) <= room * half_turn[1]
     tip = half * (ratio - 1.0) <= UNSEEN
     gap = BEVELLED
     if join == MITER:

@@ -9,6 +9,7 @@ inside the path.
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.elementary import normal_quantile, normal_tail
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -19,7 +20,6 @@ STATION_DENSITY = wp.constant(constants.STATION_DENSITY)
 STATIONS_MIN = wp.constant(constants.STATIONS_MIN)
 EPSILON = wp.constant(constants.EPSILON)
 EDGE_MIN = wp.constant(2.0e-7)  # beyond, 1 - 2 x edge would be 1
-SQRT_HALF = wp.constant(0.7071067811865476)
 
 
 @wp.func
@@ -28,7 +28,7 @@ def row_plan(width: wp.float32) -> wp.vec2:
     # The outermost row at a quarter of the strip at the most: two rows are the least. And so far inside a
     # strip of millions of pixels that a float can tell.
     edge = wp.clamp(ROW_INSET / wp.max(width, EPSILON), EDGE_MIN, 0.25)
-    reach = wp.erfinv(1.0 - 2.0 * edge) / SQRT_HALF
+    reach = normal_quantile(edge)
     # Near the boundary du = phi(z) dz and u = Phi(z), so the relative step is the hazard rate of the
     # normal distribution times dz; z + 1 / (z + 1) is close to it over the range in use.
     step = ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
@@ -39,7 +39,10 @@ def row_plan(width: wp.float32) -> wp.vec2:
 def row_position(row: wp.int32, rows: wp.int32, reach: wp.float32) -> wp.float32:
     """Fraction ``u`` in (0, 1) of the way across the strip."""
     z = reach * (2.0 * float(row) / float(rows - 1) - 1.0)
-    return 0.5 + 0.5 * wp.erf(z * SQRT_HALF)
+    tail = normal_tail(wp.abs(z))
+    if z < 0.0:
+        return tail
+    return 1.0 - tail
 
 
 @wp.func

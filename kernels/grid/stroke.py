@@ -9,6 +9,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cubic_tangent_weights, cubic_weights
+from warpsplat.kernels.elementary import sine_and_cosine
 from warpsplat.kernels.grid.strips import row_plan, row_position, station_plan
 from warpsplat.kernels.ranges import bounded_product, find_range
 
@@ -80,10 +81,12 @@ def run_place(station: wp.int32, run: wp.int32, rows: wp.int32, width: wp.float3
     radius = wp.max(1.0 - 2.0 * ROW_INSET / wp.max(width, EPSILON), 0.5)
     if station < caps:
         angle = HALF_PI * (float(caps - station) - 0.25) / float(caps)
-        return wp.vec3(0.0, -radius * wp.sin(angle), wp.cos(angle))
+        direction = sine_and_cosine(angle)
+        return wp.vec3(0.0, -radius * direction[0], direction[1])
     if station >= run - caps:
         angle = HALF_PI * (float(station - (run - caps) + 1) - 0.25) / float(caps)
-        return wp.vec3(1.0, radius * wp.sin(angle), wp.cos(angle))
+        direction = sine_and_cosine(angle)
+        return wp.vec3(1.0, radius * direction[0], direction[1])
     body = run - 2 * caps
     return wp.vec3((float(station - caps) + 0.5) / float(body), 0.0, 1.0)
 

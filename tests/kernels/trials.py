@@ -1,10 +1,12 @@
 """Kernels of the trials: a coverage (``tests/rendering/test_new_coverage.py``), two losses
-(``tests/fit/test_new_loss.py``), an attribute (``tests/scene/test_new_attribute.py``).
+(``tests/fit/test_new_loss.py``), an attribute (``tests/scene/test_new_attribute.py``), elementary functions
+(``test_elementary.py``).
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.elementary import angle_of, normal_quantile, normal_tail, power, sine_and_cosine
 from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
@@ -160,3 +162,40 @@ def glow_backward(
 ):
     shape = offset + wp.tid()
     glows_grad[shape] = glows[shape] - aim
+
+
+@wp.kernel
+def sines_and_cosines(x: wp.array[wp.float32], out: wp.array[wp.vec2]):
+    i = wp.tid()
+    out[i] = sine_and_cosine(x[i])
+
+
+@wp.kernel
+def angles_of_directions(x: wp.array[wp.float32], out: wp.array[wp.float32]):
+    i = wp.tid()
+    direction = sine_and_cosine(x[i])
+    out[i] = angle_of(direction[1], direction[0])
+
+
+@wp.kernel
+def angles(x: wp.array[wp.float32], y: wp.array[wp.float32], out: wp.array[wp.float32]):
+    i = wp.tid()
+    out[i] = angle_of(x[i], y[i])
+
+
+@wp.kernel
+def powers(x: wp.array[wp.int32], out: wp.array[wp.float32]):
+    i = wp.tid()
+    out[i] = power(0.999, x[i])
+
+
+@wp.kernel
+def normal_tails(x: wp.array[wp.float32], out: wp.array[wp.float32]):
+    i = wp.tid()
+    out[i] = normal_tail(x[i])
+
+
+@wp.kernel
+def normal_quantiles(x: wp.array[wp.float32], out: wp.array[wp.float32]):
+    i = wp.tid()
+    out[i] = normal_quantile(x[i])
