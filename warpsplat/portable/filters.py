@@ -27,8 +27,10 @@ BAND = 1 << 16
 CUBIC = -0.75
 """The slope of cubic interpolation's kernel at 1, which OpenCV has."""
 
-FADES = 4096
-"""Steps of the table of how a difference of colour counts in ``bilateral``."""
+FADE_SQUARINGS, FADE_TERMS, FADE_MOST = 5, (1 / 24, -1 / 6, 1 / 2, -1.0), 0.625
+"""How ``bilateral`` finds exp(-x): by squarings of the first terms of its series at x / 32, the highest power
+first, where x is no more than 20.
+"""
 
 LUMA = 0.299, 0.587, 0.114
 """Shares of red, green and blue (ITU-R BT.601)."""
@@ -272,53 +274,60 @@ def bilateral(image: Floats, diameter: int, sigma_color: float, sigma_space: flo
     planes = np.ascontiguousarray(image.reshape(height, width, channels).transpose(2, 0, 1))
     reach = diameter // 2
     columns = _beyond(np.arange(-reach, width + reach), width, "reflect101")
-    spread = channels * float(planes.max() - planes.min())
-    scale = FADES / spread if spread > 0 else 0.0
-    ends = np.arange(FADES + 2) * (spread / FADES / sigma_color)
-    fades = elementary.exp(-0.5 * ends * ends).astype(image.dtype)
-    falls = np.append(np.diff(fades), 0).astype(image.dtype)
     result = np.empty_like(planes)
     step = max(1, BAND // (width + 2 * reach))
     for top in range(0, height, step):
         bottom = min(top + step, height)
         band = planes[:, _beyond(np.arange(top - reach, bottom + reach), height, "reflect101")][:, :, columns]
-        result[:, top:bottom] = _faded(band, reach, sigma_space, scale, fades, falls)
+        changed = _calmer(band.reshape(channels, -1), band.shape[2], reach, sigma_color, sigma_space)
+        inner = changed.reshape(band.shape)[:, reach : reach + bottom - top, reach : reach + width]
+        result[:, top:bottom] = inner
     return np.ascontiguousarray(result.transpose(1, 2, 0)).reshape(image.shape)
 
 
-def _faded(
-    band: Floats, reach: int, sigma_space: float, scale: float, fades: Floats, falls: Floats
-) -> Floats:
-    """Planes (channel, row, column) with a margin of ``reach`` px -> what ``bilateral`` makes of the rest.
+def _calmer(planes: Floats, width: int, reach: int, sigma_color: float, sigma_space: float) -> Floats:
+    """Planes (channel, pixel) of rows of ``width`` -> what ``bilateral`` makes of what is off their margins.
 
-    Of two pixels each counts for the other alike, so that half of the neighbours are looked at.
+    Each of two pixels counts for the other alike, so that half of the neighbours are looked at; in margins of
+    ``reach`` px these may be of another row.
     """
-    total, weights = band.copy(), np.ones(band.shape[1:], band.dtype)
+    size = planes.shape[1]
+    total, weights = np.zeros_like(planes), np.ones(size, planes.dtype)
+    steps, spare, all_weight = np.empty_like(planes), np.empty_like(weights), np.empty_like(weights)
+    scale = 0.5 / (sigma_color * sigma_color * 2**FADE_SQUARINGS)
     for down in range(reach + 1):
         for right in range(-reach if down else 1, reach + 1):
             square = down * down + right * right
             if square > reach * reach:
                 continue
-            here = slice(0, band.shape[1] - down), slice(max(0, -right), band.shape[2] - max(0, right))
-            there = slice(down, None), slice(max(0, right), band.shape[2] - max(0, -right))
-            away = np.abs(band[0][here] - band[0][there])
-            for plane in band[1:]:
-                away += np.abs(plane[here] - plane[there])
-            away *= band.dtype.type(scale)
-            low = np.floor(away)
-            away -= low
-            cell = low.astype(np.int32)
-            away *= np.take(falls, cell, mode="clip")
-            weight = np.take(fades, cell, mode="clip")
-            weight += away
-            weight *= band.dtype.type(elementary.exp(-0.5 * square / (sigma_space * sigma_space)))
-            weights[here] += weight
-            weights[there] += weight
-            for sums, plane in zip(total, band, strict=True):
-                sums[here] += weight * plane[there]
-                sums[there] += weight * plane[here]
-    inner = slice(reach, band.shape[1] - reach), slice(reach, band.shape[2] - reach)
-    return np.asarray(total[:, inner[0], inner[1]] / weights[inner])
+            offset = down * width + right
+            rest, weight = spare[: size - offset], all_weight[: size - offset]
+            for channel, plane in enumerate(planes):
+                step = np.subtract(plane[offset:], plane[:-offset], out=steps[channel, : size - offset])
+                away = np.abs(step, out=rest if channel else weight)
+                if channel:
+                    weight += away
+            # exp(-x) is a power of exp(-x / 32), which a few terms of its series give.
+            np.multiply(weight, weight, out=rest)
+            rest *= scale
+            np.minimum(rest, FADE_MOST, out=rest)
+            np.multiply(rest, FADE_TERMS[0], out=weight)
+            for term in FADE_TERMS[1:]:
+                weight += term
+                weight *= rest
+            weight += 1
+            for _ in range(FADE_SQUARINGS):
+                weight *= weight
+            weight *= float(elementary.exp(-0.5 * square / (sigma_space * sigma_space)))
+            weights[:-offset] += weight
+            weights[offset:] += weight
+            for sums, step in zip(total, steps[:, : size - offset], strict=True):
+                np.multiply(step, weight, out=rest)
+                sums[:-offset] += rest
+                sums[offset:] -= rest
+    total /= weights
+    total += planes
+    return total
 
 
 # The rest.
