@@ -122,9 +122,8 @@ def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:
 
     def error(low: Ints, high: Ints) -> Floats:
         """Squared deviations of the points from ``low`` to before ``high``."""
-        return np.asarray(
-            squares[high] - squares[low] - (sums[high] - sums[low]) ** 2 / np.maximum(high - low, 1)
-        )
+        total = sums[high] - sums[low]
+        return np.asarray(squares[high] - squares[low] - total * total / np.maximum(high - low, 1))
 
     def parts(low: int, high: int) -> list[tuple[int, int]]:
         whole = float(error(np.array(low), np.array(high)))
