@@ -82,8 +82,9 @@ def test_a_singular_system_is_an_error() -> None:
         np.outer([1, 2, 3.0], [1, 2.0]),
         np.zeros((3, 2)),
         np.full((2, 2), 3.0),
+        np.array([[1, 1e-160], [1, 1e-170]]),
     ],
-    ids=["tall", "wide", "one", "of rank 1", "zero", "equal"],
+    ids=["tall", "wide", "one", "of rank 1", "zero", "equal", "of all sizes"],
 )
 def test_singular_values(matrix: np.ndarray) -> None:
     left, values, right = linear.svd(matrix)

@@ -370,5 +370,5 @@ def _white(image: Image.Image) -> float:
         share = f"{missing} of {image.width * image.height} pixels"
         raise ImageError(f"{share} are no numbers (NaN or infinite)")
     # Neither format says what white is: the least of the usual ones that holds all samples.
-    tops = [255.0, 65535.0, 2.0**31 - 1] if image.mode == "I" else [1.0, 255.0, 65535.0]
+    tops = [255.0, 65535.0, 2**31 - 1.0] if image.mode == "I" else [1.0, 255.0, 65535.0]
     return next((top for top in tops if largest <= top), largest)

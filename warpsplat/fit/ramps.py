@@ -209,10 +209,7 @@ def _powers(places: Floats) -> Floats:
 
 
 def _summed(x: Floats, values: FloatArray, y: Floats) -> Floats:
-    """Sums of values (..., row, column) times x (..., i, column) and y (..., j, row), shape (..., i, j).
-
-    TODO which
-    """
+    """Sums of values (..., k, m) with weights x (..., i, k) and y (..., j, m), shape (..., i, j)."""
     return linear.product(linear.product(x, values), np.swapaxes(y, -2, -1))
 
 

@@ -147,7 +147,8 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
                     continue
                 done = False
                 ratio = (squares[1] - squares[0]) / (2 * np.where(apart, mixed, 1.0))
-                tangent = np.where(ratio < 0, -1.0, 1.0) / (np.abs(ratio) + np.sqrt(1 + ratio * ratio))
+                with np.errstate(over="ignore"):  # of columns that are 0 beside others: no turn
+                    tangent = np.where(ratio < 0, -1.0, 1.0) / (np.abs(ratio) + np.sqrt(1 + ratio * ratio))
                 tangent = np.where(apart, tangent, 0.0)
                 cosine = (1 / np.sqrt(1 + tangent * tangent))[..., None]
                 sine = cosine * tangent[..., None]

@@ -148,7 +148,8 @@ def _zeros(a: float, b: float, c: float, d: float) -> list[float]:
     u, v, w = d - 3 * c + 3 * b - a, c - 2 * b + a, b - a
     root = v + math.copysign(math.sqrt(max(v * v - u * w, 0.0)), v)
     turns = [top / bottom for top, bottom in ((-root, u), (w, -root)) if abs(top) < abs(bottom)]
-    turns = sorted(t for t in turns if NEAR_END < t < 1 - NEAR_END)
+    # Where it is 0 at a turn it touches, or crosses level.
+    turns = sorted(t for t in turns if NEAR_END < t < 1 - NEAR_END and height(t) != 0)
     found = []
     for low, high in pairwise([NEAR_END, *turns, 1 - NEAR_END]):
         if (height(low) > 0) == (height(high) > 0):
