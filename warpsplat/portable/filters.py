@@ -294,7 +294,7 @@ def _calmer(planes: Floats, width: int, reach: int, sigma_color: float, sigma_sp
     size = planes.shape[1]
     total, weights = np.zeros_like(planes), np.ones(size, planes.dtype)
     steps, spare, all_weight = np.empty_like(planes), np.empty_like(weights), np.empty_like(weights)
-    scale = 0.5 / (sigma_color * sigma_color * 2**FADE_SQUARINGS)
+    scale = 0.5 / (sigma_color * sigma_color * (1 << FADE_SQUARINGS))
     for down in range(reach + 1):
         for right in range(-reach if down else 1, reach + 1):
             square = down * down + right * right
