@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from warpsplat.portable import elementary
 from warpsplat.svg.inspect import inspect_svg
 from warpsplat.svg.strips import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check, draw, rows_of
 
@@ -70,7 +71,7 @@ def psnr(a: Floats, b: Floats) -> float:
 
 def decibels(error: float) -> float:
     """PSNR [dB] of a mean squared error in levels of 0..255; infinite where it is 0."""
-    return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
+    return float("inf") if error == 0 else float(10 * elementary.log10(65025 / error))
 
 
 def ssim(a: Floats, b: Floats) -> float | None:
@@ -109,7 +110,7 @@ def _figures(pairs: Iterable[Pair], stop: Stop | None = None) -> tuple[float, fl
     multiple = None
     if len(similar) == len(MS_SSIM_WEIGHTS):
         factors = np.append(similar[:-1, 1], similar[-1, 0])
-        multiple = float(np.prod(np.maximum(factors, 0.0) ** MS_SSIM_WEIGHTS))
+        multiple = float(np.prod(elementary.power(np.maximum(factors, 0.0), MS_SSIM_WEIGHTS)))
     return decibels(float(np.mean(errors))), single, multiple
 
 

@@ -12,6 +12,7 @@ from warpsplat.fit import density
 from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
 from warpsplat.fit.place import circle_outlines
 from warpsplat.fit.settings import Density, make_settings
+from warpsplat.portable import filters
 from warpsplat.scene import Kind, Scene
 from warpsplat.scene.geometry import areas, bounds
 
@@ -106,12 +107,12 @@ def test_new_curves_come_where_the_error_is(kind: Kind) -> None:
 
 
 def test_a_candidate_is_the_deepest_pixel_of_its_component() -> None:
-    error = cv2.GaussianBlur(np.random.default_rng(2).random((40, 60), np.float32), (0, 0), 1.0)
+    error = filters.gaussian_blur(np.random.default_rng(2).random((40, 60), np.float32), 1.0)
     top = float(np.quantile(error, 0.995))
     wanted = []
     for level in range(1, density.ERROR_LEVELS):
         mask = (error >= top * level / density.ERROR_LEVELS).astype(np.uint8)
-        depth = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 3)[1:-1, 1:-1]
+        depth = filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
         count, labels = cv2.connectedComponents(mask, connectivity=4)
         for label in range(1, count):
             row, column = np.argwhere((labels == label) & (depth == depth[labels == label].max()))[-1]

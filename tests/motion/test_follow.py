@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.scenes import mixed_scene
-from warpsplat.motion.follow import ascending, lives
+from warpsplat.motion.follow import ascending, lives, nearest
 from warpsplat.scene import Scene
 
 
@@ -55,3 +55,9 @@ def test_longest_ascending_parts() -> None:
         found = ascending(values)
         assert len(found) == length and found == sorted(found)
         assert np.all(np.diff([values[i] for i in found]) > 0)
+
+
+def test_the_nearest_is_the_first_of_several() -> None:
+    rows, others = np.zeros((3, 8), np.float32), np.zeros((4, 8), np.float32)
+    rows[:, 0], others[:, 0] = [0, 1, 5], [7, 0.25, -0.25, 4]
+    assert nearest(rows, others).tolist() == [1, 1, 3]

@@ -73,6 +73,10 @@ def test_values_that_are_exact() -> None:
     assert elementary.power([0, 0, 7, 7], [0, 2, 0, 1]).tolist() == [1, 0, 1, 7]
 
 
+def test_powers_of_ten() -> None:
+    assert [elementary.power_of_ten(k) for k in (-5, -1, 0, 3, 22)] == [1e-5, 0.1, 1, 1000, 1e22]
+
+
 def test_ends_and_what_is_outside() -> None:
     assert elementary.exp([-1e9, 1e9, -np.inf, np.inf]).tolist() == [0, np.inf, 0, np.inf]
     assert elementary.log([0, np.inf]).tolist() == [-np.inf, np.inf]

@@ -48,7 +48,25 @@ def test_systems() -> None:
     assert np.allclose(linear.lstsq(TALL[0], np.ones(7)), np.linalg.lstsq(TALL[0], np.ones(7), rcond=None)[0])
 
 
+@pytest.mark.parametrize("dependent", [False, True])
+def test_least_squares(dependent: bool) -> None:
+    matrix, right = np.vander(RANDOM.uniform(-3, 3, 40), 5), RANDOM.uniform(-3, 3, 40)
+    if dependent:
+        matrix[:, 3] = matrix[:, 0] - 2 * matrix[:, 1]
+    assert np.allclose(linear.lstsq(matrix, right), np.linalg.lstsq(matrix, right, rcond=None)[0])
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 9])
+def test_systems_of_few_diagonals(size: int) -> None:
+    factor = np.triu(np.tril(RANDOM.uniform(1, 2, (size, size))), -2)
+    matrix, right = factor @ factor.T, RANDOM.uniform(-3, 3, (size, 4))
+    diagonals = [np.diagonal(matrix, away) for away in range(3)]
+    assert np.allclose(linear.solve_banded(diagonals, right), np.linalg.solve(matrix, right))
+
+
 def test_a_singular_system_is_an_error() -> None:
+    with pytest.raises(np.linalg.LinAlgError):
+        linear.solve_banded([np.ones(2), np.ones(1)], np.ones((2, 1)))
     with pytest.raises(np.linalg.LinAlgError):
         linear.solve(np.zeros((2, 2)), np.ones(2))
     with pytest.raises(np.linalg.LinAlgError):
@@ -64,8 +82,9 @@ def test_a_singular_system_is_an_error() -> None:
         np.outer([1, 2, 3.0], [1, 2.0]),
         np.zeros((3, 2)),
         np.full((2, 2), 3.0),
+        np.array([[1, 1e-160], [1, 1e-170]]),
     ],
-    ids=["tall", "wide", "one", "of rank 1", "zero", "equal"],
+    ids=["tall", "wide", "one", "of rank 1", "zero", "equal", "of all sizes"],
 )
 def test_singular_values(matrix: np.ndarray) -> None:
     left, values, right = linear.svd(matrix)
@@ -113,6 +132,9 @@ def test_the_same_bits_as_ever() -> None:
         linear.product(TALL.reshape(-1, 126), TALL.reshape(126, -1)),
         linear.solve(STACK, STACK[::-1]),
         linear.determinant(STACK),
+        linear.lstsq(TALL.reshape(-1, 3), TALL.reshape(3, -1)[0]),
+        linear.solve_banded([9 + STACK[0, 0], STACK[0, 1, :3], STACK[0, 2, :2]], STACK[1]),
+        linear.principal_direction(TALL[0, :, :2]),
         *linear.svd(TALL),
         linear.pinv(TALL),
         *linear.eigh(STACK[:, :2, :2] + STACK[:, :2, :2].swapaxes(1, 2)),
@@ -120,4 +142,4 @@ def test_the_same_bits_as_ever() -> None:
         convolve(STACK.ravel(), TALL[0, 0]),
     ]
     digest = hashlib.sha256(b"".join(np.asarray(each, "<f8").tobytes() for each in made)).hexdigest()
-    assert digest[:16] == "ba11c45d9967875d"
+    assert digest[:16] == "e4b9f2b0ea58f1ef"

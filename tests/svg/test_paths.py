@@ -8,6 +8,7 @@ import pytest
 from tests.svg.foreign import HEAD, ROUND
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
+from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
@@ -33,6 +34,21 @@ def test_path_data_as_the_viewer_reads_it() -> None:
         assert psnr(on_white(render_svg(write_svg(scene, per_pixel=1e4))), on_white(render_svg(text))) > 36, (
             data
         )
+
+
+@pytest.mark.parametrize("turn", [0, 30, 77.7])
+@pytest.mark.parametrize("sweep", [0, 1])
+def test_an_arc_too_small_for_its_ends_is_half_an_ellipse(turn: float, sweep: int) -> None:
+    (drawn,) = cubics(f"M1 2A3 1.5 {turn} 0 {sweep} 14.1 9.3", keep_dots=False)
+    assert len(drawn.points) == 7
+    angle = np.radians(turn)
+    own = (drawn.points[::3] - [7.55, 5.65]) @ np.array(
+        [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    )
+    sizes = np.hypot(own[:, 0] / 3, own[:, 1] / 1.5)
+    assert np.allclose(sizes, sizes[0])
+    (x, y), (far_x, far_y) = drawn.points[3] - drawn.points[0], drawn.points[6] - drawn.points[0]
+    assert (x * far_y - y * far_x > 0) == (sweep == 1)
 
 
 def test_hostile_path_data_is_read_in_linear_time() -> None:

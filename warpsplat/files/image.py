@@ -23,6 +23,8 @@ from warpsplat.errors import ImageError
 from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.native import messages_hidden
+from warpsplat.portable.filters import resize_area
+from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray
 
 Taken = TypeVar("Taken")
@@ -268,7 +270,7 @@ def boxed(pixels: FloatArray, factor: int) -> FloatArray:
     whole: npt.NDArray[Any] = pixels
     if below or right:
         whole = cv2.copyMakeBorder(whole, 0, below, 0, right, cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.float32)
+    return resize_area(whole, size)
 
 
 def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
@@ -292,7 +294,7 @@ def to_srgb(
     if is_deep(image):
         grey, opacity = _grey(image)
         if profile:
-            grey = np.interp(grey, np.linspace(0, 1, 256), profile.grey()).astype(np.float32)
+            grey = interp(grey, np.linspace(0, 1, 256), profile.grey()).astype(np.float32)
         return composited([(slice(None), np.repeat(grey, 3, axis=2), opacity)], image.size, paper)
     transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
     if transparent:
@@ -368,5 +370,5 @@ def _white(image: Image.Image) -> float:
         share = f"{missing} of {image.width * image.height} pixels"
         raise ImageError(f"{share} are no numbers (NaN or infinite)")
     # Neither format says what white is: the least of the usual ones that holds all samples.
-    tops = [255.0, 65535.0, 2.0**31 - 1] if image.mode == "I" else [1.0, 255.0, 65535.0]
+    tops = [255.0, 65535.0, 2**31 - 1.0] if image.mode == "I" else [1.0, 255.0, 65535.0]
     return next((top for top in tops if largest <= top), largest)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource, image_of, source_name
+from warpsplat.portable.filters import grey
 from warpsplat.scene import FloatArray
 
 
@@ -30,4 +30,4 @@ def load_importance(
         raise ImageError(
             f"{name}: {wide}x{tall} pixels; a mask must have the proportions of its {width}x{height} image"
         )
-    return np.asarray(cv2.cvtColor(mask, cv2.COLOR_RGB2GRAY), np.float32)
+    return np.asarray(grey(mask), np.float32)

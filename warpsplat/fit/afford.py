@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from warpsplat.fit.export import export
@@ -10,6 +9,7 @@ from warpsplat.fit.rounding import USUAL_GRID, choose_grid, finest
 from warpsplat.fit.schedule import mean_points_at
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
+from warpsplat.portable import elementary
 from warpsplat.scene import Basis, Kind
 
 HEAD_BYTES = 150
@@ -38,7 +38,7 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
     room = settings.max_bytes - HEAD_BYTES
     count = float(settings.curves)
     for _ in range(8):  # settles within a shape
-        digits = max(0.0, 0.5 * math.log10(width * height / max(count, 1.0)))
+        digits = max(0.0, 0.5 * float(elementary.log10(width * height / max(count, 1.0))))
         count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (SEPARATOR + digits)))
     return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.kernels import constants
+from warpsplat.portable import elementary
+from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray, Kind, Scene
 
 Floats = npt.NDArray[np.floating]
@@ -35,14 +37,14 @@ LEVELS = np.linspace(0, 1, 201)
 def _row_profile(opacity: Floats, distance: Floats) -> Floats:
     """Coverage at a distance from a row of Gaussians [standard deviations], shape (opacity, distance)."""
     along = np.arange(-REACH, REACH + 1) / constants.SPREAD
-    g = np.exp(-0.5 * (along[:, None] ** 2 + distance**2))
+    g = elementary.exp(-0.5 * (along[:, None] ** 2 + distance**2))
     return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None, None] * g, axis=1))
 
 
 def _plateau(opacity: Floats) -> Floats:
     """Coverage well inside a grid of Gaussians."""
     along = np.arange(-REACH, REACH + 1) / constants.SPREAD
-    g = np.exp(-0.5 * (along[:, None] ** 2 + along**2)).ravel()
+    g = elementary.exp(-0.5 * (along[:, None] ** 2 + along**2)).ravel()
     return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None] * g, axis=1))
 
 
@@ -72,14 +74,14 @@ def as_paths(scene: Scene, softness: float) -> Scene:
     breadth = mass**2 / np.maximum(energy, 1e-12) * (distance[1] - distance[0])
     breadth[0] = breadth[1]
     opacity = np.clip(scene.opacities[:, None] + scene.fades, 0, 1)
-    sigma = np.hypot(constants.WIDTH_SIGMA * scene.widths, softness)
+    sigma = elementary.hypot(constants.WIDTH_SIGMA * scene.widths, softness)
     stroke = scene.kind == Kind.STROKE
     shown = np.where(
         stroke,
-        np.interp(opacity, LEVELS, height).mean(axis=1),
-        np.interp(scene.opacities, LEVELS, _plateau(LEVELS)),
+        interp(opacity, LEVELS, height).mean(axis=1),
+        interp(scene.opacities, LEVELS, _plateau(LEVELS)),
     )
-    widths = np.where(stroke, sigma * np.interp(opacity, LEVELS, breadth).mean(axis=1), 0)
+    widths = np.where(stroke, sigma * interp(opacity, LEVELS, breadth).mean(axis=1), 0)
     return replace(
         scene,
         points=_outlines(scene),

@@ -15,6 +15,7 @@ from warpsplat.fit.place import pixel_of, place, place_strokes, shape_angles
 from warpsplat.fit.schedule import opacity_threshold
 from warpsplat.fit.settings import Density, Settings
 from warpsplat.fit.streaks import Streaks
+from warpsplat.portable import elementary, filters
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas, bounds
 
@@ -119,7 +120,7 @@ def _candidates(error: FloatArray, *, mixed: bool) -> _Candidates:
         mask = inside.view(np.uint8)
         number, labels = cv2.connectedComponents(mask, connectivity=4)
         # Padded, so that the border of the image bounds a circle as well.
-        depth = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 3)[1:-1, 1:-1]
+        depth = filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
         # The deepest pixel of a component has no deeper neighbour; of several the last is taken.
         peak = np.flatnonzero(inside & (depth >= cv2.dilate(depth, np.ones((3, 3)))))
         peak = peak[np.argsort(depth.ravel()[peak], kind="stable")]
@@ -162,7 +163,7 @@ def densify(
     unit = scene.canvas.width / target.shape[1]
     total = squares(image - target)
     weighted = total if weights is None else weights * total
-    error = np.asarray(cv2.GaussianBlur(weighted, (0, 0), 1.0), np.float32)
+    error = np.asarray(filters.gaussian_blur(weighted, 1.0), np.float32)
     found = _candidates(error, mixed=settings.mixed)
     chosen: list[int] = []
     taken = np.zeros(error.shape, np.uint8)
@@ -184,7 +185,7 @@ def densify(
         places = np.concatenate([places, np.stack([column + 0.5, row + 0.5], axis=1)]).astype(np.float32)
         sizes = np.concatenate([sizes, np.full(missing, 2.0, np.float32)])
     column, row = pixel_of(places, target)
-    tones = straight(np.asarray(cv2.GaussianBlur(target, (0, 0), 1.0)[row, column], np.float32))
+    tones = straight(np.asarray(filters.gaussian_blur(target, 1.0)[row, column], np.float32))
     angles = shape_angles(settings, target, places, 2.0)
     shapes = place(settings, scene.canvas, places * unit, np.pi * (sizes * unit) ** 2, angles, tones)
     long = np.flatnonzero(lengths)
@@ -212,5 +213,5 @@ def _take(taken: npt.NDArray[np.uint8], found: _Candidates, i: int) -> None:
         cv2.circle(taken, (x, y), max(1, round(float(found.radii[i]))), 1, -1)
         return
     angle, half = float(found.angles[i]), float(found.lengths[i]) / 2
-    dx, dy = round(half * np.cos(angle)), round(half * np.sin(angle))
+    dx, dy = round(half * float(elementary.cos(angle))), round(half * float(elementary.sin(angle)))
     cv2.line(taken, (x - dx, y - dy), (x + dx, y + dy), 1, max(1, round(float(found.widths[i]))))

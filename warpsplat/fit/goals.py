@@ -21,6 +21,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.tiny import FEW, for_few
 from warpsplat.fit.work import Meter, Report
+from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS
@@ -135,11 +136,11 @@ def rounds_left(tried: list[Made], settings: Settings, most: int) -> float:
     """
     best = min(tried, key=lambda made: _rank(made, settings))
     if settings.target_psnr and _fits(best, settings):
-        return (1 - (1 - ENDING) ** most) / ENDING
+        return float(1 - elementary.power(1 - ENDING, most)) / ENDING
     assert settings.max_bytes
-    growth = math.log(AIM_FULL * settings.max_bytes / best.size)
+    growth = float(elementary.log(AIM_FULL * settings.max_bytes / best.size))
     way, step = ("grow", GROW_MOST) if growth > 0 else ("shrink", CUT_MOST)
-    return min(max(growth / math.log(step), 1.0) + LAST_ROUNDS[way], most)
+    return min(max(growth / float(elementary.log(step)), 1.0) + LAST_ROUNDS[way], most)
 
 
 def _first(pursuit: Pursuit) -> tuple[int, Fit]:
@@ -170,7 +171,7 @@ def _first(pursuit: Pursuit) -> tuple[int, Fit]:
 
 def _promise(made: Made) -> float:
     """What a file of a few shapes would have at a size that is the same for all [dB]."""
-    return made.psnr - DB_PER_DOUBLING * math.log2(made.size)
+    return made.psnr - DB_PER_DOUBLING * float(elementary.log2(made.size))
 
 
 def _fits(made: Made, settings: Settings) -> bool:
@@ -202,11 +203,11 @@ def _next(tried: list[Made], settings: Settings) -> Change | None:
         failed = [made for made in tried[tried.index(best) + 1 :] if made.size < best.size]
         if failed:
             nearest = max(failed, key=lambda made: made.size)
-            slope = (best.psnr - nearest.psnr) / math.log2(best.size / nearest.size)
+            slope = (best.psnr - nearest.psnr) / float(elementary.log2(best.size / nearest.size))
             least = (2 * nearest.size + best.size) / 3
         if surplus <= ENOUGH_DB or best.size - least < NEAR * best.size:
             return None
-        wanted = best.size * 2 ** ((AIM_DB - surplus) / slope)
+        wanted = best.size * float(elementary.power(2, (AIM_DB - surplus) / slope))
         return Change(best, max(wanted, least), best.fit.per_pixel)
     if best.size > FULL * limit and _fits(best, settings):
         return None
@@ -222,6 +223,6 @@ def _next(tried: list[Made], settings: Settings) -> Change | None:
     wanted = GROW_MOST * base.size
     if settings.target_psnr:
         lack = max(settings.target_psnr - base.psnr, LEAST_LACK)
-        wanted = min(wanted, base.size * 2 ** (lack / DB_PER_DOUBLING))
+        wanted = min(wanted, base.size * float(elementary.power(2, lack / DB_PER_DOUBLING)))
     wanted = min(wanted, AIM_FULL * limit)
     return Change(base, wanted, per_pixel if wanted <= SAME_GRID * base.size else None)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from warpsplat.alpha import on
+from warpsplat.portable import elementary, filters
 from warpsplat.scene import FloatArray
 
 LEAST = 0.05
@@ -17,6 +17,9 @@ EMPTY = 8.0
 
 TEXTURE_SIGMA = 8.0
 """Standard deviation of the window in which texture is measured [px]."""
+
+AT_ONCE = 1 << 16
+"""Pixels whose weights are found in one go: bounds the memory."""
 
 TEXTURE_NOISE = 4 / 255
 """Standard deviation of what counts as plain."""
@@ -34,17 +37,19 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
     height, width = image.shape[:2]
     weights: FloatArray | None = None
     if texture > 0:
-        grey = cv2.cvtColor(np.asarray(on(image, 1.0), np.float32), cv2.COLOR_RGB2GRAY)
+        grey = filters.grey(np.asarray(on(image, 1.0), np.float32))
         grey = grey - np.float32(0.5)  # about which 32 bits are enough
-        mean, squares = (cv2.GaussianBlur(x, (0, 0), TEXTURE_SIGMA) for x in (grey, grey * grey))
-        variance = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE**2)
-        weights = np.asarray(variance**-texture, np.float32)
+        mean, squares = (filters.gaussian_blur(x, TEXTURE_SIGMA) for x in (grey, grey * grey))
+        variance = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE * TEXTURE_NOISE)
+        weights = variance
+        for rows in np.array_split(weights, weights.size // AT_ONCE + 1):
+            rows[:] = elementary.power(rows, -texture)
     if mask is not None:
         shrinks = mask.shape[1] >= width and mask.shape[0] >= height
-        how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-        counts = LEAST + (1 - LEAST) * np.clip(cv2.resize(mask, (width, height), interpolation=how), 0, 1)
+        resize = filters.resize_area if shrinks else filters.resize_linear
+        shares = LEAST + (1 - LEAST) * np.clip(resize(mask, (width, height)), 0, 1)
         # So that a mask of one grey is exactly none.
-        counts = np.asarray(counts / counts.mean(dtype=np.float64), np.float32)
+        counts = np.asarray(shares / shares.mean(dtype=np.float64), np.float32)
         weights = counts if weights is None else weights * counts
     if image.shape[2] == 4:
         counts = np.where(image[..., 3] == 0, np.float32(EMPTY), np.float32(1))
@@ -56,5 +61,5 @@ def weights_at(weights: FloatArray, width: int, height: int) -> FloatArray:
     """``weights`` at another size, of mean 1: learning rates and other losses mean what they do without."""
     resized = weights
     if weights.shape != (height, width):
-        resized = np.asarray(cv2.resize(weights, (width, height), interpolation=cv2.INTER_AREA))
+        resized = filters.resize_area(weights, (width, height))
     return np.asarray(resized / resized.mean(dtype=np.float64), np.float32)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable import linear
+
 Floats = npt.NDArray[np.float64]
 
 SAMPLES = 12
@@ -21,7 +23,7 @@ def points_at(cubic: Floats, t: Floats) -> Floats:
     """Points of cubics, shape (..., 4, 2), at ``t``, shape (..., sample, 1)."""
     s = 1 - t
     a, b, c, d = (cubic[..., i, None, :] for i in range(4))
-    return s**3 * a + 3 * s * s * t * b + 3 * s * t * t * c + t**3 * d
+    return s * s * s * a + 3 * s * s * t * b + 3 * s * t * t * c + t * t * t * d
 
 
 def handles_through(first: Floats, second: Floats) -> Floats:
@@ -48,9 +50,9 @@ def handles_through(first: Floats, second: Floats) -> Floats:
         along, against = 3 * (1 - u) ** 2 * u * ahead, 3 * (1 - u) * u**2 * back
         missing = samples - points_at(np.concatenate([start, start, end, end], axis=-2), u)
         sides = np.stack([along, against], axis=-3)
-        system = np.einsum("...isc,...jsc->...ij", sides, sides)
-        right = np.einsum("...isc,...sc->...i", sides, missing)
-        lengths = (np.linalg.pinv(system) @ right[..., None])[..., 0]
+        system = (sides[..., :, None, :, :] * sides[..., None, :, :, :]).sum(axis=(-2, -1))
+        right = (sides * missing[..., None, :, :]).sum(axis=(-2, -1))
+        lengths = linear.product(linear.pinv(system), right[..., None])[..., 0]
         short = (lengths < 0.01 * reach).any(axis=-1, keepdims=True)
         lengths = np.where(short, reach, lengths)[..., None]
         handles = [start + lengths[..., :1, :] * ahead, end + lengths[..., 1:, :] * back]

@@ -123,7 +123,9 @@ def best_colors(step: Step, scene: Scene) -> FloatArray:
     seen = step.renderer.visible()
     weighted = step.weights()[seen.tile] * seen.share
     squares = (weighted * seen.share).sum(axis=(1, 2), dtype=np.float64)
-    pulls = np.einsum("sij,scij->sc", weighted, step.lacking()[seen.tile])
+    lacking = step.lacking()[seen.tile]
+    lacking *= weighted[:, None]
+    pulls = lacking.sum(axis=(2, 3))
     total = np.bincount(seen.shape, weights=squares, minlength=len(scene))
     colors = scene.colors.copy()
     for channel in range(3):

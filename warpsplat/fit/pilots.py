@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,6 +10,7 @@ from warpsplat.fit.pursuit import Pursuit
 from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.fit.work import Progress
+from warpsplat.portable import elementary
 
 PILOT_CURVES = 256
 """Of the first pilot."""
@@ -44,7 +44,8 @@ def pilot(pursuit: Pursuit, most: int) -> tuple[int, int, Fit]:
     settings = pursuit.settings
     assert settings.target_psnr
     draft = _draft(settings)
-    aim = settings.target_psnr - PILOT_GAIN * math.log(settings.iterations / draft.iterations) / math.log(5)
+    longer = elementary.log(settings.iterations / draft.iterations) / elementary.log(5)
+    aim = settings.target_psnr - PILOT_GAIN * float(longer)
     curves, done = min(PILOT_CURVES, most), 0
     seen: dict[int, float] = {}
     for turn in range(PILOTS):
@@ -92,12 +93,12 @@ def curves_for(aim: float, seen: dict[int, float], most: int) -> int:
     nearest, *others = sorted(seen, key=lambda count: abs(seen[count] - aim))
     slope = DB_PER_DOUBLING
     if others:
-        slope = (seen[nearest] - seen[others[0]]) / math.log2(nearest / others[0])
+        slope = (seen[nearest] - seen[others[0]]) / float(elementary.log2(nearest / others[0]))
     missing = aim - seen[nearest]
     # Pilots gain less by more shapes than whole runs do; rather too many shapes than too few.
     doublings = missing / max(slope, (0.75 if missing > 0 else 1.0) * DB_PER_DOUBLING)
-    step = math.log2(PILOT_STEP)
-    return max(1, min(most, round(nearest * 2 ** min(max(doublings, -step), step))))
+    step = float(elementary.log2(PILOT_STEP))
+    return max(1, min(most, round(nearest * float(elementary.power(2, min(max(doublings, -step), step))))))
 
 
 def usual_rounds(pursuit: Pursuit, curves: int) -> float:

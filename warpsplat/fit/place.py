@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import CLEAR, on, straight
 from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.portable import elementary, filters
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
 COVER = 1.3
@@ -71,7 +72,7 @@ def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
     if span <= 1:
         return target, 1.0
     size = (max(1, round(width / span)), max(1, round(height / span)))
-    return np.asarray(cv2.resize(target, size, interpolation=cv2.INTER_AREA), np.float32), float(span)
+    return filters.resize_area(target, size), float(span)
 
 
 def simple_curves(target: FloatArray) -> int:
@@ -108,9 +109,9 @@ def background_color(target: FloatArray) -> FloatArray:
 def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatArray:
     """Circles as rings of ``2 * chain_cubics`` cubics, shape (shape, 6 * chain_cubics, 2)."""
     count = 2 * chain_cubics
-    handle = 4 / 3 * np.tan(np.pi / (2 * count))
+    handle = 4 / 3 * elementary.tan(np.pi / (2 * count))
     angle = 2 * np.pi * np.arange(count) / count
-    on = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    on = np.stack([elementary.cos(angle), elementary.sin(angle)], axis=1)
     turn = np.stack([-on[:, 1], on[:, 0]], axis=1)
     following, following_turn = np.roll(on, -1, axis=0), np.roll(turn, -1, axis=0)
     ring = np.stack([on, on + handle * turn, following - handle * following_turn], axis=1).reshape(-1, 2)
@@ -120,9 +121,9 @@ def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatA
 def circle_splines(centres: Floats, radii: Floats, count: int) -> FloatArray:
     """Circles as splines of ``count`` points, shape (shape, count, 2)."""
     angle = 2 * np.pi * np.arange(count) / count
-    on = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    on = np.stack([elementary.cos(angle), elementary.sin(angle)], axis=1)
     # Where quadratics meet and in the middle of each, the outline lies this much nearer than the points.
-    nearer = (np.cos(np.pi / count) + (3 + np.cos(2 * np.pi / count)) / 4) / 2
+    nearer = (elementary.cos(np.pi / count) + (3 + elementary.cos(2 * np.pi / count)) / 4) / 2
     reach = 1 / nearer
     return np.asarray(centres[:, None] + radii[:, None, None] * reach * on, np.float32)
 
@@ -130,7 +131,7 @@ def circle_splines(centres: Floats, radii: Floats, count: int) -> FloatArray:
 def stroke_outlines(centres: Floats, lengths: Floats, angles: Floats, count: int) -> FloatArray:
     """Straight strokes of ``count`` points, shape (shape, count, 2)."""
     t = np.linspace(-0.5, 0.5, count)
-    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)
     along = lengths[:, None] * t[None, :]
     return np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
 
@@ -205,10 +206,10 @@ def canvas_for(settings: Settings, target: FloatArray) -> Canvas:
 def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
     """Direction along the contours at ``centres`` [rad]: the structure tensor's lesser eigenvector."""
     grey = target.mean(axis=2)
-    gx, gy = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
-    xx, yy, xy = (cv2.GaussianBlur(g, (0, 0), max(sigma, 0.5)) for g in (gx * gx, gy * gy, gx * gy))
+    gx, gy = filters.sobel(grey)
+    xx, yy, xy = (filters.gaussian_blur(g, max(sigma, 0.5)) for g in (gx * gx, gy * gy, gx * gy))
     column, row = pixel_of(centres, target)
-    gradient = 0.5 * np.arctan2(2 * xy[row, column], (xx - yy)[row, column])
+    gradient = 0.5 * elementary.arctan2(2 * xy[row, column], (xx - yy)[row, column])
     return np.asarray(gradient + np.pi / 2, np.float32)
 
 
@@ -242,7 +243,7 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     centres = np.stack([x, y], axis=1) + rng.uniform(-0.25, 0.25, (count, 2)) * cell
     centres = np.clip(centres, 0, [width, height])
     small, span = survey(target, cell / 2)
-    blurred = cv2.GaussianBlur(small, (0, 0), max(cell / span / 4, 0.5))
+    blurred = filters.gaussian_blur(small, max(cell / span / 4, 0.5))
     column, row = pixel_of(centres / span, small)
     areas = np.full(count, COVER * cell * cell)
     angles = shape_angles(settings, small, centres / span, cell / span / 2)

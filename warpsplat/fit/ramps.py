@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from warpsplat.fit.step import Step
 from warpsplat.kernels import constants
+from warpsplat.portable import elementary, linear
 from warpsplat.scene import GRADIENTS, FloatArray
 from warpsplat.scene.geometry import bounds
 
@@ -119,13 +120,13 @@ class Survey:
         pulls, colors = np.zeros((count, 3, 3, 3)), np.zeros((count, 3, 3, 3))
         lost, squares = np.zeros(count), np.zeros((count, 3))
         for slots in self._slots(np.ones(count, np.bool_)):
-            x, y = (p[..., None] ** np.arange(5) for p in (slots.x, slots.y))
-            np.add.at(moments, slots.shape, np.swapaxes(x, 1, 2) @ slots.weight @ y)
-            x, y = np.swapaxes(x[:, None, :, :3], 2, 3), y[:, None, :, :3]
-            np.add.at(pulls, slots.shape, x @ slots.pull @ y)
+            x, y = _powers(slots.x), _powers(slots.y)
+            np.add.at(moments, slots.shape, _summed(x, slots.weight, y))
+            x, y = x[:, None, :3], y[:, None, :3]
+            np.add.at(pulls, slots.shape, _summed(x, slots.pull, y))
             if self._gradient[slots.shape].any():
                 weighted = slots.weight[:, None] * slots.color
-                np.add.at(colors, slots.shape, x @ weighted @ y)
+                np.add.at(colors, slots.shape, _summed(x, weighted, y))
                 np.add.at(lost, slots.shape, 2 * (slots.pull * slots.color).sum(axis=(1, 2, 3)))
                 np.add.at(squares, slots.shape, (weighted * slots.color).sum(axis=(2, 3)))
         gram, pull, colored = _gram(moments), _by_basis(pulls), _by_basis(colors)
@@ -156,9 +157,9 @@ class Survey:
             how the way along the line depends on these, shape (shape, size), in units of its standard
             deviation; the colours of such a unit, shape (shape, 3); the gain, shape (shape,).
         """
-        lower = np.linalg.cholesky(self._spread[:, :size, :size])
-        left, sizes, right = np.linalg.svd(np.linalg.solve(lower, self._slope[:, :size]))
-        along = np.linalg.solve(np.swapaxes(lower, 1, 2), left[:, :, :1])[..., 0]
+        lower = linear.cholesky(self._spread[:, :size, :size])
+        left, sizes, right = linear.svd(linear.solve(lower, self._slope[:, :size]))
+        along = linear.solve(np.swapaxes(lower, 1, 2), left[:, :, :1])[..., 0]
         tints = (sizes[:, 0] / self._weight)[:, None] * right[:, 0]
         return along, tints, sizes[:, 0] ** 2 / (self._weight * self._values)
 
@@ -182,7 +183,7 @@ class Survey:
         gain, radii, slope = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
         for slots in self._slots(chosen):
             x, y = slots.x - centre[slots.shape, :1], slots.y - centre[slots.shape, 1:]
-            r = np.hypot(x[:, :, None], y[:, None])
+            r = elementary.hypot(x[:, :, None], y[:, None])
             weighted = slots.weight * r
             sums = [weighted.sum(axis=(1, 2)), (weighted * r).sum(axis=(1, 2))]
             np.add.at(radii, slots.shape, np.stack(sums, axis=1))
@@ -199,6 +200,17 @@ class Survey:
         axis = np.stack([self._half * last, np.zeros(count)], axis=1)
         place = self._middle + self._half[:, None] * centre
         return _ramps(gain, np.concatenate([place, axis, _turned(axis)], axis=1), first / last, *ends)
+
+
+def _powers(places: Floats) -> Floats:
+    """The powers 0 to 4 of places (slot, place), shape (slot, power, place)."""
+    squares = places * places
+    return np.stack([np.ones_like(places), places, squares, squares * places, squares * squares], axis=1)
+
+
+def _summed(x: Floats, values: FloatArray, y: Floats) -> Floats:
+    """Sums of values (..., k, m) with weights x (..., i, k) and y (..., j, m), shape (..., i, j)."""
+    return linear.product(linear.product(x, values), np.swapaxes(y, -2, -1))
 
 
 def _off(slots: Slots, gradient: Bools, mean: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from warpsplat.portable import elementary
 
 DB_PER_DOUBLING = 1.8
 """What twice the shapes, and so twice the bytes, gain on photographs [dB] (docs/experiments.md)."""
@@ -13,4 +13,4 @@ def byte_worth(square_error: float, size: int) -> float:
 
     Shapes bought with the byte would lower it by as much: d error / d size at ``DB_PER_DOUBLING``.
     """
-    return square_error * DB_PER_DOUBLING * math.log(10) / (10 * math.log(2) * size)
+    return square_error * DB_PER_DOUBLING * elementary.LN10 / (10 * elementary.LN2 * size)

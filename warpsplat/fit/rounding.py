@@ -14,6 +14,7 @@ from warpsplat.fit.export import export
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
+from warpsplat.portable import elementary
 from warpsplat.scene import OPACITY_RANGE, Paint, Scene
 from warpsplat.svg.write import GRIDS, rounded
 
@@ -64,7 +65,7 @@ def opacities_at(settings: Settings) -> int:
 
 def finest(settings: Settings) -> float:
     """Units a pixel of the finest grid that the settings allow."""
-    return GRIDS[-1] if settings.precision is None else 10.0**settings.precision
+    return GRIDS[-1] if settings.precision is None else elementary.power_of_ten(settings.precision)
 
 
 def choose_grid(step: Step, *, staged: bool, thrifty: bool = False) -> float:
@@ -85,7 +86,7 @@ def choose_grid(step: Step, *, staged: bool, thrifty: bool = False) -> float:
     scene = state.scene()
     before = error(scene)
     after_refit = STAGED if staged else 1.0
-    allowed = before * (10 ** ((THRIFTY_LOSS if thrifty else LOSS) / 10) - 1) / after_refit
+    allowed = before * float(elementary.power(10, (THRIFTY_LOSS if thrifty else LOSS) / 10) - 1) / after_refit
     limit = finest(step.settings)
     grid, least = limit, math.inf
     worth = byte_worth(before, len(export(scene, step.settings, min(USUAL_GRID, limit)))) if thrifty else 0.0

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from warpsplat.fit.settings import Density, Settings
+from warpsplat.portable import elementary
 
 SIZE_CHOICES = 12
 """How many lengths of the shorter side are tried for a reduced image."""
@@ -63,7 +64,7 @@ def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
 def fold_weight(settings: Settings, step: int) -> float:
     """Weight of the fold loss; it grows geometrically over the run."""
     growth = settings.fold_end / settings.fold_start
-    return float(settings.fold_start * growth ** (step / settings.iterations))
+    return float(settings.fold_start * elementary.power(growth, step / settings.iterations))
 
 
 def opacity_threshold(density: Density, progress: float) -> float:
@@ -83,9 +84,10 @@ def shapes_at(settings: Settings, step: int) -> int:
     most = density.surplus * settings.curves
     if step > density.thin * steps:
         done = (step - density.thin * steps) / ((density.stop - density.thin) * steps - density.interval)
-        return round(most * density.surplus ** -min(done, 1.0))
+        return round(most * float(elementary.power(density.surplus, -min(done, 1.0))))
     missing = 1.0 - step / (density.grown * steps) if density.grown > 0 else 0.0
-    return max(1, round(most * (density.start / density.surplus) ** max(missing, 0.0)))
+    share = elementary.power(density.start / density.surplus, max(missing, 0.0))
+    return max(1, round(most * float(share)))
 
 
 def repaints_at(settings: Settings, step: int) -> bool:

@@ -6,7 +6,6 @@ them are kept: from there the next fit grows on, further, and leaves out the beg
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.settings import DENSITY_RANGES, Settings
 from warpsplat.fit.state import Past
 from warpsplat.fit.work import Progress, Report
+from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
 
@@ -117,8 +117,9 @@ def begin_of(settings: Settings, shapes: int) -> int:
     density, steps = settings.density, settings.iterations
     if density.interval <= 0:
         return 0
-    growth = math.log(density.surplus / density.start)
-    missing = math.log(density.surplus * settings.curves / shapes) / growth if growth > 0 else 0.0
+    growth = float(elementary.log(density.surplus / density.start))
+    lacking = float(elementary.log(density.surplus * settings.curves / shapes))
+    missing = lacking / growth if growth > 0 else 0.0
     share = min(max(density.grown * (1 - missing), BEGIN[0]), BEGIN[1])
     latest = max(density.grown * steps - TURNS * density.interval, 0)
     return round(min(share * steps, latest)) // density.interval * density.interval
@@ -128,6 +129,7 @@ def growing(settings: Settings, shapes: int, begin: int) -> Settings:
     """``settings`` whose schedule has so many ``shapes`` at the step ``begin``, and then grows as before."""
     density = settings.density
     left = 1 - begin / (density.grown * settings.iterations)
-    start = density.surplus * (shapes / (density.surplus * settings.curves)) ** (1 / left)
+    share = elementary.power(shapes / (density.surplus * settings.curves), 1 / left)
+    start = density.surplus * float(share)
     low, high = DENSITY_RANGES["start"]
     return replace(settings, density=replace(density, start=min(max(start, low), high)))

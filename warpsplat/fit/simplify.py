@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable.sequences import interp
 from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 
 SAMPLES = 4
@@ -46,7 +47,7 @@ def without(points: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
     t = (np.arange(5 * SAMPLES) + 0.5) / SAMPLES
     old = _quadratics(window, t)
     # Without the point, two quadratics go half as far again as before.
-    t = np.interp(t, [0, 1, 2.5, 4, 5], np.arange(5))
+    t = interp(t, [0, 1, 2.5, 4, 5], np.arange(5))
     kept = window[..., [0, 1, 2, 4, 5, 6], :]
     plain = _quadratics(kept, t)
     # Both neighbours move by w times the bulge that the point made.
@@ -55,7 +56,7 @@ def without(points: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
     unit[2:4] = 1
     share = _quadratics(unit, t)  # [sample, 1]
     missing = old - plain
-    along = (missing * bulge[..., None, :]).sum(axis=-1) @ share[:, 0]
+    along = ((missing * bulge[..., None, :]).sum(axis=-1) * share[:, 0]).sum(axis=-1)
     w = along / np.maximum((bulge**2).sum(axis=-1) * (share**2).sum(), 1e-12)
     shift = w[..., None] * bulge
     apart = missing - share * shift[..., None, :]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
-import cv2
 import numpy as np
 import warp as wp
 
@@ -19,6 +16,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
 from warpsplat.fit.work import Snapshot
+from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import ExactModel, GaussianModel, Model, SplatModel
 from warpsplat.rendering.program import Program, capture
@@ -41,7 +39,7 @@ class Target:
         self.phase = phase
         height, width = image.shape[:2]
         size = (phase.width, phase.height)
-        reduced = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        reduced = image if size == (width, height) else filters.resize_area(image, size)
         self.image = np.ascontiguousarray(reduced, np.float32)
         self.weights = None if weights is None else weights_at(weights, *size)
         """Shape (height, width), mean 1."""
@@ -215,12 +213,12 @@ class Step:
         """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
         look at the file on, an estimate of the file's. Reads a number a tile back from the device.
         """
-        return -10 * math.log10(max(self.aim.mean_square(), 1e-12))
+        return -10 * float(elementary.log10(max(self.aim.mean_square(), 1e-12)))
 
     def render_psnr(self) -> float:
         """Of the last render against the image, at its size [dB]. Reads the render back from the device."""
         error = squares(self.renderer.read_image() - self.target.image).mean(dtype="float64") / 3
-        return -10 * math.log10(max(error, 1e-12))
+        return -10 * float(elementary.log10(max(error, 1e-12)))
 
     def snapshot(self) -> Snapshot:
         """What there is now, for people to look at."""

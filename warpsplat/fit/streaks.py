@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray, IndexArray
 
 ASPECT = 8.0
@@ -49,12 +50,12 @@ class Streaks:
         # A pixel is a square, whose own second moment is a twelfth.
         xx, yy = mean(x * x) - cx**2 + 1 / 12, mean(y * y) - cy**2 + 1 / 12
         xy = mean(x * y) - cx * cy
-        half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+        half, root = (xx + yy) / 2, elementary.hypot((xx - yy) / 2, xy)
         length, breadth = np.sqrt(12 * (half + root)), np.sqrt(12 * np.maximum(half - root, 1e-6))
         width = size / length
         return Streaks(
             _single(np.stack([cx, cy], axis=1)),
-            _single(0.5 * np.arctan2(2 * xy, xx - yy)),
+            _single(0.5 * elementary.arctan2(2 * xy, xx - yy)),
             _single(length),
             _single(width),
             _single(np.minimum(1.0, width / breadth)),

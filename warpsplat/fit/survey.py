@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -20,6 +18,7 @@ from warpsplat.fit.schedule import Phase, phases
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import Past
 from warpsplat.fit.work import Meter, Progress, Report
+from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
 
@@ -93,9 +92,11 @@ class Worth:
 
     def psnr(self, shapes: float | npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Of the file [dB]."""
-        doublings = np.log2(np.asarray(shapes, np.float64) / self.measured)
+        doublings = elementary.log2(np.asarray(shapes, np.float64) / self.measured)
         decibels = self.psnr_there + self.slope * doublings + self.bend * doublings**2
-        return np.asarray(-10 * np.log10(10 ** (-np.minimum(decibels, CEILING) / 10) + self.detail))
+        return np.asarray(
+            -10 * elementary.log10(elementary.power(10, -np.minimum(decibels, CEILING) / 10) + self.detail)
+        )
 
     def size(self, shapes: float | npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Bytes of the file."""
@@ -166,12 +167,12 @@ def expected(most: int, short: tuple[int, float], probe: tuple[int, float], gain
         size: bytes of the short run's file.
     """
     shapes, psnr = short
-    doublings = math.log2(shapes / probe[0]) if shapes > probe[0] else 0.0
+    doublings = float(elementary.log2(shapes / probe[0])) if shapes > probe[0] else 0.0
     below = (min(psnr, CEILING) - min(probe[1], CEILING)) / doublings if doublings else 0.0
     below = min(max(SLOPE * below, 0.0), STEEPEST)
     # Its rise from the probe to the short run is as measured, and nowhere does it fall.
-    bend = min(BEND, below / (2 * math.log2(MEASURED / FEWEST) - math.log2(FEWER)))
-    slope = below + bend * math.log2(FEWER)
+    bend = min(BEND, below / (float(2 * elementary.log2(MEASURED / FEWEST) - elementary.log2(FEWER))))
+    slope = below + bend * float(elementary.log2(FEWER))
     there, each = min(psnr, CEILING) + gain, LATER_BYTES * size / shapes
     return Worth(min(FEWEST, most), most, shapes, there, slope, bend, each)
 
@@ -179,8 +180,8 @@ def expected(most: int, short: tuple[int, float], probe: tuple[int, float], gain
 def expected_gain(psnr: float, plan: Sequence[Phase]) -> float:
     """What a run of the default effort has over a short one with ``psnr`` and the sizes of ``plan`` [dB]."""
     first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
-    low, high = map(math.log, GAIN_SIZES)
-    seen = min(max((high - math.log(last / first)) / (high - low), 0.0), 1.0)
+    low, high = map(elementary.log, GAIN_SIZES)
+    seen = min(max(float((high - elementary.log(last / first)) / (high - low)), 0.0), 1.0)
     return GAIN * seen * min(max((psnr - GAIN_FROM) / (GAIN_WHOLE - GAIN_FROM), 0.0), 1.0)
 
 
@@ -202,6 +203,6 @@ def lost_detail(image: FloatArray, settings: Settings) -> float:
     phase = phases(settings, width, height)[-1]
     if (phase.width, phase.height) == (width, height):
         return 0.0
-    small = cv2.resize(image, (phase.width, phase.height), interpolation=cv2.INTER_AREA)
-    whole = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
+    small = filters.resize_area(image, (phase.width, phase.height))
+    whole = filters.resize_linear(small, (width, height))
     return float(squares(whole - image).mean(dtype="float64")) / 3

@@ -6,6 +6,7 @@ of what its parts hold beside the image: reading it, fitting or tracing, and mea
 
 from __future__ import annotations
 
+import math
 import os
 from contextlib import suppress
 from dataclasses import dataclass
@@ -126,7 +127,7 @@ def _fitting(facts: Facts, settings: Settings, factor: int) -> float:
     phase = phases(settings, -(-facts.width // factor), -(-facts.height // factor))[-1]
     pixels, curves = phase.width * phase.height, settings.curves
     tiles = pixels / 256
-    slots = SLOTS_A_TILE * tiles + SLOTS_BETWEEN * (tiles * curves) ** 0.5 + SLOTS_A_SHAPE * curves
+    slots = SLOTS_A_TILE * tiles + SLOTS_BETWEEN * math.sqrt(tiles * curves) + SLOTS_A_SHAPE * curves
     slot = SLOT
     slot += SLOT_STROKE if settings.kind == Kind.STROKE or settings.mixed else 0
     slot += SLOT_PAINT if settings.paint != "flat" else 0

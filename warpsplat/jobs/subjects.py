@@ -22,6 +22,7 @@ from warpsplat.fit.work import Meter, Report
 from warpsplat.jobs.line import draw_lines
 from warpsplat.jobs.thin import THIN, THINNEST, best_of_thin, continued, cut, margins
 from warpsplat.metrics import psnr
+from warpsplat.portable.elementary import log2
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
@@ -104,7 +105,7 @@ def draw(
         if count <= low or over():
             break
         if tries:
-            tries.left = max(min(tries.left, math.log2(high - low)) - 1, 0.0)
+            tries.left = max(min(tries.left, float(log2(high - low))) - 1, 0.0)
         made = drawn(count)
         size = _size(made, settings)
         if size <= settings.max_bytes:
@@ -159,7 +160,7 @@ class Tries:
         if not self._regions:
             self._regions = max(len(traced), 1)
             fits = FINISHED * len(write_svg(traced)) <= self._most
-            self.left = 0.0 if fits else min(self.left, math.log2(self._regions + 1))
+            self.left = 0.0 if fits else min(self.left, float(log2(self._regions + 1)))
         return self._meter.stage(math.sqrt(len(traced) / self._regions), self.left * SMALLER)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -17,6 +16,7 @@ from warpsplat.fit.survey import Worth, survey
 from warpsplat.fit.work import Report
 from warpsplat.jobs.prepare import prepare
 from warpsplat.jobs.several import OWN_NUMBER
+from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Backend
 from warpsplat.trace.subject import guess_subject
 
@@ -157,7 +157,8 @@ def suggestion(worth: Worth) -> Suggestion:
 
 def knee(worth: Worth, more: float) -> int:
     """The most shapes at which ``more`` of them buy ``SEEN``, at the rate there; the fewest if none do."""
-    shapes = np.geomspace(worth.fewest, worth.most, SAMPLES)
+    low, high = elementary.log([worth.fewest, worth.most])
+    shapes = elementary.exp(np.linspace(low, high, SAMPLES))
     if worth.fewest == worth.most:
         return worth.most
     rate = np.gradient(np.minimum(worth.psnr(shapes), EXACT), shapes)
@@ -193,6 +194,7 @@ def reason(worth: Worth, chosen: int, more: str) -> str:
 
 def rounded(number: float) -> int:
     """A number that is easily said, near another one."""
-    unit = 10.0 ** math.floor(math.log10(max(FINE * number, 1.0)))
-    step = max(unit * factor for factor in (1, 2, 5) if unit * factor <= max(FINE * number, 1.0))
+    most = max(FINE * number, 1.0)
+    unit = elementary.power_of_ten(len(str(int(most))) - 1)
+    step = max(unit * factor for factor in (1, 2, 5) if unit * factor <= most)
     return max(1, round(step * round(number / step)))

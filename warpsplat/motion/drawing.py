@@ -12,6 +12,7 @@ import numpy as np
 
 from warpsplat.motion.films import Frame, ticks_of, zoom_of
 from warpsplat.motion.shown import picture, screen, size_of
+from warpsplat.portable.linear import product
 from warpsplat.svg.numbers import number
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.write import MARK, NAMESPACE
@@ -105,12 +106,12 @@ def path_length(data: str) -> float:
     """Of the longest subpath of path data [its own units]: dashes begin anew with each."""
     t = np.linspace(0, 1, PIECES + 1)[:, None]
     s = 1 - t
-    weights = np.concatenate([s**3, 3 * s * s * t, 3 * s * t * t, t**3], axis=1)
+    weights = np.concatenate([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
     longest = 0.0
     for subpath in cubics(data, keep_dots=True):
         count = (len(subpath.points) - 1) // 3
         controls = subpath.points[3 * np.arange(count)[:, None] + np.arange(4)]
-        vertices = np.einsum("vk,ckx->cvx", weights, controls)
+        vertices = product(weights, controls)
         longest = max(longest, float(np.linalg.norm(np.diff(vertices, axis=1), axis=2).sum()))
     return longest
 

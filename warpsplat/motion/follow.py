@@ -11,7 +11,6 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from warpsplat.scene import FloatArray, IndexArray, Scene
@@ -22,6 +21,9 @@ COLOR_WEIGHT = 0.1
 
 FARTHEST = 0.1
 """From a shape to what it becomes, in the same measure."""
+
+AT_ONCE = 1 << 18
+"""Pairs of shapes that are compared in one go: bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,26 @@ def pairs(before: FloatArray, after: FloatArray) -> list[tuple[int, int]]:
     """
     if not (len(before) and len(after)):
         return []
-    found = cv2.BFMatcher(cv2.NORM_L2, crossCheck=True).match(before, after)
-    near = sorted((one.queryIdx, one.trainIdx) for one in found if one.distance < FARTHEST)
+    there, back = nearest(before, after), nearest(after, before)
+    rows = np.flatnonzero(back[there] == np.arange(len(before)))
+    apart = np.linalg.norm(before[rows] - after[there[rows]], axis=1)
+    near = [(row, int(there[row])) for row in rows[apart < FARTHEST].tolist()]
     return [near[i] for i in ascending([row for _, row in near])]
+
+
+def nearest(rows: FloatArray, others: FloatArray) -> IndexArray:
+    """Which of the ``others`` is the nearest to each of the ``rows``, the first of several."""
+    found = np.zeros(len(rows), np.intp)
+    columns = np.ascontiguousarray(others.T)
+    step = max(1, AT_ONCE // len(others))
+    for first in range(0, len(rows), step):
+        squares = np.zeros((len(rows[first : first + step]), len(others)), np.float32)
+        for mine, theirs in zip(rows[first : first + step].T, columns, strict=True):
+            away = mine[:, None] - theirs
+            away *= away
+            squares += away
+        found[first : first + step] = squares.argmin(axis=1)
+    return found
 
 
 def ascending(values: Sequence[int]) -> list[int]:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from warpsplat.motion.follow import lives
+from warpsplat.portable.sequences import interp
 from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
 from warpsplat.svg.data import even_cubic_data, even_spline_data
@@ -160,8 +161,11 @@ def _goes_on(piece: Piece, form: Form, points: FloatArray) -> bool:
             return False
         piece.slots = piece.slots[kept_points(piece.points[-1][piece.slots], points)]
     count = len(piece.points[0])
-    period = count if form[3] else None
-    filled = [np.interp(np.arange(count), piece.slots, column, period=period) for column in points.T]
+    slots = piece.slots
+    if form[3]:
+        slots = np.concatenate([slots[-1:] - count, slots, slots[:1] + count])
+        points = np.concatenate([points[-1:], points, points[:1]])
+    filled = [interp(np.arange(count), slots, column) for column in points.T]
     piece.points.append(np.stack(filled, axis=1).astype(np.float32))
     return True
 

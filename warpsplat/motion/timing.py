@@ -6,6 +6,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from warpsplat.portable.elementary import power
+
 SECONDS = 6.0
 """Of an animation's movement, where it is not said."""
 
@@ -41,7 +43,7 @@ def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing
     """
     found: list[Showing] = []
     for tick in range(ticks if moments else 0):
-        now = (moments[-1] + 1) * ((tick + 0.5) / ticks) ** EARLY
+        now = (moments[-1] + 1) * float(power((tick + 0.5) / ticks, EARLY))
         index = max(0, bisect_right(moments, now) - 1)
         if found and found[-1].index == index:
             found[-1] = Showing(index, found[-1].seconds + seconds / ticks)

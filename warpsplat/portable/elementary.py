@@ -16,9 +16,12 @@ Values = Any
 
 Result = npt.NDArray[np.float64]
 
+LN2, LN10 = 0.6931471805599453, 2.302585092994046
+"""The natural logarithms of 2 and 10."""
+
 LN2_HIGH = float.fromhex("0x1.62e42feep-1")
 LN2_LOW = float.fromhex("0x1.a39ef35793c76p-33")
-"""The natural logarithm of 2 as a sum: products of the first part with whole numbers are exact."""
+"""That of 2 as a sum: products of the first part with whole numbers are exact."""
 
 HALF_PI_PARTS = tuple(map(float.fromhex, ("0x1.921fb544p+0", "0x1.0b4611a6p-34", "0x1.3198a2e037073p-69")))
 """Half of pi as a sum, the same way."""
@@ -51,7 +54,7 @@ def _polynomial(x: Result, terms: tuple[float, ...]) -> Result:
 def exp(x: Values) -> Result:
     """Return e to the power ``x``."""
     x = np.clip(np.asarray(x, np.float64), EXP_MIN, EXP_MAX)
-    whole = np.rint(x * (1 / math.log(2)))
+    whole = np.rint(x * (1 / LN2))
     rest = (x - whole * LN2_HIGH) - whole * LN2_LOW
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         return np.ldexp(_polynomial(rest, EXP_TERMS), np.nan_to_num(whole).astype(np.int32))
@@ -77,12 +80,12 @@ def log2(x: Values) -> Result:
     mantissa, exponent = np.frexp(np.asarray(x, np.float64))
     exact = mantissa == 0.5
     with np.errstate(invalid="ignore"):
-        return np.where(exact, exponent - 1.0, log(mantissa) * (1 / math.log(2)) + exponent)[()]
+        return np.where(exact, exponent - 1.0, log(mantissa) * (1 / LN2) + exponent)[()]
 
 
 def log10(x: Values) -> Result:
     """Return the logarithm of ``x`` to base 10."""
-    return log(x) * (1 / math.log(10))
+    return log(x) * (1 / LN10)
 
 
 def log1p(x: Values) -> Result:
@@ -100,6 +103,11 @@ def power(base: Values, exponent: Values) -> Result:
     with np.errstate(invalid="ignore"):
         value = exp(exponent * log(base))
     return np.where(exponent == 0, 1.0, np.where(exponent == 1, base, value))[()]
+
+
+def power_of_ten(exponent: int) -> float:
+    """Return the number nearest to 10 to the power ``exponent``."""
+    return float(f"1e{exponent}")
 
 
 def _quarter_turns(x: Values) -> tuple[Result, Result]:

@@ -5,6 +5,7 @@ Sums go by the inner index in its order. Matrices are the last two axes, as in `
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ Result = npt.NDArray[Any]
 
 SWEEPS = 30
 """Rounds of Jacobi rotations at most; they converge quadratically, within ten."""
+
+DEPENDENT = 1e-20
+"""What is left of the square of a column that others nearly make up, over the whole."""
 
 LOOPED = 64
 """Products with a longer inner index are summed by NumPy at once rather than term by term."""
@@ -143,7 +147,8 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
                     continue
                 done = False
                 ratio = (squares[1] - squares[0]) / (2 * np.where(apart, mixed, 1.0))
-                tangent = np.where(ratio < 0, -1.0, 1.0) / (np.abs(ratio) + np.sqrt(1 + ratio * ratio))
+                with np.errstate(over="ignore"):  # of columns that are 0 beside others: no turn
+                    tangent = np.where(ratio < 0, -1.0, 1.0) / (np.abs(ratio) + np.sqrt(1 + ratio * ratio))
                 tangent = np.where(apart, tangent, 0.0)
                 cosine = (1 / np.sqrt(1 + tangent * tangent))[..., None]
                 sine = cosine * tangent[..., None]
@@ -174,8 +179,64 @@ def pinv(matrix: Matrices, tolerance: float = 1e-15) -> Result:
 
 def lstsq(matrix: Matrices, right: Matrices) -> Result:
     """Return the shortest ``x`` with the least squared error of ``matrix @ x = right``."""
-    matrix = np.asarray(matrix, np.float64)
+    matrix, right = np.asarray(matrix, np.float64), np.asarray(right, np.float64)
+    found = (
+        _orthogonalized(matrix, right) if right.ndim == 1 and matrix.shape[-2] >= matrix.shape[-1] else None
+    )
+    return _by_pinv(matrix, right) if found is None else found
+
+
+def _by_pinv(matrix: Result, right: Result) -> Result:
     return product(pinv(matrix, np.finfo(np.float64).eps * max(matrix.shape[-2:])), right)
+
+
+def _orthogonalized(matrix: Result, right: Result) -> Result | None:
+    """Solve for a vector by making the columns orthogonal; None where some are nearly dependent."""
+    size = matrix.shape[1]
+    rest = np.concatenate([matrix.T, right[None]])
+    whole = (rest * rest).sum(axis=1)
+    shares = np.zeros((size, size + 1))
+    for k in range(size):
+        column = rest[k]
+        square = (column * column).sum()
+        if square <= DEPENDENT * whole[k]:
+            return None
+        shares[k, k + 1 :] = (column * rest[k + 1 :]).sum(axis=1) / square
+        rest[k + 1 :] -= shares[k, k + 1 :, None] * column
+    found = shares[:, size].copy()
+    for k in range(size - 1, 0, -1):
+        found[:k] -= shares[:k, k] * found[k]
+    return found
+
+
+def solve_banded(diagonals: Sequence[Matrices], right: Matrices) -> Result:
+    """Return ``x`` of ``matrix @ x = right`` for a symmetric positive definite matrix with few diagonals.
+
+    Args:
+        diagonals: The main one, shape (n,), and those beside it, (n - 1,), (n - 2,) ...
+        right: Shape (n, k).
+
+    Raises:
+        np.linalg.LinAlgError: The matrix is not positive definite.
+    """
+    lower = [np.asarray(diagonal, np.float64).tolist() for diagonal in diagonals]
+    found = np.array(right, np.float64)
+    size, factors = len(found), []
+    for i in range(size):
+        pivot = lower[0][i]
+        if not pivot > 0:
+            raise np.linalg.LinAlgError("the matrix is not positive definite")
+        below = [lower[d][i] for d in range(1, min(len(lower), size - i))]
+        factors.append([value / pivot for value in below])
+        for d, factor in enumerate(factors[i]):
+            for e in range(d, len(below)):
+                lower[e - d][i + 1 + d] -= factor * below[e]
+            found[i + 1 + d] -= factor * found[i]
+    for i in range(size - 1, -1, -1):
+        found[i] /= lower[0][i]
+        for d, factor in enumerate(factors[i]):
+            found[i] -= factor * found[i + 1 + d]
+    return found
 
 
 def eigh(matrix: Matrices) -> tuple[Result, Result]:
@@ -196,5 +257,6 @@ def eigh(matrix: Matrices) -> tuple[Result, Result]:
 def principal_direction(points: Matrices) -> Result:
     """Return the unit vector (2,) along which points (n, 2) spread most about their mean."""
     points = np.asarray(points, np.float64)
-    away = points - points.mean(axis=0)
-    return eigh(product(away.T, away))[1][:, 1]
+    x, y = (points - points.mean(axis=0)).T
+    mixed = (x * y).sum()
+    return eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]

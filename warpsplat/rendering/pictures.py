@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column
+from warpsplat.portable.filters import resize_area
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray, Picture
@@ -49,9 +49,7 @@ def _tiles(picture: Picture, viewport: Viewport) -> tuple[tuple[int, int, int, i
     whole = np.zeros((size[1], size[0], 4), np.float32)
     whole[top : top + height, left : left + width] = picture.pixels
     if size != (viewport.width, viewport.height):
-        whole = np.asarray(
-            cv2.resize(whole, (viewport.width, viewport.height), interpolation=cv2.INTER_AREA), np.float32
-        )
+        whole = resize_area(whole, (viewport.width, viewport.height))
     seen = whole[TILE * y0 : TILE * y1, TILE * x0 : TILE * x1]
     opacity = seen[..., 3:]
     color = np.where(opacity > CLEAR, seen[..., :3] / np.maximum(opacity, CLEAR), 0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.portable.linear import product
 from warpsplat.scene.attributes import Basis, Kind
 from warpsplat.scene.scene import Canvas, FloatArray, Scene
 
@@ -38,9 +39,11 @@ def flatten(points: FloatArray, closed: bool, basis: Basis, pieces: int = PIECES
     """Contours as polylines of ``pieces`` pieces a Bézier: (contour, point, 2) -> (contour, vertex, 2)."""
     t = np.arange(pieces, dtype=np.float32)[:, None] / pieces
     s = 1 - t
-    weights = np.concatenate([s**3, 3 * s * s * t, 3 * s * t * t, t**3], axis=1)
+    weights = np.concatenate([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
     curves = beziers(points, closed, basis)
-    vertices = np.einsum("vk,cjkx->cjvx", weights, curves).reshape(len(points), -1, 2)
+    # By rows of all Béziers: sums over long rows take a fraction of the time.
+    rows = product(weights, np.moveaxis(curves, 2, 0).reshape(4, -1))
+    vertices = np.moveaxis(rows.reshape(pieces, *curves.shape[:2], 2), 0, 2).reshape(len(points), -1, 2)
     if not closed:
         vertices = np.concatenate([vertices, points[:, -1:]], axis=1)
     return vertices.astype(np.float32)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from warpsplat.errors import ImageError
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.linear import product
 from warpsplat.svg.paths import Points, Subpath, line
 from warpsplat.svg.shapes import Shape
 
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""
 
+
+NEAR_END = 1e-9
+"""Cubics are not cut nearer to their ends than this, of their parameter."""
 
 OVERLAP_SHAPES = 2000
 """Most shapes of a group that are compared with each other."""
@@ -70,8 +76,8 @@ def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
 
 def _heights(points: Points, a: Points, b: Points) -> Points:
     """Distances of points from a line, positive to its left."""
-    way = (b - a) / np.hypot(*(b - a))
-    return np.asarray((points - a) @ np.array([-way[1], way[0]]))
+    way = (b - a) / hypot(*(b - a))
+    return product(points - a, [-way[1], way[0]])
 
 
 def cut_subpath(subpath: Subpath, corners: Points) -> Subpath | None:
@@ -86,7 +92,7 @@ def cut_subpath(subpath: Subpath, corners: Points) -> Subpath | None:
     """
     chain = _cubics(subpath.points)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        way = (b - a) / np.hypot(*(b - a))
+        way = (b - a) / hypot(*(b - a))
         chain = _cut(chain, a, np.array([-way[1], way[0]]))
         if not chain:
             return None
@@ -109,8 +115,8 @@ def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
     """The part of a closed chain of cubics where ``(point - at) . inward`` is not negative."""
     kept: list[Points] = []
     for cubic in chain:
-        for piece in _split(cubic, (cubic - at) @ inward):
-            if ((piece - at) @ inward @ [1, 3, 3, 1]) < -8 * TOLERANCE:
+        for piece in _split(cubic, product(cubic - at, inward)):
+            if product(product(piece - at, inward), [1, 3, 3, 1]) < -8 * TOLERANCE:
                 continue  # the middle lies outside
             if kept and not np.allclose(kept[-1][-1], piece[0], rtol=0, atol=TOLERANCE):
                 kept.append(_straight(kept[-1][-1], piece[0]))
@@ -122,17 +128,37 @@ def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
 
 def _split(cubic: Points, heights: Points) -> list[Points]:
     """A cubic in pieces each on one side of a line that its points are ``heights`` above."""
-    a, b, c, d = heights
     if (heights >= -TOLERANCE).all() or (heights <= TOLERANCE).all():
         return [cubic]
-    roots = np.roots([d - 3 * c + 3 * b - a, 3 * (c - 2 * b + a), 3 * (b - a), a])
-    cuts = sorted(float(t.real) for t in roots if abs(t.imag) < 1e-9 and 1e-9 < t.real < 1 - 1e-9)
     pieces, start = [], 0.0
-    for t in cuts:
+    for t in _zeros(*heights.tolist()):
         left, cubic = _halves(cubic, (t - start) / (1 - start))
         pieces.append(left)
         start = t
     return [*pieces, cubic]
+
+
+def _zeros(a: float, b: float, c: float, d: float) -> list[float]:
+    """Where between 0 and 1 a cubic with these control heights changes its sign, ascending."""
+
+    def height(t: float) -> float:
+        return a + t * (3 * (b - a) + t * (3 * (c - 2 * b + a) + t * (d - 3 * c + 3 * b - a)))
+
+    # Between its turns a cubic is monotonic; they are where u t^2 + 2 v t + w is 0.
+    u, v, w = d - 3 * c + 3 * b - a, c - 2 * b + a, b - a
+    root = v + math.copysign(math.sqrt(max(v * v - u * w, 0.0)), v)
+    turns = [top / bottom for top, bottom in ((-root, u), (w, -root)) if abs(top) < abs(bottom)]
+    # Where it is 0 at a turn it touches, or crosses level.
+    turns = sorted(t for t in turns if NEAR_END < t < 1 - NEAR_END and height(t) != 0)
+    found = []
+    for low, high in pairwise([NEAR_END, *turns, 1 - NEAR_END]):
+        if (height(low) > 0) == (height(high) > 0):
+            continue
+        start, end = (low, high) if height(high) > 0 else (high, low)
+        while min(start, end) < (middle := (start + end) / 2) < max(start, end):
+            start, end = (start, middle) if height(middle) > 0 else (middle, end)
+        found.append(start)
+    return found
 
 
 def _halves(cubic: Points, t: float) -> tuple[Points, Points]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from warpsplat.errors import ImageError
+from warpsplat.portable.linear import product
 from warpsplat.svg.document import Document, name_of
 from warpsplat.svg.geometry import Matrix, about, moved, outline, parse_transform
 from warpsplat.svg.gradients import LINK
@@ -25,7 +26,8 @@ def clip_rectangle(link: str, document: Document, matrix: Matrix, viewport: View
         units = element.get("clipPathUnits", "userSpaceOnUse")
         for part in (element, *content):
             style = document.style_of(part)
-            matrix = matrix @ about(style["transform-origin"], viewport, parse_transform(style["transform"]))
+            own_map = about(style["transform-origin"], viewport, parse_transform(style["transform"]))
+            matrix = product(matrix, own_map)
             units += "" if style["clip-path"] == "none" and style["display"] != "none" else " clipped"
         own = cubics(outline("rect", content[0].attrib, viewport), keep_dots=False)
         is_rect = name_of(content[0]) == "rect" and style["visibility"] == "visible"

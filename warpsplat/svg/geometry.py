@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import ImageError
+from warpsplat.portable import elementary
+from warpsplat.portable.linear import product
 from warpsplat.svg.inspect import NUMBER, view_box
 from warpsplat.svg.paths import Points, Subpath
 from warpsplat.svg.values import Viewport, length, numbers
@@ -92,20 +94,27 @@ def tight_box(subpaths: list[Subpath]) -> Points:
     for root in (q / a, c / q):  # the stable form of both solutions; what is no number is none
         t = np.clip(np.nan_to_num(root, nan=0.0, posinf=0.0, neginf=0.0), 0.0, 1.0)
         u = 1 - t
-        extreme = u**3 * p0 + 3 * u * u * t * p1 + 3 * u * t * t * p2 + t**3 * p3
+        extreme = u * u * u * p0 + 3 * u * u * t * p1 + 3 * u * t * t * p2 + t * t * t * p3
         low, high = np.minimum(low, extreme.min(axis=0)), np.maximum(high, extreme.max(axis=0))
     return np.stack([low, high])
 
 
 def similarity(matrix: Matrix) -> float | None:
     """By how much a map scales; None if not alike in all directions (to a hundredth)."""
-    sizes = np.linalg.svd(np.nan_to_num(matrix[:2, :2]), compute_uv=False)
-    return float(sizes.mean()) if sizes[1] >= 0.99 * sizes[0] else None
+    (a, b), (c, d) = np.nan_to_num(matrix[:2, :2])
+    with np.errstate(all="ignore"):  # what overflows is found where it is used
+        # Half the sum and half the difference of the singular values, or the other way round.
+        turning, mirroring = (
+            elementary.hypot((a + d) / 2, (c - b) / 2),
+            elementary.hypot((a - d) / 2, (c + b) / 2),
+        )
+        alike = abs(turning - mirroring) >= 0.99 * (turning + mirroring)
+    return float(max(turning, mirroring)) if alike else None
 
 
 def moved(matrix: Matrix, points: Points) -> Points:
     """Points under an affine map."""
-    return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])
+    return np.asarray(product(points, matrix[:2, :2].T) + matrix[:2, 2])
 
 
 def translation(x: float, y: float) -> Matrix:
@@ -171,7 +180,7 @@ def parse_transform(text: str) -> Matrix:
             if "(" not in text:
                 return np.eye(3)
             raise ImageError(f"transform {text[:40]!r} is not supported")
-        matrix = matrix @ one
+        matrix = product(matrix, one)
         position = found.end()
     return matrix
 
@@ -200,7 +209,7 @@ def about(origin: str, viewport: Viewport, matrix: Matrix) -> Matrix:
         if place is None:
             raise ImageError(f"transform-origin {origin[:40]!r} is not known")
         at.append(place)
-    return np.asarray(translation(*at) @ matrix @ translation(-at[0], -at[1]))
+    return product(product(translation(*at), matrix), translation(-at[0], -at[1]))
 
 
 def _function(name: str, v: list[float]) -> Matrix | None:
@@ -213,13 +222,13 @@ def _function(name: str, v: list[float]) -> Matrix | None:
         return np.diag([v[0], v[-1], 1])
     if name == "rotate" and count in {1, 3}:
         angle = np.deg2rad(v[0])
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        cosine, sine = float(elementary.cos(angle)), float(elementary.sin(angle))
+        turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
         if count == 3:
-            center = np.array([[1, 0, v[1]], [0, 1, v[2]], [0, 0, 1]])
-            return np.asarray(center @ turn @ np.linalg.inv(center))
+            return product(product(translation(v[1], v[2]), turn), translation(-v[1], -v[2]))
         return turn
     if name in {"skewX", "skewY"} and count == 1:
         matrix = np.eye(3)
-        matrix[(0, 1) if name == "skewX" else (1, 0)] = np.tan(np.deg2rad(v[0]))
+        matrix[(0, 1) if name == "skewX" else (1, 0)] = elementary.tan(np.deg2rad(v[0]))
         return matrix
     return None

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.errors import ImageError
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.linear import determinant, product
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, tight_box, translation
 from warpsplat.svg.inspect import NUMBER
@@ -129,18 +131,18 @@ def _gradient(
         return attribute({name: default}, name, unit) or 0.0 if value is None else value
 
     transform = parse_transform(said("gradientTransform") or "")
-    if np.linalg.det(transform) == 0:
+    if determinant(transform) == 0:
         transform = np.eye(3)  # as resvg does
     transform = about(document.style_of(element)["transform-origin"], viewport, transform)
     if of_box:
-        transform = translation(*box[0]) @ np.diag([*extent, 1.0]) @ transform
+        transform = product(product(translation(*box[0]), np.diag([*extent, 1.0])), transform)
     own, focus = _radial_frame(get) if is_radial else (_linear_frame(get), (0.0, 0.0, 0.0))
     if own is None:
         return stops[-1]
-    if not np.hypot(focus[0], focus[1]) + focus[2] < 1:
+    if not hypot(focus[0], focus[1]) + focus[2] < 1:
         raise ImageError("uses a radial gradient whose focus is not inside its circle, not supported")
-    frame = matrix @ transform @ own
-    if not abs(np.linalg.det(frame[:2, :2])) > 1e-12:
+    frame = product(product(matrix, transform), own)
+    if not abs(determinant(frame[:2, :2])) > 1e-12:
         return None
     if not (np.abs(frame) <= np.finfo(np.float32).max).all():
         raise ImageError("a gradient reaches farther than can be drawn")
@@ -183,7 +185,7 @@ def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tupl
         (get("fy", repr(y)) - y) / radius,
         max(get("fr", "0"), 0.0) / radius,
     )
-    return translation(x, y) @ np.diag([radius, radius, 1.0]), focus
+    return product(translation(x, y), np.diag([radius, radius, 1.0])), focus
 
 
 def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[Flat, ...]]:

@@ -34,7 +34,7 @@ def by_opacity(scene: Scene) -> IndexArray:
 
 def by_color(scene: Scene) -> IndexArray:
     """The same of equal kind, paint and colour in 8 bits."""
-    levels = np.round(255 * scene.colors).astype(np.int64) @ [1 << 16, 1 << 8, 1]
+    levels = (np.round(255 * scene.colors).astype(np.int64) * [1 << 16, 1 << 8, 1]).sum(axis=1)
     kinds = scene.kind.astype(np.int64) + len(Kind) * scene.paint
     return _by(scene, list(zip(kinds.tolist(), levels.astype(np.float64).tolist(), strict=True)))
 

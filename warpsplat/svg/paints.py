@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -65,8 +66,8 @@ def _line(origin: Floats, axes: Floats, decimals: int) -> str:
     """From where t is 0 to where it is 1, straight across the lines of equal colour."""
     along, across = axes
     normal = np.array([across[1], -across[0]])
-    reach = float(along @ normal)
-    square = float(normal @ normal)
+    reach = float((along * normal).sum())
+    square = float((normal * normal).sum())
     way = normal * reach / square if square > 0 else along
     (x1, y1), (x2, y2) = origin, origin + way
     return _attributes({"x1": x1, "y1": y1, "x2": x2, "y2": y2}, decimals)
@@ -75,7 +76,7 @@ def _line(origin: Floats, axes: Floats, decimals: int) -> str:
 def _circle(origin: Floats, axes: Floats, focus: Floats, decimals: int) -> str:
     """A circle where the frame is one, else the unit circle under the frame's map."""
     along, across = axes
-    length = float(np.linalg.norm(along))
+    length = math.sqrt(float((along * along).sum()))
     turned = np.array([-along[1], along[0]])
     fx, fy, fr = focus.tolist()
     if min(np.abs(across - turned).max(), np.abs(across + turned).max()) <= ROUND * length:

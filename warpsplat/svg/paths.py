@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 import re
 from typing import NamedTuple
@@ -10,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable.elementary import arctan2, cos, sin, tan
+from warpsplat.portable.linear import product
 from warpsplat.svg.inspect import ARGUMENTS, NUMBER
 from warpsplat.svg.values import SPACE, numbers
 
@@ -35,7 +36,7 @@ class Subpath(NamedTuple):
 
     def moved(self, linear: Points, shift: Points) -> Subpath:
         """Under an affine map."""
-        return self._replace(points=self.points @ linear.T + shift)
+        return self._replace(points=product(self.points, linear.T) + shift)
 
     def controls(self) -> Points:
         """Control points of the quadratics, shape (quadratic, 2)."""
@@ -118,7 +119,7 @@ class _Pen:
             self.points = [self.at]
         elif kind == "z":
             # Relative coordinates come back to the start but for rounding: no further cubic for that.
-            if not cmath.isclose(self.at, self.start, rel_tol=1e-9, abs_tol=1e-9):
+            if not (_is_near(self.at.real, self.start.real) and _is_near(self.at.imag, self.start.imag)):
                 self._line(self.start)
                 self.is_spline = False
             self._lift(True)
@@ -180,32 +181,43 @@ class _Pen:
         if not (rx > 0 and ry > 0):
             self._line(end)
             return
-        turn = cmath.rect(1.0, math.radians(v[2]))
-
-        def to_circle(p: complex) -> complex:
-            p = p / turn
-            return complex(p.real / rx, p.imag / ry)
-
-        half = to_circle((start - end) / 2)
-        scale = max(abs(half), 1.0)  # an ellipse too small grows until it reaches
-        half /= scale
-        across = math.sqrt(max(1 / abs(half) ** 2 - 1, 0.0)) * (-1 if bool(v[3]) == bool(v[4]) else 1)
-        center = complex(half.imag, -half.real) * across
-        first = cmath.phase(half - center)
-        sweep = (cmath.phase(-half - center) - first) % math.tau
+        # In the ellipse's own coordinates, in which it is a circle, half way between start and end.
+        angle = math.radians(v[2])
+        cosine, sine = float(cos(angle)), float(sin(angle))
+        way = (start - end) / 2
+        x, y = (way.real * cosine + way.imag * sine) / rx, (way.imag * cosine - way.real * sine) / ry
+        half = math.sqrt(x * x + y * y)
+        across = 0.0
+        if half < 1:
+            across = math.sqrt(1 / (half * half) - 1) * (-1 if bool(v[3]) == bool(v[4]) else 1)
+        else:  # an ellipse too small grows until it reaches
+            x, y, rx, ry = x / half, y / half, rx * half, ry * half
+        center_x, center_y = y * across, -x * across
+        first = float(arctan2(y - center_y, x - center_x))
+        sweep = (float(arctan2(-y - center_y, -x - center_x)) - first) % math.tau
         sweep -= 0 if v[4] else math.tau
         count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-9))
-        reach = 4 / 3 * math.tan(sweep / count / 4)
+        reach = 4 / 3 * float(tan(sweep / count / 4))
 
-        def back(p: complex) -> complex:
-            return (start + end) / 2 + turn * complex(
-                (p + center).real * rx * scale, (p + center).imag * ry * scale
-            )
+        def back(x: float, y: float) -> complex:
+            x, y = (x + center_x) * rx, (y + center_y) * ry
+            return (start + end) / 2 + complex(x * cosine - y * sine, x * sine + y * cosine)
 
         for i in range(count):
-            a, b = (cmath.rect(1.0, first + sweep * (i + k) / count) for k in (0, 1))
-            self.points += [back(a + 1j * a * reach), back(b - 1j * b * reach), back(b)]
+            (ax, ay), (bx, by) = (
+                (float(cos(turn)), float(sin(turn)))
+                for turn in (first + sweep * i / count, first + sweep * (i + 1) / count)
+            )
+            self.points += [
+                back(ax - ay * reach, ay + ax * reach),
+                back(bx + by * reach, by - bx * reach),
+                back(bx, by),
+            ]
         self.points[-1] = self.at = end
+
+
+def _is_near(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)
 
 
 def line(start: complex, end: complex) -> list[complex]:

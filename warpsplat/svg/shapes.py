@@ -6,6 +6,7 @@ because a picture that silently lost something is worse than none.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +40,7 @@ class Line:
     def reach(self) -> float:
         """How far it may be from its path."""
         longest = self.miter_limit if self.join == Join.MITER else 1.0
-        return 0.5 * self.width * max(longest, 2**0.5 if self.cap == Cap.SQUARE else 1.0)
+        return 0.5 * self.width * max(longest, math.sqrt(2) if self.cap == Cap.SQUARE else 1.0)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.errors import ImageError
+from warpsplat.portable.linear import determinant, product
 from warpsplat.scene import Rule
 from warpsplat.svg.clip import clipped, overlap, polygon
 from warpsplat.svg.clip_path import clip_rectangle
@@ -155,7 +156,7 @@ def _canvas(
     view, box = view_box_map(root, *size), view_box(root)
     if view is None or box is None:
         return scale, Viewport(*size)
-    return scale @ view, Viewport(*box[2:])
+    return product(scale, view), Viewport(*box[2:])
 
 
 class _Walk:
@@ -207,8 +208,8 @@ class _Walk:
             raise ImageError("uses conditions on language or features, not supported")
         viewport = replace(context.viewport, font_size=float(style["font-size"]))
         transform = about(style["transform-origin"], viewport, parse_transform(style["transform"]))
-        matrix = context.matrix @ transform
-        if np.linalg.det(matrix[:2, :2]) == 0:
+        matrix = product(context.matrix, transform)
+        if determinant(matrix[:2, :2]) == 0:
             return
         inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=context.depth + 1)
         if tag == "g" and context.depth == 1 and LEVEL.fullmatch(element.get("id", "")):
@@ -259,7 +260,7 @@ class _Walk:
         if tag == "symbol":
             self._nested(element, inner, target, unit)
             return
-        inner = replace(inner, matrix=context.matrix @ translation(x, y))
+        inner = replace(inner, matrix=product(context.matrix, translation(x, y)))
         if tag == "svg":
             width, height = (attribute(element.attrib, name, viewport) for name in ("width", "height"))
             inner = replace(inner, use_size=(width, height))
@@ -295,7 +296,9 @@ class _Walk:
         view = view_box_map(content.attrib, width, height)
         box = view_box(dict(content.attrib)) if view is not None else None
         size = box[2:] if box else (width, height)
-        matrix = context.matrix @ translation(x, y) @ (np.eye(3) if view is None else view)
+        matrix = product(context.matrix, translation(x, y))
+        if view is not None:
+            matrix = product(matrix, view)
         seen = style["overflow"] in {"visible", "auto"}
         is_clipped = not is_svg or None not in given or context.use_size != (None, None)
         corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree
 
 from warpsplat.errors import ImageError
+from warpsplat.portable.elementary import power
 from warpsplat.svg.css import Declaration, declarations
 from warpsplat.svg.inspect import LENGTH
 from warpsplat.svg.values import length
@@ -138,6 +139,6 @@ FONT_SIZES = {
 
 def _font_size(text: str, around: float) -> float:
     if text in FONT_SIZES:
-        return float(around * 1.2 ** FONT_SIZES[text])
+        return around * float(power(1.2, FONT_SIZES[text]))
     size = length(text, around, "font-size", around)
     return around if size is None else size

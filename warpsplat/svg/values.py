@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import colorsys
+import math
 import re
 from dataclasses import dataclass
 
@@ -31,7 +32,7 @@ class Viewport:
     @property
     def diagonal(self) -> float:
         """What percentages that lie in no direction are of (SVG 1.1, 7.10)."""
-        return float(((self.width**2 + self.height**2) / 2) ** 0.5)
+        return math.sqrt((self.width * self.width + self.height * self.height) / 2)
 
 
 def length(text: str, reference: float, name: str, font_size: float = 16.0) -> float | None:

@@ -11,6 +11,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable.elementary import power_of_ten
 from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
@@ -30,7 +31,7 @@ OPACITY_DECIMALS = 2
 WIDTH_STEP = 0.25
 """Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth."""
 
-OPAQUE = 1 - 0.5 * 10.0**-OPACITY_DECIMALS
+OPAQUE = 1 - 0.5 * power_of_ten(-OPACITY_DECIMALS)
 """From here on an opacity rounds to 1 and is left out: opaque paths are smaller and quicker to draw."""
 
 GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 100)))

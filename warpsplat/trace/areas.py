@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
+from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray
 from warpsplat.trace.blobs import BROAD, SMALLEST, pen_width
 from warpsplat.trace.grids import Bools, Floats, Ints
@@ -100,15 +102,15 @@ def _cover(shown: FloatArray, area: Bools, lines: Bools) -> FloatArray:
 def _around(shown: FloatArray, where: Bools) -> FloatArray:
     """Mean colour nearby of the pixels that count; of all that do, where none is near."""
     weights = where.astype(np.float32)
-    count = cv2.boxFilter(weights, -1, (BESIDE, BESIDE), normalize=False)[..., None]
-    sums = cv2.boxFilter(shown * weights[..., None], -1, (BESIDE, BESIDE), normalize=False)
+    count = filters.box_sum(weights, BESIDE)[..., None]
+    sums = filters.box_sum(shown * weights[..., None], BESIDE)
     mean = shown[where].mean(axis=0) if where.any() else shown.reshape(-1, 3).mean(axis=0)
     return np.asarray(np.where(count > 0.5, sums / np.maximum(count, 1), mean), np.float32)
 
 
 def away_from(inside: Bools) -> Floats:
     """Distance of each pixel from those inside [px]."""
-    return np.asarray(cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5), np.float64)
+    return filters.distance(~inside).astype(np.float64)
 
 
 def _corners(rest: Bools, away: Floats, reach: float) -> Bools:
@@ -142,7 +144,7 @@ def reaching(points: Floats, widths: Floats, away: Floats) -> tuple[Floats, Floa
         wide, apart = float(widths[-1]), float(_at(away, points[-1:])[0])
         if apart <= wide + 1:
             back = points[-1] - points[max(0, len(points) - 1 - max(SMALLEST, round(2 * wide)))]
-            way = back / max(float(np.hypot(*back)), 1e-9)
+            way = back / max(float(hypot(*back)), 1e-9)
             points = np.concatenate([points, points[-1:] + (apart + wide) * way])
             widths = np.append(widths, wide)
         points, widths = points[::-1], widths[::-1]

@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
 from warpsplat.trace.grids import Bools, Floats
 from warpsplat.trace.ink import Ink
 
@@ -28,7 +29,7 @@ SMALLEST = 8
 
 def pen_width(mask: Bools) -> float:
     """The usual width of the lines in a mask [px]."""
-    away = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    away = filters.distance(mask)
     ridge = mask & (away >= cv2.dilate(away, np.ones((3, 3), np.uint8)))
     return max(1.0, 2 * float(np.quantile(away[ridge], USUAL)) - 1) if ridge.any() else 1.0
 
@@ -40,8 +41,7 @@ def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:
         The ink; closed rings, shape (point, 2) each [px]; and their width [px].
     """
     width = max(pen_width(ink.mask), FILLING)
-    padded = np.pad(ink.mask, 1).astype(np.uint8)
-    away = cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    away = filters.distance(np.pad(ink.mask, 1))[1:-1, 1:-1]
     inner = away > width
     # Not along the lines that an area goes over into.
     core = (away > BROAD * width).astype(np.uint8)

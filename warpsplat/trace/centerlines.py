@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
+from warpsplat.portable.elementary import exp, hypot
+from warpsplat.portable.sequences import convolve, interp
 from warpsplat.scene import FloatArray
 from warpsplat.trace.areas import Areas, away_from, is_beside, parted, reaching
 from warpsplat.trace.blobs import BROAD, hollowed, pen_width
@@ -18,8 +21,8 @@ from warpsplat.trace.pens import find_pens, line_colors
 from warpsplat.trace.ridges import FAINT, across, middles, with_thin
 from warpsplat.trace.skeleton import Edge, Graph, find_graph
 
-STRAIGHT = 50.0
-"""Turn up to which a line goes on through a junction [degrees]."""
+STRAIGHT = 0.6427876
+"""Cosine of the turn up to which a line goes on through a junction: 50 degrees."""
 
 REACH = 4.0
 """Length of line that says in which direction it leaves a junction, over half the width of the ink there."""
@@ -148,9 +151,10 @@ FINE = 1100
 def _enlarged(ink: Ink, factor: int) -> np.ndarray:
     """The ink's mask at ``factor`` times the size, its edge where half a pixel is covered."""
     size = (ink.mask.shape[1] * factor, ink.mask.shape[0] * factor)
-    cover = cv2.resize(ink.cover, size, interpolation=cv2.INTER_CUBIC)
-    held = cv2.resize(cv2.dilate(ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)), size, interpolation=0)
-    core = cv2.erode(cv2.resize(ink.mask.astype(np.uint8), size, interpolation=0), np.ones((3, 3), np.uint8))
+    cover = filters.resize_cubic(ink.cover, size)
+    mask, kernel = ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)
+    held = cv2.resize(cv2.dilate(mask, kernel), size, interpolation=cv2.INTER_NEAREST)
+    core = cv2.erode(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST), kernel)
     if ink.textured:
         return np.asarray(((cover > 0.5) & (held > 0)) | (core > 0), np.bool_)
     thin = middles(across(ink.cover, factor), FAINT, factor)
@@ -191,14 +195,14 @@ def _continued(graph: Graph, owner: Ints) -> dict[tuple[int, int], tuple[int, in
         if len(ends) == 2 and ends[0][0] == ends[1][0]:
             continue
         ways = [_way(graph.edges[n], e, float(graph.radii[node])) for n, e in ends]
-        turns = sorted(
-            (float(np.degrees(np.arccos(np.clip(-(ways[i] @ ways[j]), -1, 1)))), i, j)
+        bends = sorted(
+            (-_straightness(ways[i], ways[j]), i, j)
             for i in range(len(ends))
             for j in range(i)
             if owner[ends[i][0]] == owner[ends[j][0]]
         )
-        for turn, i, j in turns:
-            if turn <= STRAIGHT and ends[i] not in found and ends[j] not in found:
+        for bend, i, j in bends:
+            if -bend >= STRAIGHT and ends[i] not in found and ends[j] not in found:
                 found[ends[i]], found[ends[j]] = ends[j], ends[i]
     return found
 
@@ -206,13 +210,18 @@ def _continued(graph: Graph, owner: Ints) -> dict[tuple[int, int], tuple[int, in
 def _way(edge: Edge, end: int, radius: float) -> Floats:
     """Unit vector in which an edge leaves its node, past what the junction draws aside."""
     points = edge.points if end == 0 else edge.points[::-1]
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    along = np.concatenate([[0.0], np.cumsum(hypot(*np.diff(points, axis=0).T))])
     low, high = DRAWN * radius, REACH * max(radius, 1.5)
     if along[-1] < high:
         low, high = 0.3 * along[-1], along[-1]
     near = points[np.searchsorted(along, low) : np.searchsorted(along, high) + 1]
     way = near[-1] - near[0] if len(near) > 1 else points[-1] - points[0]
-    return np.asarray(way / max(float(np.hypot(*way)), 1e-9))
+    return np.asarray(way / max(float(hypot(*way)), 1e-9))
+
+
+def _straightness(one: Floats, other: Floats) -> float:
+    """Cosine of the turn of a line that comes against one unit vector and leaves along another."""
+    return min(-float((one * other).sum()), 1.0)
 
 
 def _line(graph: Graph, chain: Chain, radii: Floats) -> tuple[Floats, Floats, bool] | None:
@@ -254,10 +263,12 @@ def _outer(graph: Graph, link: tuple[int, bool], end: int) -> Floats:
 def _ahead(points: Floats, place: Floats, radius: float) -> Floats:
     """Where a line that begins with ``points`` begins if it came straight from beside ``place``."""
     way = points[0] - points[min(len(points) - 1, max(4, round(2 * radius)))]
-    way = way / max(float(np.hypot(*way)), 1e-9)
+    way = way / max(float(hypot(*way)), 1e-9)
     away = place - points[0]
     aside = abs(float(away[0] * way[1] - away[1] * way[0]))
-    return np.asarray(points[0] + max(float(away @ way), 0.0) * way if aside <= max(radius, 1.5) else place)
+    return np.asarray(
+        points[0] + max(float((away * way).sum()), 0.0) * way if aside <= max(radius, 1.5) else place
+    )
 
 
 def _goes_round(graph: Graph, chain: Chain) -> bool:
@@ -271,12 +282,12 @@ def _goes_round(graph: Graph, chain: Chain) -> bool:
         _way(graph.edges[first], int(first_back), radius),
         _way(graph.edges[last], int(not last_back), radius),
     )
-    return bool(np.degrees(np.arccos(np.clip(-(one @ other), -1, 1))) <= STRAIGHT)
+    return _straightness(one, other) >= STRAIGHT
 
 
 def _undrawn(graph: Graph, edge: Edge) -> Floats:
     """The points of an edge that no junction draws aside."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(edge.points, axis=0).T))])
+    along = np.concatenate([[0.0], np.cumsum(hypot(*np.diff(edge.points, axis=0).T))])
     total = along[-1]
     shares = (
         DRAWN if len(graph.at[node]) > 2 else FORKED if len(graph.at[node]) == 1 else 0.0
@@ -293,20 +304,20 @@ def _undrawn(graph: Graph, edge: Edge) -> Floats:
 
 def _smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Floats, bool]:
     """One point a pixel of length, without the steps of pixels."""
-    if closed and np.hypot(*(points[0] - points[-1])) > 1e-6:
+    if closed and hypot(*(points[0] - points[-1])) > 1e-6:
         points, widths = np.concatenate([points, points[:1]]), np.concatenate([widths, widths[:1]])
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    along = np.concatenate([[0.0], np.cumsum(hypot(*np.diff(points, axis=0).T))])
     total = float(along[-1])
     count = max(2, round(total) + 1)
     at = np.linspace(0, total, count)
-    even = np.stack([np.interp(at, along, points[:, axis]) for axis in (0, 1)], axis=1)
-    wide = np.interp(at, along, widths)
+    even = np.stack([interp(at, along, points[:, axis]) for axis in (0, 1)], axis=1)
+    wide = interp(at, along, widths)
     if closed:
         even, wide = even[:-1], wide[:-1]
     if len(even) < 4:
         return even, wide, closed and len(even) > 2
     reach = min(round(3 * SMOOTH), len(even) - 1)
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTH) ** 2)
+    kernel = exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTH) ** 2)
     kernel /= kernel.sum()
     if closed:
         padded = np.concatenate([even[-reach:], even, even[:reach]])
@@ -314,5 +325,5 @@ def _smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Flo
         padded = np.concatenate(
             [2 * even[0] - even[reach:0:-1], even, 2 * even[-1] - even[-2 : -reach - 2 : -1]]
         )
-    smooth = np.stack([np.convolve(padded[:, axis], kernel, "valid") for axis in (0, 1)], axis=1)
+    smooth = np.stack([convolve(padded[:, axis], kernel) for axis in (0, 1)], axis=1)
     return smooth, wide, closed

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpsplat.portable.elementary import arctan2, hypot
+from warpsplat.portable.linear import principal_direction
 from warpsplat.trace.grids import Floats
 
 SCALES = ((4.0, 28.0), (2.2, 50.0))
@@ -33,15 +35,18 @@ Corner = tuple[float, Floats]
 def lengths(points: Floats, closed: bool) -> Floats:
     """Arc length at each point and, of a closed polyline, of the whole at last."""
     following = np.roll(points, -1, axis=0) if closed else points[1:]
-    steps = np.hypot(*(following - points[: len(following)]).T)
+    steps = hypot(*(following - points[: len(following)]).T)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def at_length(points: Floats, along: Floats, closed: bool, where: Floats) -> Floats:
-    """Points at arc lengths; of a closed polyline modulo its length."""
+    """Points at arc lengths, shape (..., 2); of a closed polyline modulo its length."""
     ring = np.concatenate([points, points[:1]]) if closed else points
     where = where % along[-1] if closed else np.clip(where, 0, along[-1])
-    return np.stack([np.interp(where, along, ring[:, axis]) for axis in (0, 1)], axis=1)
+    low = np.clip(np.searchsorted(along, where, side="right") - 1, 0, len(along) - 2)
+    size = np.diff(along)
+    share = (where - along[low]) / np.where(size > 0, size, 1.0)[low]
+    return np.asarray(ring[low] + share[..., None] * np.diff(ring, axis=0)[low])
 
 
 def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corner]:
@@ -60,13 +65,10 @@ def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corne
         reach = min(scale_px * scale, total / 6)
         if reach < 1.2:
             continue
-        turn = _turns(points, along, closed, here, reach)
+        before, turn, after = _turns(points, along, closed, here, reach)
         way = np.sign(turn)
         # The other way, the next corner of a stair turns.
-        beside = sum(
-            np.maximum(way * _turns(points, along, closed, here + off, reach), 0) for off in (-reach, reach)
-        )
-        excess = np.abs(turn) - 0.5 * beside
+        excess = np.abs(turn) - 0.5 * (np.maximum(way * before, 0) + np.maximum(way * after, 0))
         if not closed:
             excess[(here < reach * 0.6) | (here > total - reach * 0.6)] = 0
         strength = np.maximum(strength, excess / least)
@@ -75,11 +77,11 @@ def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corne
 
 
 def _turns(points: Floats, along: Floats, closed: bool, where: Floats, reach: float) -> Floats:
-    """Degrees that the polyline turns at arc lengths."""
-    before, middle, after = (at_length(points, along, closed, where + d) for d in (-reach, 0.0, reach))
-    a, b = middle - before, after - middle
-    cross, dot = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)
-    return np.asarray(np.degrees(np.arctan2(cross, dot)))
+    """Degrees that the polyline turns ``reach`` before arc lengths, there, and as far after; shape (3, n)."""
+    x, y = np.moveaxis(at_length(points, along, closed, where + reach * np.arange(-2, 3)[:, None]), 2, 0)
+    x, y = np.diff(x, axis=0), np.diff(y, axis=0)
+    cross, dot = x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:]
+    return np.asarray(np.degrees(arctan2(cross, dot)))
 
 
 def _peaks(strength: Floats, here: Floats, total: float, closed: bool) -> list[int]:
@@ -148,9 +150,7 @@ def _side(
     if high - low < 1.5:
         return None
     part = at_length(points, along, closed, np.linspace(low, high, 9))
-    middle = part.mean(axis=0)
-    way = np.linalg.svd(part - middle)[2][0]
-    return middle, way
+    return part.mean(axis=0), principal_direction(part)
 
 
 def _meeting(
@@ -159,9 +159,9 @@ def _meeting(
     """Where two sides meet; ``near`` where they do not, or farther away from it than ``far`` [px]."""
     if one is None or other is None:
         return near
-    matrix = np.stack([one[1], -other[1]], axis=1)
-    if abs(np.linalg.det(matrix)) < 0.2:
+    (x, y), (other_x, other_y), (away_x, away_y) = one[1], other[1], other[0] - one[0]
+    cross = x * other_y - y * other_x
+    if abs(cross) < 0.2:
         return near
-    share = np.linalg.solve(matrix, other[0] - one[0])
-    point = one[0] + share[0] * one[1]
-    return np.asarray(point if np.hypot(*(point - near)) <= far else near)
+    point = one[0] + (away_x * other_y - away_y * other_x) / cross * one[1]
+    return np.asarray(point if hypot(*(point - near)) <= far else near)

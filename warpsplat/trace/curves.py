@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.linear import eigh, lstsq, product, solve
 from warpsplat.trace.corners import find_corners, lengths
 from warpsplat.trace.grids import Bools, Floats, Ints
 
@@ -36,8 +38,8 @@ TURNS = 3
 FLAT_SLOPE = 0.012
 """Slope below which a line is taken as horizontal or vertical, if its ends differ by about a tolerance."""
 
-RANK = 1e-14
-"""Singular values below so much of the largest one are none: points in one place say no direction."""
+RANK = 1e-24
+"""What is left of a sum of squares, over the whole, that is none."""
 
 CIRCLE = 4 * (np.sqrt(2) - 1) / 3
 """Length of the handles of a quarter of the unit circle."""
@@ -133,26 +135,26 @@ def fit_ellipse(points: Floats, tolerance: float) -> Pieces | None:
     x, y = away.T
     # A conic through the points: A x^2 + B xy + C y^2 + D x + E y = 1.
     matrix = np.stack([x * x, x * y, y * y, x, y], axis=1)
-    conic, *_ = np.linalg.lstsq(matrix, np.ones(len(points)), rcond=None)
+    conic = lstsq(matrix, np.ones(len(points)))
     shape = np.array([[conic[0], conic[1] / 2], [conic[1] / 2, conic[2]]])
-    values, vectors = np.linalg.eigh(shape)
+    values, vectors = eigh(shape)
     if values.min() <= 1e-9:
         return None
-    center = -np.linalg.solve(2 * shape, conic[3:])
-    level = 1 + center @ shape @ center
+    center = -0.5 * solve(shape, conic[3:])
+    level = 1 + (product(shape, center) * center).sum()
     radii = np.sqrt(level / values)
     if radii.max() > 20 * radii.min():
         return None
     mean = float(np.sqrt(radii.prod()))
     limit = min(tolerance * (1 + 0.003 * mean), 0.12 * mean + 0.05)
-    unit = ((away - center) @ vectors) / radii
-    off = np.abs(np.hypot(*unit.T) - 1) * radii.min()
+    unit = product(away - center, vectors) / radii
+    off = np.abs(hypot(*unit.T) - 1) * radii.min()
     if off.max() > 1.5 * limit or np.sqrt((off**2).mean()) > 0.6 * limit:
         return None
     if abs(radii[0] - radii[1]) < max(0.5 * tolerance, 0.004 * mean):
         vectors, radii = np.eye(2), np.full(2, radii.mean())
     frame = vectors * radii
-    if np.linalg.det(frame) < 0:
+    if frame[0, 0] * frame[1, 1] < frame[0, 1] * frame[1, 0]:
         frame[:, 1] *= -1
     if _signed(points) < 0:
         frame[:, 1] *= -1
@@ -160,8 +162,8 @@ def fit_ellipse(points: Floats, tolerance: float) -> Pieces | None:
     turn = np.array([(0, -1), (1, 0)])
     cubics = []
     for _ in range(4):
-        cubics.append(quarter @ frame.T + middle + center)
-        quarter = quarter @ turn.T
+        cubics.append(product(quarter, frame.T) + middle + center)
+        quarter = product(quarter, turn.T)
     return Pieces(np.stack(cubics), np.zeros(4, np.bool_))
 
 
@@ -176,7 +178,7 @@ def _spans(run: Run, tolerance: float) -> list[_Span]:
     if not run.closed:
         assert run.start is not None and run.end is not None
         points = np.concatenate([run.start[None], points, run.end[None]])
-        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        keep = np.concatenate([[True], hypot(*np.diff(points, axis=0).T) > 1e-6])
         points = points[keep] if keep.sum() > 1 else points[:2]
     along = lengths(points, run.closed)
     corners = find_corners(points, run.closed, max(1.0, tolerance / 0.3)) if len(points) > 4 else []
@@ -239,33 +241,66 @@ def _nearest(along: Floats, wanted: Floats) -> Ints:
 
 def _local(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[Floats, Floats]:
     """Where the outline passes at ``places``, and its directions, by parabolas through the points near."""
-    total, here = float(along[-1]), along[places]
-    along = along[: len(ring)]  # a closed outline's last point is its first one
-    away = along - here[:, None]
-    if closed:
-        away = (away + 0.5 * total) % total - 0.5 * total
-    distance = np.abs(away)
-    third = min(2, len(ring) - 1)
-    window = min(WINDOW, 0.5 * total) if closed else WINDOW
-    near = distance <= np.maximum(window, np.partition(distance, third, axis=1)[:, third])[:, None]
-    counts = near.sum(axis=1)
-    # The near points of all places as one array, filled up with points that have no weight.
-    columns = np.argsort(~near, axis=1, kind="stable")[:, : counts.max()]
-    known = np.arange(counts.max()) < counts[:, None]
-    t = np.where(known, np.take_along_axis(away, columns, axis=1), 0.0)
-    bent = (counts > 4) & (np.ptp(t, axis=1) > 2)
+    total, here, count = float(along[-1]), along[places], len(ring)
+    along = along[:count]  # a closed outline's last point is its first one
+    window, first = WINDOW, 0
     # Corners and junctions at the ends are known exactly.
-    at_end = (along == 0) | (along == total)
-    weights = np.where(at_end[columns] & (not closed), 4.0, 1.0) * known
-    matrix = np.stack([np.ones_like(t), t, t * t * bent[:, None]], axis=2) * weights[..., None]
-    inverse = np.linalg.pinv(matrix, rcond=RANK)
-    found = inverse @ (ring[columns] * weights[..., None])
-    ways = found[:, 1]
-    size = np.hypot(*ways.T)
+    weights = np.where((along == 0) | (along == total), 16.0, 1.0)
+    if closed:
+        window, first, weights = min(WINDOW, 0.5 * total), count, np.ones(count)
+        along = np.concatenate([along - total, along, along + total])
+    beside = np.arange(min(5, len(along))) + np.clip(places[:, None] + first - 2, 0, max(len(along) - 5, 0))
+    third = np.sort(np.abs(along[beside] - here[:, None]), axis=1)[:, min(2, len(along) - 1)]
+    reach = np.maximum(window, third)
+    low, high = np.searchsorted(along, here - reach), np.searchsorted(along, here + reach, side="right")
+    counts = np.minimum(high - low, count)
+    # The near points of all places as one array, filled up with points that have no weight.
+    number = np.arange(counts.max())
+    columns = np.minimum(low[:, None] + number, len(along) - 1)
+    t = along[columns] - here[:, None]
+    columns %= count
+    weights = weights[columns] * (number < counts[:, None])
+    bent = (counts > 4) & (along[low + counts - 1] - along[low] > 2)
+    middles, ways = _parabolas(t, weights, bent, ring[columns])
+    size = hypot(*ways.T)
     still = size < 1e-9
-    ways[still] = (ring[np.minimum(places + 1, len(ring) - 1)] - ring[places - 1])[still]
-    size = np.where(still, np.hypot(*ways.T), size)
-    return found[:, 0], ways / np.maximum(size, 1e-9)[:, None]
+    ways[still] = (ring[np.minimum(places + 1, count - 1)] - ring[places - 1])[still]
+    size = np.where(still, hypot(*ways.T), size)
+    return middles, ways / np.maximum(size, 1e-9)[:, None]
+
+
+def _parabolas(t: Floats, weights: Floats, bent: Bools, points: Floats) -> tuple[Floats, Floats]:
+    """Values and slopes at 0 of the parabolas, or where not ``bent`` lines, of least squares through points.
+
+    By polynomials of ``t`` that are orthogonal.
+
+    Args:
+        t: of the points, shape (place, point).
+        weights: of the squared errors, the same shape.
+        bent: shape (place,).
+        points: shape (place, point, 2).
+    """
+    weight = weights.sum(axis=1)
+    middle = (weights * t).sum(axis=1) / weight
+    t = t - middle[:, None]
+    once = weights * t
+    spread = (once * t).sum(axis=1)
+    # Points in one place say no direction, nor do two places say a bend.
+    spread = np.where(spread > RANK * weight, spread, np.inf)
+    lean, level = (once * t * t).sum(axis=1) / spread, (once * t).sum(axis=1) / weight
+    square = t * t - lean[:, None] * t - level[:, None]
+    twice = weights * square
+    bend = (twice * square).sum(axis=1)
+    bend = np.where(bent & (bend > RANK * (once * t * t * t).sum(axis=1)), bend, np.inf)
+    values, slopes = [], []
+    for axis in (0, 1):
+        own = points[..., axis]
+        mean = (weights * own).sum(axis=1) / weight
+        slope = (once * own).sum(axis=1) / spread
+        curve = (twice * own).sum(axis=1) / bend
+        values.append(mean - slope * middle + curve * (middle * middle + lean * middle - level))
+        slopes.append(slope - curve * (2 * middle + lean))
+    return np.stack(values, axis=1), np.stack(slopes, axis=1)
 
 
 def _choose(spans: list[_Span], tolerance: float) -> list[Pieces]:
@@ -350,7 +385,7 @@ def _candidates(spans: list[_Span], pairs: Ints) -> tuple[Floats, Floats, Floats
     # Towards a knot its own place counts, not the noisy point there.
     points[:, 0], points[:, -1] = start, end
     chord = end - start
-    size = np.maximum(np.hypot(*chord.T), 1e-9)
+    size = np.maximum(hypot(*chord.T), 1e-9)
     away = points - start[:, None]
     line = np.abs(away[..., 0] * chord[:, None, 1] - away[..., 1] * chord[:, None, 0]).max(axis=1) / size
     along = (away * chord[:, None]).sum(axis=2) / size[:, None]
@@ -374,7 +409,7 @@ def fit_cubics(
         end: shape (cubic, 2).
         points: shape (cubic, sample, 2).
     """
-    steps = np.hypot(*np.moveaxis(np.diff(points, axis=1), 2, 0))
+    steps = hypot(*np.moveaxis(np.diff(points, axis=1), 2, 0))
     t = np.concatenate([np.zeros((len(points), 1)), np.cumsum(steps, axis=1)], axis=1)
     t /= np.maximum(t[:, -1:], 1e-9)
     cubics: Floats = np.zeros((len(points), 4, 2))
@@ -382,7 +417,7 @@ def fit_cubics(
         cubics = _with_handles(start, way, back, end, points, t)
         if turn + 1 < TURNS:
             t = _nearer(cubics, points, t)
-    off = np.hypot(*np.moveaxis(_at(cubics, t) - points, 2, 0))
+    off = hypot(*np.moveaxis(_at(cubics, t) - points, 2, 0))
     return cubics, off.max(axis=1)
 
 
@@ -401,7 +436,7 @@ def _with_handles(start: Floats, way: Floats, back: Floats, end: Floats, points:
     det = a11 * a22 - a12**2
     safe = np.where(np.abs(det) > 1e-9, det, 1)
     first, second = (a22 * y1 - a12 * y2) / safe, (a11 * y2 - a12 * y1) / safe
-    chord = np.hypot(*(end - start).T)
+    chord = hypot(*(end - start).T)
     bad = (np.abs(det) <= 1e-9) | (first < 0.02 * chord) | (second < 0.02 * chord)
     bad |= (first > 3 * chord) | (second > 3 * chord)
     first, second = np.where(bad, chord / 3, first), np.where(bad, chord / 3, second)
@@ -410,7 +445,7 @@ def _with_handles(start: Floats, way: Floats, back: Floats, end: Floats, points:
 
 def _at(cubics: Floats, t: Floats) -> Floats:
     s = 1 - t
-    weights = s**3, 3 * s * s * t, 3 * s * t * t, t**3
+    weights = s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t
     return np.stack(
         [sum(w * cubics[:, k, axis, None] for k, w in enumerate(weights)) for axis in (0, 1)], axis=-1
     )

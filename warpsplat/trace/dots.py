@@ -9,6 +9,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.linear import principal_direction
 from warpsplat.trace.grids import Bools, Floats
 from warpsplat.trace.ink import Ink
 
@@ -85,7 +88,7 @@ def round_dots(ink: Ink, width: float) -> tuple[list[Dot], Bools]:
             continue
         _stroke(covered, ends, thick)
         dots.append(Dot((ends + 0.5) / fine, thick / fine))
-    return dots, cv2.resize(covered, ink.mask.shape[::-1], interpolation=cv2.INTER_AREA) > 0
+    return dots, filters.resize_area(covered, ink.mask.shape[::-1]) > 0.5
 
 
 def _goes_on(depth: Floats, ends: Floats, width: float) -> bool:
@@ -104,17 +107,17 @@ def _goes_on(depth: Floats, ends: Floats, width: float) -> bool:
 def _round(own: Bools, radius: float) -> tuple[Floats, float] | None:
     """Ends and width of the dot that a piece of ink is, on the fine grid; None where it is none."""
     places = np.argwhere(own)[:, ::-1].astype(np.float64)
-    half = max(0.0, (len(places) - math.pi * radius**2) / (4 * radius))
+    half = max(0.0, (len(places) - math.pi * radius * radius) / (4 * radius))
     if half > (LONGEST - 1) * radius:
         return None
     middle = places.mean(axis=0)
-    way = np.linalg.eigh(np.cov((places - middle).T))[1][:, 1] if half else np.zeros(2)
+    way = principal_direction(places) if half else np.zeros(2)
     ends = middle + np.stack([-half * way, half * way])
     shown = np.zeros(own.shape, np.uint8)
     _stroke(shown, ends, 2 * radius)
     both = int((own & (shown > 0)).sum())
     # What the box cuts off of the dot counts as well.
-    either = len(places) + math.pi * radius**2 + 4 * radius * half - both
+    either = len(places) + math.pi * radius * radius + 4 * radius * half - both
     return (ends, 2 * radius) if both >= LIKE * either else None
 
 
@@ -175,7 +178,7 @@ def _dot(
         return None
     y, x = np.ogrid[: left.shape[0], : left.shape[1]]
     radius = np.minimum(depth, most)
-    room = radius - np.hypot(y - row, x - column)
+    room = radius - hypot(y - row, x - column)
     fits = room >= min(float(left[row, column]), most) - 1
     best = np.where(fits, radius, 0)
     row, column = np.unravel_index(int(best.argmax()), best.shape)
@@ -191,7 +194,7 @@ def _inked(ink: Ink, fine: int) -> Bools:
     """Where ink is, on the fine grid."""
     size = (ink.mask.shape[1] * fine, ink.mask.shape[0] * fine)
     near = cv2.dilate(ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    cover = cv2.resize(np.where(near, ink.cover, 0), size, interpolation=cv2.INTER_CUBIC)
+    cover = filters.resize_cubic(np.where(near, ink.cover, 0), size)
     return np.asarray(cover > 0.5, np.bool_)
 
 
@@ -209,5 +212,4 @@ def _drawn(lines: list[tuple[Floats, Floats, bool]], shape: tuple[int, int], fin
 
 def _depth(inside: np.ndarray) -> Floats:
     """Distance of each pixel from those not inside."""
-    padded = np.pad(inside, 1).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1], np.float32)
+    return filters.distance(np.pad(inside, 1))[1:-1, 1:-1]

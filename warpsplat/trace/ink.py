@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
 from warpsplat.trace.grids import Bools
 from warpsplat.trace.ridges import FAINT, NOISY, SURE, across, middles, with_thin
@@ -91,7 +92,7 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     contrast = _contrast(light, small, in_all=is_textured)
     noise = _noise(contrast)
     if noise > 0.01:
-        contrast = np.asarray(cv2.GaussianBlur(contrast, (0, 0), 0.8), np.float32)
+        contrast = filters.gaussian_blur(contrast, 0.8)
         noise *= 0.5
     floor = max(FAINTEST, NOISE * noise)
     dark = contrast[contrast > floor]
@@ -111,7 +112,7 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     mask = _held(mask, seeds, sure, speck, share)
     full = cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8))
     # What is lighter than ink elsewhere is thinner than a pixel, to some extent.
-    full = np.maximum(cv2.blur(full, (NEAR, NEAR)), (TEXTURED_FULL if is_textured else FULL) * strong)
+    full = np.maximum(filters.box_blur(full, NEAR), (TEXTURED_FULL if is_textured else FULL) * strong)
     around = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
     cover[cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0] = 1
@@ -134,7 +135,7 @@ def _reduced(light: FloatArray) -> FloatArray:
     height, width = light.shape[:2]
     factor = max(1, round(max(height, width) / REDUCED))
     size = (max(1, width // factor), max(1, height // factor))
-    return np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA), np.float32)
+    return filters.resize_area(light, size)
 
 
 def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArray:
@@ -147,7 +148,7 @@ def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArr
     paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, kernel, borderType=cv2.BORDER_REPLICATE)
     # The edge of what is coloured broadly is no line, although the reduced picture blurs it.
     paper = cv2.erode(paper, np.ones((3, 3), np.uint8))
-    paper = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR)
+    paper = filters.resize_linear(paper, (width, height))
     contrast = np.clip(paper - light, 0, 1)
     return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
@@ -178,7 +179,7 @@ def _is_colored_in(small: FloatArray) -> bool:
 
 def _noise(contrast: FloatArray) -> float:
     """Standard deviation of the noise, from the second differences of most pixels."""
-    rough = cv2.filter2D(contrast, -1, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32))
+    rough = np.diff(np.diff(np.pad(contrast, 1, mode="reflect"), n=2, axis=0), n=2, axis=1)
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
@@ -187,8 +188,8 @@ def _held(mask: Bools, seeds: Bools, dark: Bools, speck: float, share: float) ->
     pinholes.
     """
     edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
-    width = 2 * mask.sum() / max(1, edge.sum())
-    least = max(SMALLEST, speck * width**2)
+    width = 2 * float(mask.sum()) / max(1, int(edge.sum()))
+    least = max(SMALLEST, speck * width * width)
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     held = stats[:, cv2.CC_STAT_AREA] >= least
     held |= (np.bincount(parts[dark], minlength=len(stats)) > 0) & (stats[:, cv2.CC_STAT_AREA] >= LEAST_DOT)
@@ -196,6 +197,6 @@ def _held(mask: Bools, seeds: Bools, dark: Bools, speck: float, share: float) ->
     held[0] = False
     inked = held[parts]
     _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)
-    pinholes = stats[:, cv2.CC_STAT_AREA] < max(SMALLEST, 0.5 * SPECK * width**2)
+    pinholes = stats[:, cv2.CC_STAT_AREA] < max(SMALLEST, 0.5 * SPECK * width * width)
     pinholes[0] = False
     return np.asarray(inked | pinholes[parts], np.bool_)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.trace.areas import Areas
@@ -89,7 +90,7 @@ def rejoined(before: Scene, after: Scene) -> Scene:
 
 def _strokes(line: Line, *, thin: bool) -> list[_Stroke]:
     """A line, in parts of one width; ``thin``: or less than a pixel."""
-    length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())
+    length = float(hypot(*np.diff(line.points, axis=0).T).sum())
     steps = width_steps(line.widths, length / max(1, len(line.points) - 1))
     least = LEAST_WIDTH if thin and length >= LONG else 1.0
     if len(steps) == 1:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.filters import remap_linear
+from warpsplat.portable.sequences import convolve, interp
 from warpsplat.trace.grids import Floats
 
 STEP = 0.25
@@ -41,13 +43,7 @@ def measured(points: Floats, widths: Floats, closed: bool, cover: Floats) -> tup
     sides = []
     for sign in (1, -1):
         places = (points[:, None] + sign * steps[None, :, None] * normals[:, None]).astype(np.float32) - 0.5
-        seen = cv2.remap(
-            cover.astype(np.float32, copy=False),
-            places[..., 0],
-            places[..., 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
+        seen = remap_linear(cover, places[..., 0], places[..., 1])
         seen = np.where(np.logical_and.accumulate(seen > EDGE, axis=1), seen, 0)
         sides.append(STEP * (seen.sum(axis=1) - 0.5 * seen[:, 0]))
     found = sides[0] + sides[1]
@@ -60,9 +56,9 @@ def measured(points: Floats, widths: Floats, closed: bool, cover: Floats) -> tup
     if crossed.all():
         return points, usual
     at = np.arange(len(points))
-    away = np.interp(at, at[~crossed], np.clip(away[~crossed], -MOST_AWAY, MOST_AWAY))
+    away = interp(at, at[~crossed], np.clip(away[~crossed], -MOST_AWAY, MOST_AWAY))
     away = _running_mean(away, 3, mode)
-    found = np.interp(at, at[~crossed], found[~crossed])
+    found = interp(at, at[~crossed], found[~crossed])
     return points + away[:, None] * normals, _running_mean(found, max(2, window // 3), mode)
 
 
@@ -70,7 +66,7 @@ def _normals(points: Floats, closed: bool) -> Floats:
     """Unit vectors across a line, shape (point, 2)."""
     padded = np.pad(points, ((2, 2), (0, 0)), mode="wrap" if closed else "edge")
     ways = padded[4:] - padded[:-4]
-    return np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(np.hypot(*ways.T), 1e-9)[:, None]
+    return np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(hypot(*ways.T), 1e-9)[:, None]
 
 
 def _running_median(values: Floats, reach: int, mode: str) -> Floats:
@@ -82,4 +78,4 @@ def _running_median(values: Floats, reach: int, mode: str) -> Floats:
 def _running_mean(values: Floats, reach: int, mode: str) -> Floats:
     reach = min(reach, len(values) - 1)
     padded = np.pad(values, reach, mode=mode)  # type: ignore[call-overload]
-    return np.convolve(padded, np.full(2 * reach + 1, 1 / (2 * reach + 1)), "valid")
+    return convolve(padded, np.full(2 * reach + 1, 1 / (2 * reach + 1)))

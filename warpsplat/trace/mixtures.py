@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,7 +78,7 @@ def _neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Int
     index = np.zeros((len(WAYS), len(rows)), np.int64)
     distance = np.full((len(WAYS), len(rows)), np.inf, np.float32)
     for way, (down, right) in enumerate(WAYS):
-        length = np.hypot(down, right)
+        length = math.sqrt(down * down + right * right)
         for reach in range(1, most + 1):
             y, x = rows + reach * down, columns + reach * right
             near = (y >= 0) & (y < height) & (x >= 0) & (x < width) & (found[way] == NOBODY)

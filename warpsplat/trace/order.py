@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpsplat.portable.elementary import hypot
 from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints
 from warpsplat.trace.planar import STEPS, Loops
 
@@ -149,7 +150,7 @@ def _votes(loops: Loops, unpainted: Bools) -> dict[int, dict[int, float]]:
         window = np.arange(max(1, look))[:, None]
         ahead = steps[(changes + window) % size].sum(axis=0)
         behind = steps[(changes - 1 - window) % size].sum(axis=0)
-        lengths = np.hypot(*ahead.T) * np.hypot(*behind.T)
+        lengths = hypot(*ahead.T) * hypot(*behind.T)
         cosines = (ahead * behind).sum(axis=1) / np.maximum(lengths, 1e-6)
         for change, cosine in zip(changes.tolist(), cosines.tolist(), strict=True):
             if cosine >= STRAIGHT:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
+from warpsplat.portable.elementary import exp, log
+from warpsplat.portable.filters import lab
 from warpsplat.scene import FloatArray
 from warpsplat.trace.grids import Floats, Ints
 from warpsplat.trace.ink import Ink
@@ -64,7 +65,7 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
     """
     if not len(colors):
         return np.zeros((0, 3), np.float32), np.zeros(0, np.intp)
-    places = cv2.cvtColor(colors[None], cv2.COLOR_RGB2LAB)[0] * np.array([0.5, 1, 1], np.float32)
+    places = lab(colors) * np.array([0.5, 1, 1], np.float32)
     total = weights.sum()
     leaders: list[int] = []
     for line in np.argsort(-weights, kind="stable").tolist():
@@ -84,7 +85,7 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
         centers = _apart(np.array(means), used[kept])
     owner = np.linalg.norm(places[:, None] - centers[None], axis=2).argmin(axis=1)
     order = np.argsort(-np.bincount(owner, weights, len(centers)), kind="stable")
-    owner = np.argsort(order)[owner]
+    owner = np.argsort(order, kind="stable")[owner]
     pens = np.stack(
         [_weighted_median(colors[owner == pen], weights[owner == pen]) for pen in range(len(order))]
     )
@@ -102,7 +103,7 @@ def _apart(centers: Floats, used: Floats) -> Floats:
 
 def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
     """Of each column."""
-    order = np.argsort(values, axis=0)
+    order = np.argsort(values, axis=0, kind="stable")
     sums = np.cumsum(weights[order], axis=0)
     middle = (sums >= 0.5 * sums[-1]).argmax(axis=0)
     return np.asarray(np.take_along_axis(values, np.take_along_axis(order, middle[None], 0), 0)[0])
@@ -115,26 +116,27 @@ def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:
         widths: at the points of a line [px], shape (point,).
         spacing: of the points [px].
     """
-    logs = np.log(np.maximum(widths, 0.25))
+    logs = log(np.maximum(widths, 0.25))
     sums = np.concatenate([[0.0], np.cumsum(logs)])
     squares = np.concatenate([[0.0], np.cumsum(logs**2)])
 
     def error(low: Ints, high: Ints) -> Floats:
         """Squared deviations of the points from ``low`` to before ``high``."""
-        return np.asarray(
-            squares[high] - squares[low] - (sums[high] - sums[low]) ** 2 / np.maximum(high - low, 1)
-        )
+        total = sums[high] - sums[low]
+        return np.asarray(squares[high] - squares[low] - total * total / np.maximum(high - low, 1))
 
     def parts(low: int, high: int) -> list[tuple[int, int]]:
-        least = max(2, round(SHORTEST * float(np.exp(logs[low:high].mean())) / max(spacing, 1e-6)))
-        cuts = np.arange(low + least, high - least + 1)
         whole = float(error(np.array(low), np.array(high)))
-        if not len(cuts) or whole <= STEP**2 * (high - low):
+        if whole <= STEP * STEP * (high - low):
+            return [(low, high)]
+        least = max(2, round(SHORTEST * float(exp(logs[low:high].mean())) / max(spacing, 1e-6)))
+        cuts = np.arange(low + least, high - least + 1)
+        if not len(cuts):
             return [(low, high)]
         cut = int(cuts[(error(np.array(low), cuts) + error(cuts, np.array(high))).argmin()])
         return [*parts(low, cut), *parts(cut, high)]
 
     return [
-        (low, min(high, len(widths) - 1), float(np.exp(np.median(logs[low:high]))))
+        (low, min(high, len(widths) - 1), float(exp(np.median(logs[low:high]))))
         for low, high in parts(0, len(widths))
     ]

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.linear import eigh, product, solve, solve_banded
+from warpsplat.portable.sequences import interp
 from warpsplat.scene import Paint
 from warpsplat.trace.grids import Bools, Floats
 
@@ -68,9 +72,9 @@ def fit_ramp(image: Floats, mask: Bools, left: int, top: int) -> Ramp | None:
 
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
     """Where the slope of the picture is known, and it in each channel: (n, 2), (n, 2, channel)."""
-    weight = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5)
-    soft = cv2.GaussianBlur(image.astype(np.float32) * mask[..., None], (0, 0), 1.5)
-    soft = soft.reshape(image.shape) / np.maximum(weight, 1e-3)[..., None]
+    weight = filters.gaussian_blur(mask, 1.5)
+    soft = filters.gaussian_blur(image.astype(np.float32) * mask[..., None], 1.5)
+    soft = soft / np.maximum(weight, 1e-3)[..., None]
     sure = cv2.erode(mask.astype(np.uint8), np.ones((2 * SPAN + 1,) * 2, np.uint8), borderValue=0) > 0
     sure[:SPAN], sure[-SPAN:], sure[:, :SPAN], sure[:, -SPAN:] = False, False, False, False
     rows, columns = np.nonzero(sure)
@@ -82,14 +86,15 @@ def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
 
 
 def _linear(at: Floats, colors: Floats, slopes: Floats) -> Ramp:
-    tensor = np.einsum("nic,njc->ij", slopes, slopes)
-    way = np.linalg.eigh(tensor)[1][:, 1]
-    along = at @ way
+    x, y = slopes[:, 0], slopes[:, 1]
+    mixed = (x * y).sum()
+    way = eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]
+    along = product(at, way)
     low, high = float(along.min()), float(along.max())
     length = max(high - low, 1e-3)
     offsets, stops, residual = _profile((along - low) / length, colors)
     middle = at.mean(axis=0)
-    origin = middle + (low - float(middle @ way)) * way
+    origin = middle + (low - float((middle * way).sum())) * way
     axis = way * length
     frame = np.concatenate([origin, axis, [-axis[1], axis[0]]])
     return Ramp(Paint.LINEAR, frame, offsets, stops, residual)
@@ -98,15 +103,18 @@ def _linear(at: Floats, colors: Floats, slopes: Floats) -> Ramp:
 def _center(places: Floats, slopes: Floats) -> Floats | None:
     """The point that all slopes point to or away from."""
     normals = np.stack([slopes[:, 1], -slopes[:, 0]], axis=-1)  # (n, channel, 2)
-    matrix = np.einsum("nci,ncj->ij", normals, normals)
-    wanted = np.einsum("nci,ncj,nj->i", normals, normals, places)
-    if np.linalg.cond(matrix) > 1e4:
+    away = (normals * places[:, None]).sum(axis=-1)
+    x, y = normals[..., 0], normals[..., 1]
+    mixed = (x * y).sum()
+    matrix = np.array([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])
+    least, most = eigh(matrix)[0]
+    if most >= 1e4 * least:
         return None
-    return np.asarray(np.linalg.solve(matrix, wanted))
+    return solve(matrix, np.array([(x * away).sum(), (y * away).sum()]))
 
 
 def _radial(at: Floats, colors: Floats, center: Floats) -> Ramp:
-    distance = np.hypot(*(at - center).T)
+    distance = hypot(*(at - center).T)
     reach = max(float(distance.max()), 1e-3)
     offsets, stops, residual = _profile(distance / reach, colors)
     return Ramp(
@@ -122,7 +130,7 @@ def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
     known = np.concatenate([[True], (seen[1:] + seen[:-1]) > 0, [True]])
     chosen = _fewest(knots[known], fine[known])
     stops = _least_squares(t, colors, chosen)
-    shown = np.stack([np.interp(t, chosen, stops[:, c]) for c in range(colors.shape[1])], axis=1)
+    shown = np.stack([interp(t, chosen, stops[:, c]) for c in range(colors.shape[1])], axis=1)
     return chosen, np.clip(stops, 0, 255), float(np.sqrt(np.mean((shown - colors) ** 2)))
 
 
@@ -139,10 +147,14 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     beside = sums(share * (1 - share))[:-1]
     here = sums((1 - share) ** 2) + np.roll(sums(share**2), 1)
     right = np.stack([sums((1 - share) * c) + np.roll(sums(share * c), 1) for c in colors.T], axis=1)
-    stiff = 1e-3 * np.diff(np.eye(len(knots)), n=2, axis=0) if len(knots) > 2 else np.zeros((0, len(knots)))
-    matrix = np.diag(here) + np.diag(beside, 1) + np.diag(beside, -1)
-    matrix += len(t) * (stiff.T @ stiff) + 1e-9 * np.eye(count)
-    return np.asarray(np.linalg.solve(matrix, right))
+    here += 1e-9
+    # The squares of second differences.
+    stiff = 1e-6 * len(t)
+    for first, times in enumerate((1, 4, 1)):
+        here[first : count - 2 + first] += times * stiff
+    beside[:-1] -= 2 * stiff
+    beside[1:] -= 2 * stiff
+    return solve_banded([here, beside, np.full(count - 2, stiff)], right)
 
 
 def _fewest(knots: Floats, values: Floats) -> Floats:
@@ -151,7 +163,7 @@ def _fewest(knots: Floats, values: Floats) -> Floats:
     while len(chosen) < STOPS:
         order = sorted(chosen)
         shown = np.stack(
-            [np.interp(knots, knots[order], values[order, c]) for c in range(values.shape[1])], axis=1
+            [interp(knots, knots[order], values[order, c]) for c in range(values.shape[1])], axis=1
         )
         off = np.abs(shown - values).max(axis=1)
         worst = int(off.argmax())

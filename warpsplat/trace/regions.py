@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
 from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints, Sets, largest, linked_parts
 from warpsplat.trace.mixtures import REACH, explain
 from warpsplat.trace.ramps import Ramp, fit_ramp
@@ -150,10 +151,12 @@ def _slack(noise: float) -> float:
 def _calmed(image: Floats, noise: float) -> Floats:
     """Without what JPEG leaves beside edges."""
     calm = np.ascontiguousarray(image, np.float32)
-    for _ in range(3):
-        for channels in (slice(0, 3), slice(3, 4)):
-            part = np.ascontiguousarray(calm[..., channels])
-            calm[..., channels] = cv2.bilateralFilter(part, 7, CALM + 6 * noise, 2.5).reshape(part.shape)
+    for channels in (slice(0, 3), slice(3, 4)):
+        part = calm[..., channels]
+        if np.ptp(part) > 0:
+            for _ in range(3):
+                part = filters.bilateral(part, 7, CALM + 6 * noise, 2.5)
+            calm[..., channels] = part
     return calm
 
 
@@ -447,14 +450,22 @@ def _near(labels: Ints, paint: Ints, y: Ints, x: Ints, colorings: list[Coloring]
 
 def _is_mixed(pixels: Floats, colors: list[Floats], limit: float) -> bool:
     """Whether all pixels are mixtures of some three of the colours, and mostly of one of them."""
-    done = np.zeros(len(pixels), np.bool_)
-    for a, b, c in itertools.combinations(colors[:8], 3):
-        sides = np.stack([b - a, c - a], axis=1)
-        shares = (pixels - a) @ np.linalg.pinv(sides).T
-        off = np.abs(pixels - a - shares @ sides.T).max(axis=1)
-        inside = (shares > -0.05).all(axis=1) & (shares.sum(axis=1) < 1.05)
-        done |= (off <= limit) & inside
-    return bool(done.all())
+    if len(colors) < 3:
+        return False
+    first, second, third = np.moveaxis(np.array(list(itertools.combinations(colors[:8], 3))), 1, 0)[
+        :, :, None
+    ]
+    one, other, away = second - first, third - first, pixels - first
+    # The nearest point of the plane of three colours, or of their line: the sides are of whole levels.
+    a, b, c = ((x * y).sum(axis=2) for x, y in ((one, one), (one, other), (other, other)))
+    p, q = (away * one).sum(axis=2), (away * other).sum(axis=2)
+    determinant = a * c - b * b
+    flat = determinant > 0
+    scale = np.where(flat, determinant, np.maximum(a + c, 1))
+    shares = np.where(flat, c * p - b * q, p) / scale, np.where(flat, a * q - b * p, q) / scale
+    off = np.abs(away - shares[0][..., None] * one - shares[1][..., None] * other).max(axis=2)
+    inside = (np.minimum(*shares) > -0.05) & (shares[0] + shares[1] < 1.05)
+    return bool(((off <= limit) & inside).any(axis=0).all())
 
 
 def _thin_color(
@@ -538,7 +549,7 @@ def main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
     """
     a, b = image[rows, columns], image[rows, columns + 1]
     c, d = image[rows + 1, columns], image[rows + 1, columns + 1]
-    soft = cv2.blur(np.ascontiguousarray(image, np.float32), (AROUND, AROUND))
+    soft = filters.box_blur(np.asarray(image, np.float32), AROUND)
     mean = sum(soft[rows + down, columns + right] for down in (0, 1) for right in (0, 1)) / 4
     main, other = np.abs((a + d) / 2 - mean).max(axis=1), np.abs((b + c) / 2 - mean).max(axis=1)
     return np.asarray(main >= other)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 
+from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
 from warpsplat.trace.grids import Bools
 
@@ -38,16 +41,18 @@ def across(ink: FloatArray, fine: int = 1) -> FloatArray:
     """
     if fine > 1:
         size = (ink.shape[1] * fine, ink.shape[0] * fine)
-        ink = np.asarray(cv2.resize(ink, size, interpolation=cv2.INTER_CUBIC), np.float32)
-    soft = cv2.GaussianBlur(ink, (0, 0), SPREAD * fine, borderType=cv2.BORDER_REPLICATE)
+        ink = filters.resize_cubic(ink, size)
+    soft = filters.gaussian_blur(ink, SPREAD * fine, "replicate")
     padded = np.pad(soft, 1, mode="edge")
     middle = padded[1:-1, 1:-1]
     xx = padded[1:-1, 2:] - 2 * middle + padded[1:-1, :-2]
     yy = padded[2:, 1:-1] - 2 * middle + padded[:-2, 1:-1]
     xy = 0.25 * (padded[2:, 2:] + padded[:-2, :-2] - padded[2:, :-2] - padded[:-2, 2:])
     bend = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
-    spread = fine * np.sqrt(SPREAD**2 + 1 / 12)  # with that of the pixels
-    return np.asarray(np.maximum(-bend, 0) * np.sqrt(2 * np.pi) * spread**3 / fine, np.float32)
+    spread = fine * math.sqrt(SPREAD * SPREAD + 1 / 12)  # with that of the pixels
+    return np.asarray(
+        np.maximum(-bend, 0) * (math.sqrt(2 * math.pi) * spread * spread * spread / fine), np.float32
+    )
 
 
 def middles(mass: FloatArray, least: float, fine: int = 1) -> Bools:
@@ -77,6 +82,6 @@ def with_thin(mask: Bools, thin: Bools, fine: int = 1) -> Bools:
     )
     pairs = np.unique(pairs[pairs[:, 1] > 0], axis=0)
     beside = np.bincount(pairs[:, 0], minlength=count)
-    held = (beside > 1) | (stats[:, cv2.CC_STAT_AREA] >= LONG * fine**2)
+    held = (beside > 1) | (stats[:, cv2.CC_STAT_AREA] >= LONG * fine * fine)
     held[0] = False
     return np.asarray(mask | held[links], np.bool_)

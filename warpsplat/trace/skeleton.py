@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.filters import distance
 from warpsplat.trace.grids import Bools, Floats, Ints, Sets
 
 STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
@@ -30,7 +32,7 @@ class Edge:
 
     def length(self) -> float:
         """In pixels of the skeleton."""
-        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+        return float(hypot(*np.diff(self.points, axis=0).T).sum())
 
     def backwards(self) -> Edge:
         """The same, from its end."""
@@ -59,7 +61,7 @@ class Graph:
 def find_graph(mask: Bools) -> tuple[Graph, Floats]:
     """The skeleton of ``mask`` without burrs, and half the width of the ink at each pixel."""
     inside = cv2.copyMakeBorder(mask.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
-    radii = np.maximum(cv2.distanceTransform(inside, cv2.DIST_L2, 5)[1:-1, 1:-1] - 0.5, 0.5)
+    radii = np.maximum(distance(inside)[1:-1, 1:-1] - 0.5, 0.5)
     thin = cv2.ximgproc.thinning(255 * inside, thinningType=cv2.ximgproc.THINNING_GUOHALL)[1:-1, 1:-1] > 0
     graph = _traced(thin, radii)
     for _ in range(3):

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from warpsplat.portable.elementary import cos, hypot, sin
+from warpsplat.portable.linear import principal_direction
 from warpsplat.trace.curves import Pieces, Run, straight
 from warpsplat.trace.grids import NOBODY, Bools, Floats, Ints
 from warpsplat.trace.order import Layers
@@ -30,6 +32,10 @@ ASIDE = 1.0
 
 MARGIN = 0.7
 """What a hidden outline keeps from where it would be seen [px]."""
+
+_ANGLES = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+CIRCLE = np.stack([cos(_ANGLES), sin(_ANGLES)], axis=1)
+"""Points on the unit circle, shape (12, 2)."""
 
 DOT = 8
 """Cracks of the largest loop that is a dot, whose shape cannot be told."""
@@ -131,8 +137,7 @@ class Tracer:
         full = area + float(self.offsets[low:high].sum())
         radius = np.sqrt(max(abs(full), 0.1) / np.pi)
         middle = self.points[low:high].mean(axis=0)
-        angle = np.linspace(0, 2 * np.pi, 12, endpoint=False) * np.sign(area)
-        circle = middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        circle = middle + radius * CIRCLE * (1, np.sign(area))
         self.runs.append(Run(circle, closed=True))
         return Outline([len(self.runs) - 1])
 
@@ -216,8 +221,8 @@ class Tracer:
         if len(tail) < 2:
             return vertex
         middle = tail.mean(axis=0)
-        way = np.linalg.svd(tail - middle)[2][0]
-        way = way if way @ (tail[-1] - tail[0]) > 0 else -way
+        way = principal_direction(tail)
+        way = way if (way * (tail[-1] - tail[0])).sum() > 0 else -way
         height, width = self.labels.shape
         if kind == EDGE:
             axis = 0 if vertex[0] in (0, width) else 1
@@ -226,9 +231,10 @@ class Tracer:
             reached = middle + way * (vertex[axis] - middle[axis]) / way[axis]
             reached[axis] = vertex[axis]
             reached[1 - axis] = np.clip(reached[1 - axis], 0, (height, width)[axis])
-            return reached if np.hypot(*(reached - vertex)) < 1.5 else vertex
-        reached = middle + way * max(float((vertex - middle) @ way), float((tail[-1] - middle) @ way) + 0.1)
-        if np.hypot(*(reached - vertex)) > 1.0:
+            return reached if hypot(*(reached - vertex)) < 1.5 else vertex
+        ahead, behind = ((place - middle) * way for place in (vertex, tail[-1]))
+        reached = middle + way * max(float(ahead.sum()), float(behind.sum()) + 0.1)
+        if hypot(*(reached - vertex)) > 1.0:
             reached = vertex
         further = reached + UNDER * way
         return further if self._covered(region, further[None])[0] else reached
@@ -271,7 +277,7 @@ class Tracer:
         trend = self.trend[cracks]
         # Around a single pixel there may be none.
         trend = np.where(np.abs(trend).max(axis=1, keepdims=True) > 0, trend, steps)
-        outward = np.stack([trend[:, 1], -trend[:, 0]], axis=1) / np.hypot(*trend.T)[:, None]
+        outward = np.stack([trend[:, 1], -trend[:, 0]], axis=1) / hypot(*trend.T)[:, None]
         middle = self.loops.vertices[cracks] + 0.5 * steps
         reach, open_ = np.full(len(cracks), NEAR), np.ones(len(cracks), np.bool_)
         for depth in np.arange(NEAR, DEEP, 0.5):
@@ -294,7 +300,7 @@ class Tracer:
     def _is_free(self, region: int, start: Floats, end: Floats) -> bool:
         """Whether a straight line is hidden, its ends aside."""
         way = end - start
-        size = float(np.hypot(*way))
+        size = float(hypot(*way))
         if size < 1.5:
             return True
         unit = way / size
@@ -342,7 +348,7 @@ def assembled(outline: Outline, fitted: list[Pieces]) -> Pieces | None:
                 lines.append(True)
             last = part[-1]
         goal = fitted[after].cubics[0, 0] if isinstance(after, int) else after[0]
-        if np.hypot(*(goal - last)) > 1e-3:
+        if hypot(*(goal - last)) > 1e-3:
             cubics.append(straight(last, goal))
             lines.append(True)
     return _joined(np.asarray(cubics), lines)
@@ -367,7 +373,7 @@ def _joined(cubics: Floats, lines: list[bool]) -> Pieces:
 def _goes_on(one: Floats, other: Floats) -> bool:
     """Whether the joint of two lines is on the straight way from the first's start to the second's end."""
     way, here = other[3] - one[0], one[3] - one[0]
-    size = float(np.hypot(*way))
-    if size < 1e-6 or here @ way < 0 or (other[3] - one[3]) @ way < 0:
+    size = float(hypot(*way))
+    if size < 1e-6 or (here * way).sum() < 0 or ((other[3] - one[3]) * way).sum() < 0:
         return False
     return bool(abs(here[0] * way[1] - here[1] * way[0]) <= STRAIGHT * size)

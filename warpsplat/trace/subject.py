@@ -8,6 +8,8 @@ from typing import Literal
 import cv2
 import numpy as np
 
+from warpsplat.portable.filters import distance
+from warpsplat.portable.sequences import convolve
 from warpsplat.scene import FloatArray
 from warpsplat.trace.grids import Bools, Floats, Ints
 
@@ -201,7 +203,7 @@ def _is_line_art(levels: Ints) -> bool:
         flat = flat + 255 - levels[..., 3:].astype(np.int32)
     grey = flat.min(axis=2).astype(np.uint8)
     histogram = np.bincount(grey.reshape(-1), minlength=256)
-    paper = int(np.convolve(histogram, np.ones(9), "same").argmax())
+    paper = int(convolve(np.pad(histogram, 4), np.ones(9)).argmax())
     darkest = float(np.percentile(grey, 0.2))
     if paper < 160 or paper - darkest < 80:
         return False
@@ -212,7 +214,7 @@ def _is_line_art(levels: Ints) -> bool:
     beside = cv2.dilate(ink.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     if (~blank & ~beside).mean() > max(0.005, 0.1 * ink.mean()):
         return False
-    depth = cv2.distanceTransform(np.pad(ink, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    depth = distance(np.pad(ink, 1))[1:-1, 1:-1]
     widest = max(LINE, THIN * max(grey.shape))
     return bool(np.quantile(depth[ink], 0.97) <= widest)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.scene.scene import ranges
 from warpsplat.trace.grids import Bools, Floats, Ints
@@ -29,7 +30,7 @@ def pen_up(scene: Scene) -> float:
     Between pens as well; the ways from and to the plotter's corner are not counted.
     """
     starts, ends = _ends(scene)
-    return float(np.hypot(*(starts[1:] - ends[:-1]).T).sum())
+    return float(hypot(*(starts[1:] - ends[:-1]).T).sum())
 
 
 def toured(scene: Scene) -> Scene:
@@ -82,7 +83,7 @@ def _lifted(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> float:
     """Way of the lifted pen on a tour."""
     entries = np.where(turned[:, None], ends[tour], starts[tour])
     exits = np.where(turned[:, None], starts[tour], ends[tour])
-    return float(np.hypot(*(entries[1:] - exits[:-1]).T).sum())
+    return float(hypot(*(entries[1:] - exits[:-1]).T).sum())
 
 
 def _improved(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> tuple[Ints, Bools]:
@@ -107,12 +108,12 @@ def _turn_parts(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> None
         high = np.arange(low, min(low + LOOK_AHEAD, count))
         now, then = np.zeros(len(high)), np.zeros(len(high))
         if low:
-            now += np.hypot(*(entries[low] - exits[low - 1]))
-            then += np.hypot(*(exits[high] - exits[low - 1]).T)
+            now += hypot(*(entries[low] - exits[low - 1]))
+            then += hypot(*(exits[high] - exits[low - 1]).T)
         inner = high < count - 1
         following = np.minimum(high + 1, count - 1)
-        now += inner * np.hypot(*(entries[following] - exits[high]).T)
-        then += inner * np.hypot(*(entries[following] - entries[low]).T)
+        now += inner * hypot(*(entries[following] - exits[high]).T)
+        then += inner * hypot(*(entries[following] - entries[low]).T)
         best = int((then - now).argmin())
         if then[best] - now[best] < -1e-6:
             part = slice(low, int(high[best]) + 1)
@@ -129,11 +130,11 @@ def _with_moves(starts: Floats, ends: Floats, tour: Ints, turned: Bools) -> tupl
         rest, rest_turned = np.delete(tour, at), np.delete(turned, at)
         entries = np.where(rest_turned[:, None], ends[rest], starts[rest])
         exits = np.where(rest_turned[:, None], starts[rest], ends[rest])
-        between = np.append(np.hypot(*(entries[1:] - exits[:-1]).T), 0.0)
+        between = np.append(hypot(*(entries[1:] - exits[:-1]).T), 0.0)
         costs = []
         for entry, leave in ((starts[stroke], ends[stroke]), (ends[stroke], starts[stroke])):
-            onwards = np.append(np.hypot(*(entries[1:] - leave).T), 0.0)
-            costs.append(np.hypot(*(exits - entry).T) + onwards - between)
+            onwards = np.append(hypot(*(entries[1:] - leave).T), 0.0)
+            costs.append(hypot(*(exits - entry).T) + onwards - between)
         is_end, place = divmod(int(np.argmin(costs)), len(rest))
         if costs[is_end][place] < costs[int(turned[at])][at - 1] - 1e-6:
             tour = np.insert(rest, place + 1, stroke)
@@ -162,7 +163,7 @@ def _rings_begun(scene: Scene) -> Scene:
         own = scene.points_of(shape)
         near = [ends[shape - 1]] if shape else []
         near += [starts[shape + 1]] if shape + 1 < len(scene) else []
-        away = np.sum([np.hypot(*(own[::3] - place).T) for place in near], axis=0)
+        away = np.sum([hypot(*(own[::3] - place).T) for place in near], axis=0)
         begin = 3 * int(np.argmin(away)) if near else 0
         points[scene.first[shape] : scene.first[shape + 1]] = np.roll(own, -begin, axis=0)
         starts[shape] = ends[shape] = own[begin]

@@ -1,0 +1,388 @@
+"""Filters of images, the same bits everywhere: what OpenCV has in floating point, by sums of slices.
+
+Images are float arrays of shape (height, width) or (height, width, channels). Results are float64 where the
+image is, else float32. All go through the image in bands that fit a processor's cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.portable import elementary
+
+Floats = npt.NDArray[Any]
+Indices = npt.NDArray[np.intp]
+Border = Literal["reflect101", "replicate"]
+"""What lies beyond an image: its reflection in its outermost pixels' middles, or copies of these pixels."""
+
+BAND = 1 << 16
+"""Numbers in a band: a few such arrays fit a processor's second cache."""
+
+CUBIC = -0.75
+"""The slope of cubic interpolation's kernel at 1, which OpenCV has."""
+
+FADE_SQUARINGS, FADE_TERMS, FADE_MOST = 5, (1 / 24, -1 / 6, 1 / 2, -1.0), 0.625
+"""How ``bilateral`` finds exp(-x): by squarings of the first terms of its series at x / 32, the highest power
+first, where x is no more than 20.
+"""
+
+LUMA = 0.299, 0.587, 0.114
+"""Shares of red, green and blue (ITU-R BT.601)."""
+
+XYZ = (0.412453, 0.357580, 0.180423), (0.212671, 0.715160, 0.072169), (0.019334, 0.119193, 0.950227)
+WHITE = 0.950456, 1.0, 1.088754
+"""Linear sRGB as CIE XYZ, and white in it (D65)."""
+
+
+def _floats(image: Floats) -> Floats:
+    image = np.asarray(image)
+    return image if image.dtype == np.float64 else image.astype(np.float32, copy=False)
+
+
+# Resizing.
+
+
+@dataclass(frozen=True)
+class _Taps:
+    """Which pixels of a side make each pixel of the resized side."""
+
+    indices: Indices
+    """Shape (tap, pixel)."""
+    weights: Floats
+    """Their shares, the same shape."""
+    whole: bool = False
+    """Whether pixel i is the mean of as many pixels as there are taps, from the first that no other has."""
+
+
+def _area_taps(before: int, after: int, dtype: Any) -> _Taps:
+    """Shares by the length that pixels have in common, found in whole numbers."""
+    taps = 2 if after > before else -(-before // after) + (before % after > 0)
+    pixel, tap = np.arange(after), np.arange(taps)[:, None]
+    index = pixel * before // after + tap
+    low = np.maximum(pixel * before, index * after)
+    high = np.minimum((pixel + 1) * before, (index + 1) * after)
+    weights = (np.maximum(high - low, 0) / before).astype(dtype)
+    return _Taps(np.minimum(index, before - 1), weights, before % after == 0)
+
+
+def _point_taps(before: int, after: int, dtype: Any, *, cubic: bool) -> _Taps:
+    """Weights of the pixels around a resized pixel's middle; beyond the border they are as at it."""
+    place = (np.arange(after) + 0.5) * (before / after) - 0.5
+    low = np.floor(place)
+    x = place - low
+    weights, offsets = [1 - x, x], [0, 1]
+    if cubic:
+        weights = [_cubic_far(1 + x), _cubic_near(x), _cubic_near(1 - x)]
+        weights.append(1 - weights[0] - weights[1] - weights[2])
+        offsets = [-1, 0, 1, 2]
+    indices = low.astype(np.intp) + np.array(offsets)[:, None]
+    return _Taps(np.clip(indices, 0, before - 1), np.array(weights).astype(dtype))
+
+
+def _cubic_near(x: Floats) -> Floats:
+    """The cubic kernel between 0 and 1."""
+    return ((CUBIC + 2) * x - (CUBIC + 3)) * x * x + 1
+
+
+def _cubic_far(x: Floats) -> Floats:
+    """The cubic kernel between 1 and 2."""
+    return ((CUBIC * x - 5 * CUBIC) * x + 8 * CUBIC) * x - 4 * CUBIC
+
+
+def _gathered(band: Floats, taps: _Taps, axis: int) -> Floats:
+    """The band (row, number) with the pixels of one axis resized."""
+    shape = list(band.shape)
+    shape[axis] = taps.indices.shape[1]
+    total, spare = np.zeros(shape, band.dtype), np.empty(shape, band.dtype)
+    for indices, weights in zip(taps.indices, taps.weights, strict=True):
+        np.take(band, indices, axis=axis, out=spare, mode="clip")
+        if not taps.whole:
+            spare *= weights[:, None] if axis == 0 else weights
+        total += spare
+    if taps.whole:
+        total *= band.dtype.type(1 / len(taps.indices))
+    return total
+
+
+def _resized(image: Floats, down: _Taps, across: _Taps) -> Floats:
+    """The image by the taps of its height and those of its width."""
+    image = np.ascontiguousarray(image)
+    channels = image.shape[2] if image.ndim == 3 else 1
+    height, width = down.indices.shape[1], across.indices.shape[1]
+    rows, channel = image.reshape(image.shape[0], -1), np.arange(channels)
+    numbers = (across.indices[..., None] * channels + channel).reshape(len(across.indices), -1)
+    along = _Taps(numbers, np.repeat(across.weights, channels, axis=1), across.whole)
+    result = np.empty((height, width * channels), image.dtype)
+    step = max(1, BAND // (max(width, image.shape[1]) * channels))
+    for top in range(0, height, step):
+        here = slice(top, top + step)
+        band = _Taps(down.indices[:, here], down.weights[:, here], down.whole)
+        result[here] = _gathered(_gathered(rows, band, 0), along, 1)
+    return result.reshape(height, width, *image.shape[2:])
+
+
+def resize_area(image: Floats, size: tuple[int, int]) -> Floats:
+    """Return an image at another size, whose pixels are means of what they cover of the image.
+
+    As OpenCV's ``INTER_AREA``, but where one side grows while the other shrinks, which OpenCV samples.
+
+    Args:
+        image: Shape (height, width) or (height, width, channels).
+        size: Width and height [px].
+    """
+    image = _floats(image)
+    across, down = (_area_taps(image.shape[1 - i], size[i], image.dtype) for i in (0, 1))
+    return _resized(image, down, across)
+
+
+def resize_linear(image: Floats, size: tuple[int, int]) -> Floats:
+    """Return an image at another size, interpolated linearly at the middles of pixels; as ``resize_area``."""
+    image = _floats(image)
+    across, down = (_point_taps(image.shape[1 - i], size[i], image.dtype, cubic=False) for i in (0, 1))
+    return _resized(image, down, across)
+
+
+def resize_cubic(image: Floats, size: tuple[int, int]) -> Floats:
+    """Return an image at another size, interpolated by cubics at middles of pixels; as ``resize_area``."""
+    image = _floats(image)
+    across, down = (_point_taps(image.shape[1 - i], size[i], image.dtype, cubic=True) for i in (0, 1))
+    return _resized(image, down, across)
+
+
+# Convolutions.
+
+
+def _beyond(places: Indices, size: int, border: Border) -> Indices:
+    """Which of ``size`` pixels stand for these, some of which lie beyond the border."""
+    if border == "replicate" or size == 1:
+        return np.clip(places, 0, size - 1)
+    period = 2 * (size - 1)
+    places = places % period
+    return np.minimum(places, period - places)
+
+
+def _weighted(parts: Sequence[Floats], weights: Sequence[float], total: Floats, spare: Floats) -> None:
+    """Write the weighted sum of ``parts``, two at a time where their weights are alike."""
+    middle = len(parts) // 2
+    mirrored = len(parts) % 2 == 1 and list(weights) == list(weights)[::-1]
+    np.multiply(parts[middle], weights[middle], out=total)
+    for i in range(len(parts)):
+        if i == middle or weights[i] == 0 or (mirrored and i > middle):
+            continue
+        part = parts[i]
+        if mirrored:
+            part = np.add(part, parts[-1 - i], out=spare)
+        total += part if weights[i] == 1 else np.multiply(part, weights[i], out=spare)
+
+
+def _convolved(
+    image: Floats, down: Sequence[float], across: Sequence[float], border: Border = "reflect101"
+) -> Floats:
+    """The sum of the pixels around each one, by weights that are products of two sequences'.
+
+    A sequence of n weights begins n // 2 pixels before the pixel.
+    """
+    image = np.ascontiguousarray(_floats(image))
+    height, width = image.shape[:2]
+    channels = image.shape[2] if image.ndim == 3 else 1
+    rows, result = image.reshape(height, -1), np.empty((height, width * channels), image.dtype)
+    above, left = len(down) // 2, len(across) // 2
+    right = len(across) - 1 - left
+    columns = _beyond(np.arange(-left, width + right), width, border)
+    step = max(1, min(height, BAND // (width * channels)))
+    wide = np.empty((step, width + len(across) - 1, channels), image.dtype)
+    spare = np.empty((step, width * channels), image.dtype)
+    for top in range(0, height, step):
+        bottom = min(top + step, height)
+        count = bottom - top
+        first, last = top - above, bottom + len(down) - 1 - above
+        if first >= 0 and last <= height:
+            band = rows[first:last]
+        else:
+            band = rows[_beyond(np.arange(first, last), height, border)]
+        mixed = spare[:count]
+        held = wide[:count]
+        _weighted([band[i : i + count] for i in range(len(down))], down, result[top:bottom], mixed)
+        held[:, left : left + width] = result[top:bottom].reshape(count, width, channels)
+        held[:, :left] = held[:, left + columns[:left]]
+        held[:, left + width :] = held[:, left + columns[left + width :]]
+        flat = held.reshape(count, -1)
+        parts = [flat[:, i * channels : (i + width) * channels] for i in range(len(across))]
+        _weighted(parts, across, result[top:bottom], mixed)
+    return result.reshape(image.shape)
+
+
+def gaussian_weights(sigma: float, size: int) -> list[float]:
+    """Weights of a Gaussian's kernel of ``size`` pixels, whose sum is 1."""
+    away = np.arange(size) - (size - 1) / 2
+    weights = elementary.exp(away * away * (-0.5 / (sigma * sigma)))
+    return [float(weight) for weight in weights / weights.sum()]
+
+
+def gaussian_blur(
+    image: Floats, sigma: float, border: Border = "reflect101", size: int | None = None
+) -> Floats:
+    """Return an image blurred by a Gaussian, as OpenCV blurs float images.
+
+    Args:
+        image: Shape (height, width) or (height, width, channels).
+        sigma: Standard deviation [px].
+        border: What lies beyond the border.
+        size: Side of the kernel [px, odd]; None for one that reaches four standard deviations.
+    """
+    weights = gaussian_weights(sigma, size or round(8 * sigma + 1) | 1)
+    return _convolved(image, weights, weights, border)
+
+
+def box_sum(image: Floats, size: int) -> Floats:
+    """Return the sum of the ``size`` x ``size`` pixels around each one, mirrored beyond the border."""
+    return _convolved(image, [1.0] * size, [1.0] * size)
+
+
+def box_blur(image: Floats, size: int) -> Floats:
+    """Return the mean of the ``size`` x ``size`` pixels around each one, mirrored beyond the border."""
+    total = box_sum(image, size)
+    total *= total.dtype.type(1 / (size * size))
+    return total
+
+
+def sobel(image: Floats) -> tuple[Floats, Floats]:
+    """Return eight times the slope of an image along x and along y, by Sobel's kernels of 3 x 3 px."""
+    smooth, slope = (1.0, 2.0, 1.0), (-1.0, 0.0, 1.0)
+    return _convolved(image, smooth, slope), _convolved(image, slope, smooth)
+
+
+def bilateral(image: Floats, diameter: int, sigma_color: float, sigma_space: float) -> Floats:
+    """Return an image blurred among pixels of like colour; mirrored beyond the border.
+
+    Args:
+        image: Shape (height, width) or (height, width, channels).
+        diameter: Pixels across the disc of neighbours that count [px, odd].
+        sigma_color: Standard deviation of the Gaussian by which neighbours count, in the sum of the channels'
+            absolute differences.
+        sigma_space: That of the Gaussian by which they count by their distance [px].
+    """
+    image = _floats(image)
+    height, width = image.shape[:2]
+    channels = image.shape[2] if image.ndim == 3 else 1
+    planes = np.ascontiguousarray(image.reshape(height, width, channels).transpose(2, 0, 1))
+    reach = diameter // 2
+    columns = _beyond(np.arange(-reach, width + reach), width, "reflect101")
+    result = np.empty_like(planes)
+    step = max(1, BAND // (width + 2 * reach))
+    for top in range(0, height, step):
+        bottom = min(top + step, height)
+        band = planes[:, _beyond(np.arange(top - reach, bottom + reach), height, "reflect101")][:, :, columns]
+        changed = _calmer(band.reshape(channels, -1), band.shape[2], reach, sigma_color, sigma_space)
+        inner = changed.reshape(band.shape)[:, reach : reach + bottom - top, reach : reach + width]
+        result[:, top:bottom] = inner
+    return np.ascontiguousarray(result.transpose(1, 2, 0)).reshape(image.shape)
+
+
+def _calmer(planes: Floats, width: int, reach: int, sigma_color: float, sigma_space: float) -> Floats:
+    """Planes (channel, pixel) of rows of ``width`` -> what ``bilateral`` makes of what is off their margins.
+
+    Each of two pixels counts for the other alike, so that half of the neighbours are looked at; in margins of
+    ``reach`` px these may be of another row.
+    """
+    size = planes.shape[1]
+    total, weights = np.zeros_like(planes), np.ones(size, planes.dtype)
+    steps, spare, all_weight = np.empty_like(planes), np.empty_like(weights), np.empty_like(weights)
+    scale = 0.5 / (sigma_color * sigma_color * (1 << FADE_SQUARINGS))
+    for down in range(reach + 1):
+        for right in range(-reach if down else 1, reach + 1):
+            square = down * down + right * right
+            if square > reach * reach:
+                continue
+            offset = down * width + right
+            rest, weight = spare[: size - offset], all_weight[: size - offset]
+            for channel, plane in enumerate(planes):
+                step = np.subtract(plane[offset:], plane[:-offset], out=steps[channel, : size - offset])
+                away = np.abs(step, out=rest if channel else weight)
+                if channel:
+                    weight += away
+            # exp(-x) is a power of exp(-x / 32), which a few terms of its series give.
+            np.multiply(weight, weight, out=rest)
+            rest *= scale
+            np.minimum(rest, FADE_MOST, out=rest)
+            np.multiply(rest, FADE_TERMS[0], out=weight)
+            for term in FADE_TERMS[1:]:
+                weight += term
+                weight *= rest
+            weight += 1
+            for _ in range(FADE_SQUARINGS):
+                weight *= weight
+            weight *= float(elementary.exp(-0.5 * square / (sigma_space * sigma_space)))
+            weights[:-offset] += weight
+            weights[offset:] += weight
+            for sums, step in zip(total, steps[:, : size - offset], strict=True):
+                np.multiply(step, weight, out=rest)
+                sums[:-offset] += rest
+                sums[offset:] -= rest
+    total /= weights
+    total += planes
+    return total
+
+
+# The rest.
+
+
+def remap_linear(image: Floats, x: Floats, y: Floats) -> Floats:
+    """Return the values of an image at places, interpolated linearly; beyond its border they are as at it.
+
+    Args:
+        image: Shape (height, width).
+        x: Columns [px, whole at the middles of pixels], any shape.
+        y: Rows, of the same shape.
+    """
+    image = np.ascontiguousarray(_floats(image))
+    height, width = image.shape
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+    column, row = x.astype(np.intp), y.astype(np.intp)
+    right, down = (x - column).astype(image.dtype), (y - row).astype(image.dtype)
+    first, lower = row * width, np.minimum(row + 1, height - 1) * width
+    beside = np.minimum(column + 1, width - 1)
+    flat = image.reshape(-1)
+    above, below = flat[first + column], flat[lower + column]
+    above = above + right * (flat[first + beside] - above)
+    below = below + right * (flat[lower + beside] - below)
+    return np.asarray(above + down * (below - above))
+
+
+def distance(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    """Return the distance of each pixel of ``mask`` from the nearest that is 0 [px], shape (height, width).
+
+    By steps to neighbours at up to a knight's move, 2 % too long or short at most. With labels OpenCV does so
+    in whole numbers; without, Intel's library does it in floating point where there is one.
+    """
+    pixels = np.asarray(mask, np.uint8)
+    away, _ = cv2.distanceTransformWithLabels(pixels, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    return np.asarray(away, np.float32)
+
+
+def grey(rgb: Floats) -> Floats:
+    """Return the luma of colours (..., 3), shape (...)."""
+    rgb = _floats(rgb)
+    red, green, blue = (rgb.dtype.type(share) * rgb[..., i] for i, share in enumerate(LUMA))
+    return np.asarray(red + green + blue)
+
+
+def lab(rgb: Floats) -> Floats:
+    """Return colours (..., 3), sRGB in [0, 1], as CIELAB: lightness in [0, 100], a and b."""
+    given = _floats(rgb)
+    colors = np.asarray(given, np.float64)
+    bent = elementary.power((np.maximum(colors, 0.04045) + 0.055) / 1.055, 2.4)
+    linear = np.where(colors <= 0.04045, colors / 12.92, bent)
+    cubes = []
+    for row, white in zip(XYZ, WHITE, strict=True):
+        share = (row[0] * linear[..., 0] + row[1] * linear[..., 1] + row[2] * linear[..., 2]) / white
+        root = elementary.power(np.maximum(share, 0.008856), 1 / 3)
+        cubes.append(np.where(share > 0.008856, root, 7.787 * share + 16 / 116))
+    x, y, z = cubes
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1).astype(given.dtype)
