@@ -159,6 +159,7 @@ def knee(worth: Worth, more: float) -> int:
     """The most shapes at which ``more`` of them buy ``SEEN``, at the rate there; the fewest if none do."""
     low, high = elementary.log([worth.fewest, worth.most])
     shapes = elementary.exp(np.linspace(low, high, SAMPLES))
+    shapes[[0, -1]] = worth.fewest, worth.most
     if worth.fewest == worth.most:
         return worth.most
     rate = np.gradient(np.minimum(worth.psnr(shapes), EXACT), shapes)
