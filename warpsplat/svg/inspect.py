@@ -98,8 +98,8 @@ class Facts:
     """Attributes of the root element."""
     paths: int = 0
     """Elements that draw an outline, paths and basic shapes, as often as they are written: what ``use`` shows
-    again counts once. Left out are clips, masks, and a background: a rectangle that covers the view box and is
-    drawn before the others.
+    again counts once. Left out are clips, masks, and a background: a rectangle that fills the view box and is
+    behind the others.
     """
     nodes: int = 0
     """Points that the paths pass through; of the same elements, other outlines count as one."""
