@@ -19,7 +19,6 @@ from warpsplat.fit.settings import Settings
 from warpsplat.jobs.batch.images import Found
 from warpsplat.jobs.batch.layers import Place
 from warpsplat.jobs.batch.names import Wanted, check_outputs, fields_of, name_results
-from warpsplat.jobs.executors.work import make_folder
 from warpsplat.jobs.formats import ENDINGS
 from warpsplat.jobs.options import settings_from
 from warpsplat.jobs.reports.command import several_command
@@ -47,8 +46,6 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
         if path.parent.exists():
             check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
         check_report(request.report, inputs, path, overwrite=request.overwrite)
-    for folder in {path.parent for path in outputs}:
-        make_folder(folder)
     results = run_several(request, outputs, numbers, settings, data)
     begun = sorted(numbers)[: len(results)]  # where it was stopped, the fewest shapes are there
     paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]

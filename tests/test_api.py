@@ -98,6 +98,13 @@ def test_settings_and_their_values_exclude_each_other() -> None:
         warpsplat.vectorize(photograph(), threads=0)
 
 
+@pytest.mark.parametrize("nothing", ["", " \n", b""])
+def test_nothing_is_neither_a_path_nor_an_svg(nothing: str | bytes) -> None:
+    for read in (warpsplat.load_svg, lambda svg: warpsplat.score(svg, photograph())):
+        with pytest.raises(warpsplat.ImageError, match=r"^the SVG: is empty: give an SVG's text"):
+            read(nothing)
+
+
 def test_strokes_levels_and_palettes(device: str) -> None:
     result = warpsplat.vectorize(photograph(), open=True, device=device, **QUICK)
     assert (result.scene.kind == Kind.STROKE).all()

@@ -214,8 +214,10 @@ class Score:
     ssimulacra2: float | None
     """None where it was not measured."""
     paths: int
+    """Elements that draw an outline, basic shapes too, each once however often ``use`` shows it; a background
+    that is a rectangle is none."""
     nodes: int
-    """Points that the paths pass through, with those of basic shapes counted as one each."""
+    """Points that these paths pass through, with those of basic shapes counted as one each."""
     bytes: int
     gzip_bytes: int
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,6 +50,22 @@ def browser() -> Iterator[Browser]:
 class Complaints(list[str]):
     """What went wrong on pages: errors, lines on the console, requests for what is not in the file."""
 
+    expected: str | None = None
+    """Part of lines that may be on the console, whenever the browser gets round to them."""
+
+    def hear(self, line: str) -> None:
+        """Note a line on the console."""
+        if self.expected is None or self.expected not in line:
+            self.append(line)
+
+
+def wait_until(page: Page, is_so: Callable[[], bool]) -> None:
+    """Let a page go on until something is so that it does not say itself."""
+    end = time.monotonic() + LONGEST_WAIT / 1000
+    while not is_so():
+        assert time.monotonic() < end
+        page.wait_for_timeout(20)
+
 
 @pytest.fixture
 def complaints() -> Complaints:
@@ -62,7 +79,7 @@ def opened(browser: Browser, complaints: Complaints) -> Iterator[Page]:
     context.set_default_timeout(LONGEST_WAIT)
     page = context.new_page()
     page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda line: complaints.append(line.text) if line.type != "log" else None)
+    page.on("console", lambda line: complaints.hear(line.text) if line.type != "log" else None)
     yield page
     context.close()
     assert not complaints

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import warpsplat
-from tests.browser.conftest import Complaints, fits_a_phone, opened
+from tests.browser.conftest import Complaints, fits_a_phone, opened, wait_until
 from tests.serve.helpers import Visitor, picture, until
 from warpsplat.fit.settings import PRESETS
 
@@ -67,7 +67,7 @@ def test_two_settings_of_an_image_are_compared_and_one_is_saved(visit: Page, tmp
     assert left.get_attribute("alt") == "1 · photo, 4 shapes"
     assert right.get_attribute("alt") == "2 · photo, 8 shapes"
     for side in (left, right):  # loaded, and as wide as the image
-        assert side.evaluate("image => image.naturalWidth") == 40
+        assert side.evaluate("image => image.decode().then(() => image.naturalWidth)") == 40
     with page.expect_download() as saving:
         cards.nth(1).get_by_role("link", name="Download").click()
     saving.value.save_as(tmp_path / "saved.svg")
@@ -125,6 +125,7 @@ def test_what_is_refused_is_said_in_its_place(visit: Page, complaints: Complaint
     page.wait_for_selector("#refused:not([hidden])")
     assert error.inner_text() == "subject drawing and open do not go together"
     assert not page.locator(".run").count()
+    wait_until(page, lambda: len(complaints) >= 2)
     assert [int(text.rpartition("status of ")[2][:3]) for text in complaints] == [415, 400]
     complaints.clear()
 

@@ -78,7 +78,10 @@ REFUSED = [
     (["--curves", "5,9", "--checkpoint", "a.ckpt"], "and --checkpoint do not go together"),
     (["--curves", "5,9", "--data-uri"], "and --data-uri do not go together"),
     (["--curves", "5,9", "--animate", "a.gif"], "--animate takes one number of shapes"),
-    (["--curves", "5,9", "--subject", "pixel"], "has a number of shapes of its own"),
+    (
+        ["--curves", "5,9", "--subject", "pixel", "-o", "new/"],
+        "photo.png: a picture of cells has a number of",
+    ),
     (["--curves", "5,9", "photo.png"], "matrix: {curves: [5, 9]}"),
     (["--suggest", "--curves", "5"], "--suggest and --curves do not go together"),
     (["--suggest", "--max-bytes", "5KB"], "max-bytes as well"),

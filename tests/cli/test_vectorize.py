@@ -8,11 +8,14 @@ import os
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
+import warpsplat
 from tests.cli.helpers import QUICK, one_line, run, shell
 from tests.files.samples import bad_files
+from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.svg.uri import data_uri
 from warpsplat.svg.viewer import on_white, render_svg
@@ -51,6 +54,17 @@ def test_bad_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert captured.out == ""
         assert str(path) in one_line(captured.err)
         assert set(os.listdir(tmp_path)) == before
+
+
+def test_what_only_the_work_finds_out_names_the_image(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "white.png"
+    Image.fromarray(np.full((40, 40, 3), 255, np.uint8)).save(path)
+    assert run("vectorize", path, "--subject", "line", "-o", tmp_path / "a.svg", "--device", "cpu") == 3
+    assert f"{path}: no lines found" in one_line(capsys.readouterr().err)
+    with pytest.raises(ImageError, match=r"^mine: no lines found"):
+        warpsplat.vectorize(path.read_bytes(), subject="line", name="mine", device="cpu")
 
 
 def test_the_image_is_not_overwritten(image: Path, capsys: pytest.CaptureFixture[str]) -> None:

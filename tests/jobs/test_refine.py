@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.fit.pictures import picture
 from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.fit.settings import Settings, make_settings
@@ -17,6 +19,7 @@ from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind
+from warpsplat.svg.page import placed
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import load_kept
 from warpsplat.svg.viewer import on_white, premultiplied, render_svg
@@ -140,6 +143,42 @@ FILTERED = (
     f'fill="#246"/><path d="M3 4h14v22h-14z" fill="#c33"/><path d="M12 9h14v10h-14z" fill="#0a4"/>{COVER}'
     '<path d="M14 12h20v14z" fill="#358"/></svg>'
 )
+
+
+SHEET = re.compile(r'<svg xmlns="\S+" width="(\S+)" height="(\S+)" viewBox="([^"]+)">')
+
+
+@pytest.mark.parametrize(
+    "sheet",
+    [{"page": "a4"}, {"size": "50x40mm"}, {"units": "in"}, {"page": "a5", "background": "none"}],
+    ids=str,
+)
+def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) -> None:
+    """Its paths are those that it has without the sheet, on which it lies as before, whatever the grid."""
+    target = np.ascontiguousarray(picture()[:36, :48])
+    settings = make_settings(curves=6, iterations=20, **sheet)
+    scene = random_scene(Kind.FILL, count=6, width=48, height=36, seed=2)
+    still = write_svg(scene, per_pixel=2, background=not sheet.get("background"))
+    text = placed(still, settings.size, settings.page, settings.units)
+    wanted, result = (improved(svg, target, settings, device)[0] for svg in (still, text))
+    assert result.score and wanted.score and result.before
+    assert result.score.psnr == wanted.score.psnr > result.before
+    assert result.score.bytes == len(result.svg.encode())
+    assert result.svg[result.svg.index("<path") :].strip() in wanted.svg
+    before, after = (SHEET.match(svg) for svg in (text, result.svg))
+    assert before and after and after.groups()[:2] == before.groups()[:2]
+    views = [np.array(found[3].split(), np.float64) for found in (before, after)]
+    np.testing.assert_allclose(views[1] / views[1][2], views[0] / views[0][2], atol=1e-5)
+
+
+def test_what_has_margins_of_its_own_is_all_picture(device: str) -> None:
+    """It begins as a file on a sheet, but others wrote it."""
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="24px" height="24px" viewBox="-2 -2 24 24">'
+    text = f'{head}<rect x="-2" y="-2" width="24" height="24"/><path d="M0 0h9v9z" fill="red"/></svg>'
+    target = np.zeros((24, 24, 3), np.float32)
+    target[2:12, 2:12] = [1, 0, 0]
+    before = improved(text, target, make_settings(iterations=3), device)[1]
+    assert before == pytest.approx(score_svg(text, target).psnr)
 
 
 def test_what_lies_around_kept_elements_is_fitted_to_what_is_seen(device: str) -> None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
 
+from warpsplat.fit.constraints import Drawing
+from warpsplat.fit.loop import Fit
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.subjects import FEWER_ROUNDS, Tries, decided
+from warpsplat.jobs.size import BETWEEN, FEWER_ROUNDS, PRICE_STEP, PRICES, Sketch, Tries, best_within
+from warpsplat.jobs.subjects import decided
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
@@ -28,6 +33,7 @@ def squares() -> FloatArray:
 
 @pytest.mark.slow
 def test_a_drawing_has_as_many_regions_as_fit(device: str) -> None:
+    """Squares have no node to spare: some of them have to go."""
     whole = vectorize(squares(), make_settings(subject="drawing"), Backend.on(device))
     assert whole.score
     assert len(whole.scene) >= len(COLORS)
@@ -36,6 +42,77 @@ def test_a_drawing_has_as_many_regions_as_fit(device: str) -> None:
     assert made.score
     assert made.score.bytes <= limit and not made.missed
     assert len(COLORS) // 2 <= len(made.scene) < len(whole.scene)
+
+
+def wavy() -> FloatArray:
+    """Two discs whose outlines are wavy, so that their files are mostly nodes."""
+    y, x = np.mgrid[:64, :96].astype(np.float32) + 0.5
+    image = np.ones((64, 96, 3), np.float32)
+    for centre, color in ((26, (0.8, 0.1, 0.1)), (70, (0.1, 0.2, 0.8))):
+        dx, dy = x - centre, y - 32
+        edge = 18 + 1.2 * np.sin(14 * np.arctan2(dy, dx))
+        cover = np.clip(edge - np.hypot(dx, dy) + 0.5, 0, 1)[..., None]
+        image = image * (1 - cover) + cover * np.float32(color)
+    return np.asarray(image, np.float32)
+
+
+@pytest.mark.slow
+def test_outlines_get_simpler_before_regions_go(device: str) -> None:
+    whole = vectorize(wavy(), make_settings(subject="drawing"), Backend.on(device))
+    assert whole.score and len(whole.scene) == 2
+    limit = round(0.75 * whole.score.bytes)
+    made = vectorize(wavy(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
+    assert made.score and made.score.bytes <= limit and not made.missed
+    assert len(made.scene) == 2
+    assert made.score.nodes < whole.score.nodes
+    assert made.score.psnr > 25, "without one of the discs it is 12"
+
+
+def sketch(regions: int, size: int, psnr: float) -> Sketch:
+    """A drawing of so many regions, as far as its size is concerned."""
+    scene = trace(squares()).scene.take(np.arange(regions))
+    nothing = np.zeros(len(scene.points), np.int32)
+    return Sketch(Fit(scene, 1.0, psnr, psnr, 0, False), size, Drawing(scene, nothing, nothing - 1))
+
+
+def test_what_shows_more_is_taken() -> None:
+    """Of fewer nodes and of fewer regions."""
+    asked: list[tuple[int, float]] = []
+
+    def priced(worth: float) -> Callable[[Drawing, float], Sketch]:
+        def again(drawing: Drawing, price: float) -> Sketch:
+            count = len(drawing.scene)
+            asked.append((count, price))
+            return sketch(count, round(1000 - 150 * np.log2(price)), worth)
+
+        return again
+
+    def drawn(count: int) -> Sketch:
+        return sketch(count, 125 * count, 20.0 + count)
+
+    for worth, regions in ((30.0, 8), (21.0, 4)):
+        asked.clear()
+        made = best_within(drawn(8), 600, drawn, priced(worth), lambda: False, None)
+        assert len(made.scene) == regions
+        assert made.render_psnr == (30.0 if regions == 8 else 24.0)
+        prices = [price for count, price in asked if count == 8]
+        assert prices[:2] == [PRICE_STEP, PRICE_STEP**0.5], "what has room left is made less simple"
+        assert len(prices) <= PRICES + BETWEEN
+
+
+def test_where_nothing_fits_the_smallest_is_taken() -> None:
+    """After so many tries as there are prices, and no more."""
+    asked: list[float] = []
+
+    def again(drawing: Drawing, price: float) -> Sketch:
+        asked.append(price)
+        return sketch(len(drawing.scene), 900, 30.0)
+
+    made = best_within(
+        sketch(2, 1000, 40.0), 10, lambda count: sketch(count, 500, 10.0), again, lambda: False, None
+    )
+    assert len(made.scene) == 1
+    assert len(asked) <= 2 * PRICES
 
 
 def test_a_size_leaves_drawings_what_they_are() -> None:

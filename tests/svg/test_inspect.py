@@ -75,6 +75,37 @@ def test_external_entities_are_not_read(tmp_path: Path) -> None:
         inspect_svg(text)
 
 
+SHAPES = (
+    '<rect x="2" width="9" height="9"/><circle r="3"/><ellipse rx="3" ry="2"/><line x2="3" y2="3"/>'
+    '<polyline points="0,0 3,3"/><polygon points="0,0 3,3 3,0"/><path d="M0 0h9v9z"/>'
+)
+GROUND = '<rect width="40" height="30" fill="red"/>'
+
+
+@pytest.mark.parametrize(
+    ("body", "paths", "nodes"),
+    [
+        (SHAPES, 7, 9),
+        (GROUND + SHAPES, 7, 9),
+        ('<rect width="100%" height="100%"/>' + SHAPES, 7, 9),
+        (SHAPES + GROUND, 8, 10),
+        (2 * GROUND + SHAPES, 8, 10),
+        ('<rect width="40" height="29"/>' + SHAPES, 8, 10),
+        ('<rect width="40" height="30" rx="5"/>' + SHAPES, 8, 10),
+        (GROUND, 1, 1),
+        (f'<defs><g id="a">{SHAPES}</g></defs><use href="#a"/><use href="#a" x="9"/>', 7, 9),
+        (f'<clipPath id="c">{SHAPES}</clipPath><mask id="m">{SHAPES}</mask><path d="M0 0h9"/>', 1, 2),
+        ("<text>a</text>", 0, 0),
+    ],
+)
+def test_what_is_drawn_is_counted(body: str, paths: int, nodes: int) -> None:
+    """Once as it is written; not a background, nor what only cuts."""
+    facts = inspect_svg(f'{HEAD}width="40" height="30">{body}</svg>')
+    assert (facts.paths, facts.nodes) == (paths, nodes)
+    sized = f'{HEAD}width="4in" viewBox="0 0 40 30">{body}</svg>'
+    assert (inspect_svg(sized).paths, inspect_svg(sized).nodes) == (paths, nodes)
+
+
 def test_reading_is_linear() -> None:
     """Texts that a search from each position would take minutes for."""
     assert inspect_svg(f"{SMALL}<!--{'<path ' * 200_000}--></svg>").paths == 0

@@ -36,7 +36,7 @@ def vectorize_several(
         settings: all that decides the results but their numbers, made by ``make_settings``; default: those
             of ``vectorize``.
         importance: as for ``vectorize``.
-        outputs: a file for each number, written as soon as it is made.
+        outputs: a file for each number, written as soon as it is made; missing folders are made.
         device: as for ``vectorize``.
         threads: see there.
         callback: see there; ``Progress.work`` is the share of all that is to be done. One that returns True

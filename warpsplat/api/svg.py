@@ -102,7 +102,8 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
 
 def svg_name_of(svg: object) -> str:
     """How messages call an SVG."""
-    return "the SVG" if isinstance(svg, str) and "<" in svg else source_name(svg, "the SVG")
+    is_text = isinstance(svg, str) and ("<" in svg or not svg.strip())
+    return "the SVG" if is_text else source_name(svg, "the SVG")
 
 
 def text_of(svg: SvgSource, name: str) -> str:
@@ -114,6 +115,8 @@ def text_of(svg: SvgSource, name: str) -> str:
     """
     if isinstance(svg, str) and "<" in svg:
         return svg
+    if isinstance(svg, (str, bytes)) and not svg.strip():
+        raise ImageError(f"{name}: is empty: give an SVG's text, its bytes, or the path of its file")
     if not isinstance(svg, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
         raise TypeError(f"an SVG is its text, a path, bytes or a file, not {type(svg).__name__}")
     return svg_text(source_bytes(svg, "an SVG"), name)

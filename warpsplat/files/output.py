@@ -116,6 +116,20 @@ def check_folder(folder: Path) -> None:
     _discard(name)
 
 
+def make_folder(folder: Path) -> None:
+    """Make the folder of a result, if it is not there.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    if is_remote(folder):
+        return  # comes with its files
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from error
+
+
 def check_target(path: Path) -> Path:
     """The file that a result is written to, behind all links: a regular one, or one that is not there yet.
 

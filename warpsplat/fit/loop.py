@@ -31,7 +31,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Content, Stages, real, whole
 from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.surgery import operate
+from warpsplat.fit.surgery import operate, thin
 from warpsplat.fit.viewer_shift import look_at_file
 from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
@@ -288,7 +288,9 @@ class _Run:
     def result(self) -> Fit:
         """What there is now, as that of a run that was not interrupted."""
         self.step = step = mend(self.step, renews=False, last=True)
-        state = step.state
+        state, most = step.state, step.state.base + step.settings.curves
+        if self.task.grows and state.parameters.shape_count > most:  # it was ended while it had a surplus
+            self.step = step = thin(step, most)
         if self.task.finish and not state.rounding:
             state.per_pixel = choose_grid(step, staged=False)
         done, render_psnr, estimated = state.step - self.task.begin, step.render_psnr(), step.psnr()

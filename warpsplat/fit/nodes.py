@@ -21,7 +21,7 @@ from warpsplat.fit.merge import handles_through, points_at
 Floats = npt.NDArray[np.float64]
 
 MOST_OFF = 0.6
-"""How far a candidate may move an outline [canvas units]: what moves further is no candidate."""
+"""How far a candidate may move an outline [canvas units], where bytes have their usual price."""
 
 STEEP = 0.06
 """Slope below which a line may be level, or upright, and a tangent likewise."""
@@ -92,8 +92,9 @@ def turned(drawing: Drawing) -> Drawing:
 class Outlines:
     """A drawing's outlines, place by place."""
 
-    def __init__(self, drawing: Drawing) -> None:
-        self.drawing = drawing
+    def __init__(self, drawing: Drawing, reach: float = MOST_OFF) -> None:
+        """``reach``: how far a candidate may move an outline [canvas units]."""
+        self.drawing, self._reach = drawing, reach
         self.points = drawing.scene.points.astype(np.float64)
         on, following = drawing.links()
         self.on = on.tolist()
@@ -202,7 +203,7 @@ class Outlines:
         whole = np.stack([first[:, 0], second[:, 3]], axis=1)
         handles = np.where(straight[:, None, None], thirds_between(whole), handles_through(first, second))
         off = _apart(np.concatenate([whole[:, :1], handles, whole[:, 1:]], axis=1), first, second)
-        return {spare[i]: (handles[i], float(off[i])) for i in np.flatnonzero(off <= MOST_OFF).tolist()}
+        return {spare[i]: (handles[i], float(off[i])) for i in np.flatnonzero(off <= self._reach).tolist()}
 
     def _without(self, p: int, handles: Floats, off: float) -> Edit:
         """The two pieces that meet in ``p`` as one."""
@@ -229,7 +230,7 @@ class Outlines:
         corners = np.stack([self.corners(a) for a in starts])
         thirds = thirds_between(corners[:, [0, 3]])
         off = _apart(np.concatenate([corners[:, :1], thirds, corners[:, 3:]], axis=1), corners)
-        return {starts[i]: (thirds[i], float(off[i])) for i in np.flatnonzero(off <= MOST_OFF).tolist()}
+        return {starts[i]: (thirds[i], float(off[i])) for i in np.flatnonzero(off <= self._reach).tolist()}
 
     def _straight(self, a: int, thirds: Floats, off: float) -> Edit:
         """A cubic as a line."""
@@ -252,7 +253,7 @@ class Outlines:
         ways = np.abs(self.points[[self.next[a] for a in starts.tolist()]] - self.points[starts])
         axes = ways.argmin(axis=1)
         off, along = ways.min(axis=1), ways.max(axis=1)
-        near = (off >= EQUAL) & (off <= np.minimum(STEEP * along, MOST_OFF))
+        near = (off >= EQUAL) & (off <= np.minimum(STEEP * along, self._reach))
         return _picked(near, starts, axes, off)
 
     def _level_line(self, a: int, axis: int, off: float) -> Iterator[Edit]:

@@ -56,6 +56,31 @@ def operate(step: Step, *, grows: bool) -> Step:
     return step.after_surgery()
 
 
+THIN_ROUNDS = 4
+"""In which ``thin`` removes shapes: of two that hide each other neither is missed until the other is gone."""
+
+
+def thin(step: Step, count: int) -> Step:
+    """Remove shapes until ``count`` are left, those first without which the error grows least; the step to go
+    on with, rendered. Shapes of earlier levels stay.
+    """
+    state = step.state
+    for left in range(THIN_ROUNDS, 0, -1):
+        excess = state.parameters.shape_count - count
+        if excess <= 0:
+            break
+        step.render()
+        seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
+        seen[: state.base] = np.inf
+        gone = np.argsort(seen, kind="stable")[: -(-excess // left)]
+        nothing = state.scene().take(np.arange(0))
+        state.parameters.rearrange(np.setdiff1d(np.arange(len(seen)), gone), nothing)
+        step = step.after_surgery()
+    step.render()
+    step.measured_error()
+    return step
+
+
 def in_front(added: Scene, base: Scene) -> Scene:
     """New shapes as those of the level after ``base``, the shapes of earlier ones."""
     return replace(added, layer=np.full(len(added), int(base.layer.max()) + 1, np.int32))

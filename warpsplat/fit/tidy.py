@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from warpsplat.fit.cells import by_cell, first_apart, sum_within
 from warpsplat.fit.constraints import Constraints, Drawing, Keeper
 from warpsplat.fit.drawing import Refinement, matching, refine_drawing
 from warpsplat.fit.drawing_costs import DONE, Costs, Ending, RoundsWatch
-from warpsplat.fit.nodes import Edit, Key, Outlines, applied, turned
+from warpsplat.fit.nodes import MOST_OFF, Edit, Key, Outlines, applied, turned
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import STAGED
 from warpsplat.fit.work import Meter, Report
@@ -45,6 +46,9 @@ price of nodes that nobody would miss."""
 USUAL_GRID = 10.0
 """Units a pixel, where the grid is not known yet."""
 
+FARTHEST_OFF = 4.0
+"""How far a candidate may move an outline [canvas units], however dear bytes are."""
+
 WORTHWHILE = 0.004
 """Share of the file's bytes that a round has to spare for another one to follow."""
 
@@ -72,6 +76,7 @@ def finish_drawing(
     *,
     finest: float = GRIDS[-1],
     tidy: bool = True,
+    price: float = 1.0,
     report: Report | None = None,
     after: float = 0.0,
     stop: Stop | None = None,
@@ -86,6 +91,7 @@ def finish_drawing(
         how: rates and steps of the first refinement.
         finest: most units of the view box a pixel.
         tidy: whether nodes are removed.
+        price: of a byte, over what it is worth usually: the higher, the fewer there are.
         report: called every few steps.
         after: work that comes then (``fit.costs``).
         stop: asked after every step and round; once true, what there is is rounded.
@@ -106,14 +112,14 @@ def finish_drawing(
     refit = costs.refit(REFIT)
     last = DONE * costs.refit(second) + costs.grid() + refit
     watch = RoundsWatch(meter, costs, after_round(target), WORTHWHILE, last)
-    found = Outlines(drawing).edits() if report and tidy else []
+    found = Outlines(drawing, reach_at(price)).edits() if report and tidy else []
     later = watch.ahead(found, apart(found), rounds_for(target[..., 0].size))
     drawing = refined(drawing, how, meter.stage(costs.refit(how), later, likely=Ending()))
-    drawing = tidied(target, drawing, backend, watch, stop) if tidy else drawing
+    drawing = tidied(target, drawing, backend, watch, stop, price) if tidy else drawing
     told_second = meter.stage(costs.refit(second), costs.grid() + refit, likely=Ending())
     drawing = refined(drawing, second, told_second)
     meter.stage(costs.grid(), refit)  # of which nothing shows on the way
-    grid = drawing_grid(target, drawing, backend, finest)
+    grid = drawing_grid(target, drawing, backend, finest, price)
     on, _ = drawing.links()
     held = np.zeros(len(drawing.joints), np.bool_)
     held[on] = True
@@ -130,11 +136,13 @@ def tidied(
     backend: Backend,
     watch: RoundsWatch | None = None,
     stop: Stop | None = None,
+    price: float = 1.0,
 ) -> Drawing:
     """A drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round candidates that do not meet are made together and fitted anew; each is judged by the pixels
-    around it, and where some cost too much, the others are made alone. ``watch``: of its progress.
+    around it, and where some cost too much, the others are made alone. ``watch``: of its progress. ``price``:
+    see ``finish_drawing``.
     """
     refused: set[Key] = set()
     how = after_round(target)
@@ -152,14 +160,14 @@ def tidied(
 
     most = rounds_for(target[..., 0].size)
     for turn in range(most):
-        candidates = Outlines(drawing).edits(refused)
+        candidates = Outlines(drawing, reach_at(price)).edits(refused)
         edits = apart(candidates)
         if not edits or (stop and stop()):
             break
         if watch:
             watch.found(candidates, edits, most - turn)
         size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
-        worth = worth_of(errors, size)
+        worth = price * worth_of(errors, size)
         growth = judge.errors(applied(drawing, edits)) - errors
         left = [e for e in edits if sum_within(growth, e.cells) <= MENDED * e.saved * worth]
         refused |= {e.key for e in edits} - {e.key for e in left}
@@ -179,6 +187,11 @@ def tidied(
         if spared < WORTHWHILE * size:
             break
     return drawing
+
+
+def reach_at(price: float) -> float:
+    """How far a candidate may move an outline [canvas units]: the error grows by the square of that."""
+    return min(MOST_OFF * math.sqrt(price), FARTHEST_OFF)
 
 
 def after_round(target: FloatArray) -> Refinement:
@@ -226,11 +239,13 @@ def apart(edits: Sequence[Edit]) -> list[Edit]:
     return [ranked[i] for i in first_apart(edit.cells for edit in ranked)]
 
 
-def drawing_grid(target: FloatArray, drawing: Drawing, backend: Backend, finest: float) -> float:
+def drawing_grid(
+    target: FloatArray, drawing: Drawing, backend: Backend, finest: float, price: float = 1.0
+) -> float:
     """Units a pixel of the grid that costs least: in error, of which refitting mends most, and in bytes."""
     judge = Judge(target, backend)
     errors = judge.errors(drawing)
-    worth = worth_of(errors, len(write_svg(drawing.scene, per_pixel=USUAL_GRID)))
+    worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=USUAL_GRID)))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(drawing, scene=rounded(drawing.scene, grid))

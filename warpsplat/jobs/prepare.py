@@ -30,6 +30,8 @@ class Prepared:
     reduction: Reduction | None
     key: str = ""
     """Of the job, where the file is to name it."""
+    name: str = "the image"
+    """How messages call it."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -65,7 +67,7 @@ def prepare(
     chosen, why = decided(target, settings)
     target, factor = memory.smaller(target, name, chosen, factor)
     release_memory()
-    work = Prepared(target, chosen, why, None, memory.reduction(factor, target, chosen), key)
+    work = Prepared(target, chosen, why, None, memory.reduction(factor, target, chosen), key, name)
     if importance is None:
         return work
     mask = load_importance(importance, *work.size, mask_name, memory.mask_factor(factor))

@@ -24,6 +24,7 @@ from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.read_kept import KeptScene, load_kept
 from warpsplat.svg.strips import rows_of
@@ -45,7 +46,7 @@ def refine(
 ) -> Result:
     """Improve the SVG ``text`` against ``target``; its shapes stay, none is added or removed.
 
-    A result that is no better is the SVG unchanged.
+    A result that is no better is the SVG unchanged. A picture on a sheet (``svg.page``) stays on it.
 
     Args:
         text: the SVG.
@@ -67,6 +68,11 @@ def refine(
     stages = (
         checkpoint.stages(identity("refine", settings, target, svg=text), backend) if checkpoint else None
     )
+    given, view = text, None
+    if OUR_VIEW.match(text):
+        view = picture_view(text, target.shape[1], target.shape[0])
+    if view:
+        text = with_view(text, view, target.shape[1], target.shape[0])
     base, target, has_background = _load(text, target, settings, name, keep=keep)
     scene = base.scene
     before = score_svg(text, target, eyes=False)
@@ -104,15 +110,18 @@ def refine(
     svg = write_svg(
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
-    svg = minified(svg) if settings.minify else shortened(svg)
+    svg = minified(svg) if settings.minify else svg if view else shortened(svg)
     eyes = eyes and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr
     if eyes and not better:
         before = score_svg(text, target)
+    if view:
+        svg = on_sheet_of(given, view, svg)
+        score, before = score.of_file(svg), before.of_file(given)
     seconds = time.monotonic() - started
     return Result(
-        svg=svg if better else text,
+        svg=svg if better else given,
         scene=refined if better else scene,
         score=score if better else before,
         render_psnr=made.render_psnr,

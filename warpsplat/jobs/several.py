@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from warpsplat.errors import UsageError
+from warpsplat.files.output import make_folder
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.several import Series
@@ -66,7 +67,8 @@ def vectorize_several(
         numbers: of shapes; of a drawing, the most.
         settings: all else that decides the results.
         backend: where to compute.
-        outputs: a file for each number, each written as soon as it is made, see ``vectorize_image``.
+        outputs: a file for each number, each written as soon as it is made, see ``vectorize_image``; folders
+            that are missing are made once nothing is left to refuse.
         name: how messages call the image.
         importance: a mask.
         report: called every few steps; ``work`` is the share of all that is to be done.
@@ -87,9 +89,11 @@ def vectorize_several(
     subject = work.settings.subject
     if subject in OWN_NUMBER:
         raise UsageError(
-            f"a {OWN_NUMBER[subject]} has a number of shapes of its own: one file is all there is of it; "
-            "--subject photo fits shapes"
+            f"{work.name}: a {OWN_NUMBER[subject]} has a number of shapes of its own: one file is all there "
+            "is of it; --subject photo fits shapes"
         )
+    for folder in sorted({path.parent for path in outputs or ()}):
+        make_folder(folder)
     series = Series(work.settings, numbers, *work.size, backend, shares=can_share(work.target))
     results: dict[int, Result] = {}
     for number in sorted(numbers):

@@ -17,17 +17,16 @@ from warpsplat.fit.palette import Palette, solid_shapes
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.fit.stages import Stages
-from warpsplat.fit.tidy import finish_drawing
-from warpsplat.fit.work import Meter, Report
+from warpsplat.fit.tidy import REFIT, finish_drawing
+from warpsplat.fit.work import Report
 from warpsplat.jobs.line import draw_lines
+from warpsplat.jobs.size import Sketch, Tries, best_within
 from warpsplat.jobs.thin import THIN, THINNEST, best_of_thin, continued, cut, margins
 from warpsplat.metrics import psnr
-from warpsplat.portable.elementary import log2
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
-from warpsplat.svg.write import write_svg
 from warpsplat.trace.pixels import cell_size, trace_pixels
 from warpsplat.trace.subject import guess_subject
 from warpsplat.trace.trace import trace
@@ -85,35 +84,26 @@ def draw(
     most = None if settings.simplify else settings.curves
     tries = Tries(report, settings.max_bytes) if settings.max_bytes else None
 
-    def drawn(most: int | None) -> Fit:
-        told = tries.begun if tries else lambda traced: report
-        across, down = margins(target, THIN)
-        ways = [lambda: _drawn(target, settings, backend, most, over, stop, told, after)]
-        if across or down:
-            ways.append(lambda: _drawn_beyond(target, settings, backend, most, over, stop))
-            ways += [lambda: _cells(target, settings, backend)] if most is None else []
-        return best_of_thin(ways)
+    across, down = margins(target, THIN)
 
-    made = drawn(most)
-    low, high = 0, len(made.scene)  # regions that fit into the size, and that do not
-    best, size = made, _size(made, settings)
-    if not settings.max_bytes or size <= settings.max_bytes:
-        return made
-    for _ in range(FEWER_ROUNDS):
-        share = settings.max_bytes / size if not low else 0.5
-        count = min(max(low + round(share * (high - low)), low + 1), high - 1)
-        if count <= low or over():
-            break
-        if tries:
-            tries.left = max(min(tries.left, float(log2(high - low))) - 1, 0.0)
-        made = drawn(count)
-        size = _size(made, settings)
-        if size <= settings.max_bytes:
-            low, best = count, made
-        else:
-            high = count
-            best = best if low else made
-    return best
+    def finished_again(drawing: Drawing, price: float) -> Sketch:
+        told = tries.begun(drawing.scene) if tries else report
+        return _finished(target, settings, backend, drawing, price, over, stop, told, after)
+
+    def drawn(most: int | None) -> Sketch:
+        first = finished_again(_traced(target, settings, most), 1.0)
+        if not (across or down):
+            return first
+        ways = [lambda: first.fit, lambda: _drawn_beyond(target, settings, backend, most, over, stop)]
+        ways += [lambda: _cells(target, settings, backend)] if most is None else []
+        best = best_of_thin(ways)
+        return Sketch(best, _size(best, settings), None)
+
+    first = drawn(most)
+    if not settings.max_bytes or first.size <= settings.max_bytes:
+        return first.fit
+    made = best_within(first, settings.max_bytes, drawn, finished_again, over, tries)
+    return replace(made, interrupted=bool(stop and stop()))
 
 
 def _cells(target: FloatArray, settings: Settings, backend: Backend) -> Fit:
@@ -127,11 +117,11 @@ def _cells(target: FloatArray, settings: Settings, backend: Backend) -> Fit:
 def _drawn_beyond(
     target: FloatArray, settings: Settings, backend: Backend, most: int | None, over: Stop, stop: Stop | None
 ) -> Fit:
-    """As ``_drawn``, of the picture continued beyond its borders."""
+    """A drawing of ``most`` regions of the picture continued beyond its borders."""
     across, down = margins(target, THIN)
-    made = _drawn(
-        continued(target, across, down), settings, backend, most, over, stop, lambda traced: None, 0.0
-    )
+    wide = continued(target, across, down)
+    drawing = _traced(wide, settings, most)
+    made = _finished(wide, settings, backend, drawing, 1.0, over, stop, None, 0.0).fit
     scene = cut(made.scene, across, down)
     return _made(scene, made.per_pixel, target, backend, interrupted=made.interrupted)
 
@@ -141,65 +131,50 @@ def _size(made: Fit, settings: Settings) -> int:
     return len(finished(made.scene, settings, made.per_pixel).encode())
 
 
-FEWER_ROUNDS = 5
-"""Numbers of regions at the most that are tried for ``max_bytes``."""
-
-
-class Tries:
-    """The progress of drawings of fewer and fewer regions, until a file has its size."""
-
-    def __init__(self, report: Report | None, most: int) -> None:
-        """``most``: bytes of the file."""
-        self._meter, self._most = Meter(report), most
-        self._regions = 0
-        self.left = float(FEWER_ROUNDS)
-        """How many follow."""
-
-    def begun(self, traced: Scene) -> Report | None:
-        """What the next one reports to."""
-        if not self._regions:
-            self._regions = max(len(traced), 1)
-            fits = FINISHED * len(write_svg(traced)) <= self._most
-            self.left = 0.0 if fits else min(self.left, float(log2(self._regions + 1)))
-        return self._meter.stage(math.sqrt(len(traced) / self._regions), self.left * SMALLER)
-
-
-FINISHED, SMALLER = 0.8, 0.7
-"""Bytes of a drawing over those as it was traced; work on one of the right size over that on the first. For
-progress: in the mean."""
-
-
-def _drawn(
-    target: FloatArray,
-    settings: Settings,
-    backend: Backend,
-    most: int | None,
-    over: Stop,
-    stop: Stop | None,
-    told: Callable[[Scene], Report | None],
-    after: float,
-) -> Fit:
-    """A drawing of ``most`` regions, finished. ``told``: what is reported to, by what was traced."""
-    size, whole = enlargement(target), (target.shape[1], target.shape[0])
-    shown, target = target, np.ascontiguousarray(target[::size, ::size])
-    traced = trace(target, most=most)
+def _traced(target: FloatArray, settings: Settings, most: int | None) -> Drawing:
+    """A drawing of ``most`` regions."""
+    traced = trace(_small(target), most=most)
     drawing = Drawing(traced.scene, traced.joints, traced.same)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))
         drawing = replace(drawing, scene=limited(drawing.scene, settings))
+    return drawing
+
+
+def _small(target: FloatArray) -> FloatArray:
+    """A picture before it was enlarged."""
+    size = enlargement(target)
+    return np.ascontiguousarray(target[::size, ::size])
+
+
+def _finished(
+    target: FloatArray,
+    settings: Settings,
+    backend: Backend,
+    drawing: Drawing,
+    price: float,
+    over: Stop,
+    stop: Stop | None,
+    report: Report | None,
+    after: float,
+) -> Sketch:
+    """A drawing finished. ``price``: of a byte (``fit.tidy``)."""
+    size, whole = enlargement(target), (target.shape[1], target.shape[0])
     done = finish_drawing(
-        target,
+        _small(target),
         drawing,
         backend,
-        Refinement(),
+        Refinement() if price == 1 else REFIT,
         finest=finest(settings),
-        tidy=settings.tidy,
-        report=told(drawing.scene),
+        tidy=settings.tidy or price > 1,
+        price=price,
+        report=report,
         after=after,
         stop=over,
     )
     scene, per_pixel = enlarged(done.drawing.scene, size, *whole), done.per_pixel / size
-    return _made(scene, per_pixel, shown, backend, interrupted=bool(stop and stop()))
+    made = _made(scene, per_pixel, target, backend, interrupted=bool(stop and stop()))
+    return Sketch(made, _size(made, settings), done.drawing)
 
 
 LEAST_SIDE = 96

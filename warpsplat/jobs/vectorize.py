@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.export import finished
 from warpsplat.fit.place import simple_curves
@@ -92,19 +93,22 @@ def make(
     """
     settings, history = work.settings, list[Progress]()
 
-    result = vectorize(
-        work.target,
-        settings,
-        backend,
-        metadata=work.key,
-        start=start,
-        importance=work.importance,
-        report=noting(history, report),
-        stop=stop,
-        write=None if output is None else lambda file: write_named(output, file),
-        stages=stages,
-        reduction=work.reduction,
-    )
+    try:
+        result = vectorize(
+            work.target,
+            settings,
+            backend,
+            metadata=work.key,
+            start=start,
+            importance=work.importance,
+            report=noting(history, report),
+            stop=stop,
+            write=None if output is None else lambda file: write_named(output, file),
+            stages=stages,
+            reduction=work.reduction,
+        )
+    except ImageError as error:  # of what only the work itself finds out
+        raise ImageError(f"{work.name}: {error}") from error
     release_memory()
     return replace(result, subject=settings.subject, why=work.why, history=tuple(history))
 

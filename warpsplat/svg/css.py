@@ -174,6 +174,8 @@ class _Rule:
         return above[-1] if last.is_child else inside[-1]
 
 
+ANIMATED = "uses animation, not supported: take the still SVG of the same picture"
+
 RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
 
 
@@ -192,6 +194,8 @@ class StyleSheet:
         self._rules: dict[str, list[_Rule]] = {}
         """By what the last compound asks for first."""
         css = without_comments(css).replace("<!--", "").replace("-->", "")
+        if "@keyframes" in css:
+            raise ImageError(ANIMATED)
         if "@" in re.sub(r"""@(?:charset|namespace)\b[^;{}]*;|@font-face\s*\{[^{}]*\}""", "", css):
             raise ImageError("uses a style sheet with @-rules, not supported")
         css = re.sub(r"""@(?:charset|namespace)\b[^;{}]*;|@font-face\s*\{[^{}]*\}""", "", css)

@@ -97,13 +97,18 @@ class Facts:
     root: dict[str, str] = field(default_factory=dict)
     """Attributes of the root element."""
     paths: int = 0
-    """Elements that draw an outline: paths and basic shapes, rectangles left out (they are backgrounds)."""
+    """Elements that draw an outline, paths and basic shapes, as often as they are written: what ``use`` shows
+    again counts once. Left out are clips, masks, and a background: a rectangle that fills the view box and is
+    behind the others.
+    """
     nodes: int = 0
-    """Points that the paths pass through; other outlines count as one."""
+    """Points that the paths pass through; of the same elements, other outlines count as one."""
 
 
-DRAWN = {f"{NAMESPACE} {tag}" for tag in ("circle", "ellipse", "polygon", "polyline", "line")}
-PATH = f"{NAMESPACE} path"
+DRAWN = {f"{NAMESPACE} {tag}" for tag in ("rect", "circle", "ellipse", "polygon", "polyline", "line")}
+PATH, RECT = f"{NAMESPACE} path", f"{NAMESPACE} rect"
+HIDDEN = {f"{NAMESPACE} {tag}" for tag in ("clipPath", "mask")}
+"""Elements whose content is not drawn, but says what else is."""
 ROOT = f"{NAMESPACE} svg"
 
 
@@ -114,10 +119,11 @@ def inspect_svg(text: str) -> Facts:
         ImageError: not well-formed, no SVG, too long, nested too deep, or with entities that multiply.
     """
     root: dict[str, str] = {}
-    depth = paths = nodes = longest = 0
+    depth = paths = nodes = longest = hidden = 0
+    behind = False
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, paths, nodes
+        nonlocal depth, paths, nodes, hidden, behind
         if depth == 0:
             if tag != ROOT:
                 raise ImageError(
@@ -127,16 +133,22 @@ def inspect_svg(text: str) -> Facts:
         depth += 1
         if depth > MAX_DEPTH:
             raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
-        if tag == PATH:
+        hidden += tag in HIDDEN
+        if hidden:
+            return
+        if tag == RECT and not paths and not behind and _covers(attributes, root):
+            behind = True
+        elif tag == PATH:
             paths += 1
             nodes += path_nodes(attributes.get("d", ""))
         elif tag in DRAWN:
             paths += 1
             nodes += 1
 
-    def end(_: str) -> None:
-        nonlocal depth
+    def end(tag: str) -> None:
+        nonlocal depth, hidden
         depth -= 1
+        hidden -= tag in HIDDEN
 
     def entity(
         name: str, parameter: int, value: str | None, base: str | None, system: str | None, *_: str | None
@@ -157,7 +169,7 @@ def inspect_svg(text: str) -> Facts:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise ImageError(f"cannot be rendered: not well-formed XML: {error}") from None
-    return Facts(root, paths, nodes)
+    return Facts(root, paths, nodes) if paths or not behind else Facts(root, 1, 1)
 
 
 TOKEN = re.compile(r"([MLHVCSQTAZmlhvcsqtaz])|[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
@@ -205,6 +217,26 @@ NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 SEPARATOR = r"(?:\s*,\s*|\s+|(?=[-+]))"
 VIEW_BOX = re.compile(rf"\s*({NUMBER.pattern})" + 3 * rf"{SEPARATOR}({NUMBER.pattern})" + r"(?=[\s,]|$)")
 LENGTH = re.compile(rf"({NUMBER.pattern})(px|in|cm|mm|pt|pc|em|ex|%|)")
+
+
+def _covers(rectangle: dict[str, str], root: dict[str, str]) -> bool:
+    """Whether a rectangle with these attributes covers the view box, or the size, of a root with those."""
+    if {"rx", "ry", "transform"} & rectangle.keys():
+        return False
+    box = view_box(root) or (0.0, 0.0, *(_plain(root.get(name, "")) for name in ("width", "height")))
+    for axis, (place, side) in enumerate((("x", "width"), ("y", "height"))):
+        low, length = _plain(rectangle.get(place, "0")), _plain(rectangle.get(side, ""), box[2 + axis])
+        if not (low <= box[axis] and low + length >= box[axis] + box[2 + axis]):
+            return False
+    return True
+
+
+def _plain(text: str, whole: float = math.nan) -> float:
+    """A number of pixels or units, ``whole`` for 100 %; not a number for all else."""
+    found = LENGTH.fullmatch(text.strip())
+    if found and found[2] == "%":
+        return whole if float(found[1]) == 100 else math.nan
+    return float(found[1]) if found and found[2] in {"", "px"} else math.nan
 
 
 def view_box(root: dict[str, str]) -> tuple[float, float, float, float] | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from warpsplat.errors import UsageError
 from warpsplat.svg.numbers import number
-from warpsplat.svg.write import NAMESPACE
+from warpsplat.svg.write import GRIDS, MARK, NAMESPACE
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
 """Of a unit of CSS."""
@@ -26,6 +26,15 @@ HEAD = re.compile(
     rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)"'
 )
 """How a file written here begins: its size in pixels, and that in units of its view box."""
+
+VIEW = re.compile(
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" (width="[\d.]+[a-z]+" height="[\d.]+[a-z]+") '
+    r'viewBox="(-?[\d.]+) (-?[\d.]+) ([\d.]+) ([\d.]+)"'
+)
+"""How a file written here begins that lies on a sheet: the sheet's size, and what it covers of the units."""
+
+OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
+"""The same of one that nobody else wrote: others may have margins that belong to the picture."""
 
 NUMBER = r"(\d+(?:\.\d+)?)"
 SIZE = re.compile(rf"{NUMBER}\s*[x×]\s*{NUMBER}\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
@@ -182,3 +191,46 @@ def _with_size(text: str, sheet: Sheet, view: tuple[float, float, float, float])
     found = HEAD.match(text)
     assert found
     return f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{box}"{text[found.end() :]}'
+
+
+PROPORTIONS = 0.02
+"""By how much the sides of a picture on a sheet may differ from those of an image, over them."""
+
+
+def picture_view(svg: str, width: int, height: int) -> str | None:
+    """The view box of the picture alone, of one that lies in the middle of a sheet; None: of any other, and
+    where it has not the proportions of the image.
+
+    ``width``, ``height``: of the image [px]. Margins are in whole units, so that what they leave is up to a
+    unit more or less than the picture, whose pixels have a number of units that files know (``GRIDS``).
+    """
+    found = VIEW.match(svg)
+    if not found:
+        return None
+    left, top, across, down = (float(found[i]) for i in range(2, 6))
+    rooms = ((across + 2 * left) / width, (down + 2 * top) / height)
+    low = max(room - 1 / side for room, side in zip(rooms, (width, height), strict=True))
+    high = min(room + 1 / side for room, side in zip(rooms, (width, height), strict=True))
+    middle = (low + high) / 2
+    if low > (1 + PROPORTIONS) * high or middle <= 0:
+        return None
+    known = [grid for grid in GRIDS if low <= grid <= high]
+    units = min(known, key=lambda grid: abs(grid - middle)) if known else middle
+    return f"0 0 {units * width:.10g} {units * height:.10g}"
+
+
+def with_view(svg: str, view: str, width: int, height: int) -> str:
+    """A file on a sheet with the view box ``view``, as large as the image [px]."""
+    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}"'
+    return VIEW.sub(head, svg, count=1)
+
+
+def on_sheet_of(svg: str, view: str, text: str) -> str:
+    """A file written here, ``text``, on the sheet of another one, ``svg``, whose picture has the view box
+    ``view``: in the same place, as large.
+    """
+    sheet, found = VIEW.match(svg), HEAD.match(text)
+    assert sheet and found
+    scale = float(found[3]) / float(view.split()[2])
+    box = " ".join(number(scale * float(sheet[i]), DECIMALS) for i in range(2, 6))
+    return f'<svg xmlns="{NAMESPACE}" {sheet[1]} viewBox="{box}"{text[found.end() :]}'

@@ -13,6 +13,7 @@ import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.scene import Cap, Join, Picture, Rule
+from warpsplat.svg.css import ANIMATED
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
 from warpsplat.svg.gradients import Colouring, Flat, resolve_paint
@@ -90,7 +91,7 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
     """
     style, tag = place.style, name_of(element)
     if any(name_of(child) in ANIMATIONS for child in element):
-        raise ImageError("uses animation, not supported")
+        raise ImageError(ANIMATED)
     if style["visibility"] in {"hidden", "collapse"}:
         return []
     if style["visibility"] != "visible":

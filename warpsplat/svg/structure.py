@@ -149,7 +149,10 @@ def _canvas(
         raise ImageError("says neither its size nor a viewBox")
     if magnified is None:
         if abs(size[0] / size[1] - width / height) > 0.02 * width / height:
-            raise ImageError(f"{size[0]:g}x{size[1]:g} does not have the proportions of the image")
+            raise ImageError(
+                f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
+                "it has to show all of it, and nothing around it"
+            )
         scale = np.diag([width / size[0], height / size[1], 1.0])
     else:
         scale = np.diag([magnified, magnified, 1.0])

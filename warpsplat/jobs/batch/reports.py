@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from warpsplat.errors import OutputError, UsageError, printable
-from warpsplat.files.output import check_output, may_replace, write_result
+from warpsplat.files.output import check_output, make_folder, may_replace, write_result
 from warpsplat.files.remote import is_remote
 from warpsplat.jobs.executors.tasks import Outcome
-from warpsplat.jobs.executors.work import make_folder
 
 log = logging.getLogger(__name__)
 

@@ -15,13 +15,13 @@ from typing import Any, Literal, NamedTuple
 from warpsplat.errors import ImageError, OutputError
 from warpsplat.files.inputs import MAX_INPUT, read_input
 from warpsplat.files.marks import picture_key
-from warpsplat.files.output import GZIP, HEAD, may_replace, write_result
+from warpsplat.files.output import GZIP, HEAD, make_folder, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.jobs.batch.manifest import Entry, Manifest
 from warpsplat.jobs.batch.plan import Job
 from warpsplat.jobs.batch.reports import Reports
 from warpsplat.jobs.executors.tasks import Advance, Executor, Outcome, ReportWish, Source, Stop, Task
-from warpsplat.jobs.executors.work import digest, failure, make_folder
+from warpsplat.jobs.executors.work import digest, failure
 from warpsplat.jobs.formats import is_picture
 from warpsplat.jobs.keys import STOPPED, job_key
 from warpsplat.svg.inspect import svg_text

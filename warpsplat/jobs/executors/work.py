@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from warpsplat.errors import OutputError, WarpsplatError, explain, printable
+from warpsplat.errors import WarpsplatError, explain, printable
 from warpsplat.files.inputs import read_input
-from warpsplat.files.remote import is_remote
+from warpsplat.files.output import make_folder
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.jobs.formats import named_bytes
@@ -140,17 +140,3 @@ def _reported(task: Task, image: bytes, svg: str, facts: Facts, backend: Backend
 def digest(data: bytes) -> str:
     """Names the bytes of a result."""
     return hashlib.sha256(data).hexdigest()
-
-
-def make_folder(folder: Path) -> None:
-    """Make the folder of a result, if it is not there.
-
-    Raises:
-        OutputError: it cannot be made.
-    """
-    if is_remote(folder):
-        return  # comes with its files
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from error

@@ -14,10 +14,11 @@ from warpsplat.errors import printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.knee import knee
 from warpsplat.jobs.reports.pictures import ROOM, ROOM_SHARE, encoded, shown_image
-from warpsplat.jobs.reports.single import Facts, headline, notes, picture_view, with_view
+from warpsplat.jobs.reports.single import Facts, headline, notes
 from warpsplat.jobs.result import Result
 from warpsplat.pages import page
 from warpsplat.pages.plot import Mark, Plot, plot
+from warpsplat.svg.page import picture_view, with_view
 
 ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "copy.js", "several.js")
 

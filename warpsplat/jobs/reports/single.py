@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -31,9 +30,9 @@ from warpsplat.pages import page
 from warpsplat.pages.embed import image_uri
 from warpsplat.pages.plot import Plot, plot
 from warpsplat.rendering.backend import Backend
+from warpsplat.svg.page import picture_view, with_view
 from warpsplat.svg.read_kept import load_kept
 from warpsplat.svg.strips import draw
-from warpsplat.svg.write import GRIDS
 
 ASSETS = ("viewer.css", "report.css", "viewer.js", "copy.js", "report.js")
 
@@ -143,37 +142,6 @@ def report_page(
         data={"svg": svg, "view": view, "listing": listed.data() if listed else None, "name": svg_name},
     )
     return Report(text, thumbnail)
-
-
-VIEW = re.compile(
-    r'(<svg xmlns="http://www\.w3\.org/2000/svg" )width="[\d.]+[a-z]+" height="[\d.]+[a-z]+" '
-    r'viewBox="(-?[\d.]+) (-?[\d.]+) ([\d.]+) ([\d.]+)"'
-)
-"""How a file written here begins that lies on a sheet (``svg.page``)."""
-
-
-def picture_view(svg: str, width: int, height: int) -> str | None:
-    """The view box of the picture alone, of one that lies in the middle of a sheet; None: of any other.
-
-    ``width``, ``height``: of the image [px]. Margins are in whole units, so that what they leave is up to a
-    unit more or less than the picture, whose pixels have a number of units that files know (``GRIDS``).
-    """
-    found = VIEW.match(svg)
-    if not found:
-        return None
-    left, top, across, down = (float(found[i]) for i in range(2, 6))
-    rooms = ((across + 2 * left) / width, (down + 2 * top) / height)
-    low = max(room - 1 / side for room, side in zip(rooms, (width, height), strict=True))
-    high = min(room + 1 / side for room, side in zip(rooms, (width, height), strict=True))
-    middle = (low + high) / 2
-    known = [grid for grid in GRIDS if low <= grid <= high]
-    units = min(known, key=lambda grid: abs(grid - middle)) if known else middle
-    return f"0 0 {units * width:.10g} {units * height:.10g}"
-
-
-def with_view(svg: str, view: str, width: int, height: int) -> str:
-    """A file on a sheet with the view box ``view``, as large as the image [px]."""
-    return VIEW.sub(rf'\g<1>width="{width}" height="{height}" viewBox="{view}"', svg, count=1)
 
 
 def headline(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
