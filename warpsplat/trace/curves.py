@@ -153,6 +153,8 @@ def fit_ellipse(points: Floats, tolerance: float) -> Pieces | None:
         return None
     if abs(radii[0] - radii[1]) < max(0.5 * tolerance, 0.004 * mean):
         vectors, radii = np.eye(2), np.full(2, radii.mean())
+    elif shape[0, 0] > shape[1, 1]:  # so that it begins at the upper or left end of its longer axis
+        vectors = -vectors
     frame = vectors * radii
     if frame[0, 0] * frame[1, 1] < frame[0, 1] * frame[1, 0]:
         frame[:, 1] *= -1
@@ -251,7 +253,7 @@ def _local(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[Flo
         along = np.concatenate([along - total, along, along + total])
     beside = np.arange(min(5, len(along))) + np.clip(places[:, None] + first - 2, 0, max(len(along) - 5, 0))
     third = np.sort(np.abs(along[beside] - here[:, None]), axis=1)[:, min(2, len(along) - 1)]
-    reach = np.maximum(window, third)
+    reach = np.maximum(window, third + 1e-9)  # so that rounding does not leave the third out
     low, high = np.searchsorted(along, here - reach), np.searchsorted(along, here + reach, side="right")
     counts = np.minimum(high - low, count)
     # The near points of all places as one array, filled up with points that have no weight.
