@@ -2,9 +2,9 @@
 
 Without options: under each choice of code that NumPy, OpenBLAS, OpenCV and the C library can be told to
 make, and with several numbers of threads. With ``--emulate``: on other processors, by QEMU's user mode
-(``qemu-user`` of Debian's trixie), which takes minutes for the first case, as the kernels are compiled there as
-well. An aarch64 needs its own Python and packages, which ``--prepare FOLDER`` fetches (Debian, pip) and
-``--aarch64 FOLDER`` uses.
+(``qemu-user`` of Debian's trixie), which takes minutes for the first case, as the kernels are compiled
+there too. An aarch64 needs its own Python and packages, which ``--prepare FOLDER`` fetches (Debian, pip)
+and ``--aarch64 FOLDER`` uses.
 """
 
 from __future__ import annotations
