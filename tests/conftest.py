@@ -69,6 +69,13 @@ def single_precision() -> Iterator[None]:
     torch.set_default_dtype(before)
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--fit-seed"):
+        left_out = [item for item in items if item.get_closest_marker("usual_seed")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "device" in metafunc.fixturenames:
         names = metafunc.config.getoption("--device") or [str(d) for d in wp.get_devices()]

@@ -102,6 +102,7 @@ def test_an_output_is_what_its_name_says(image: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.slow
+@pytest.mark.usual_seed
 def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     direct = image.parent / "a.svg"
     assert run("vectorize", image, "-o", direct, "-q", *QUICK) == 0
