@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 import warp as wp
 
+from tests import smoke
+
 wp.config.log_level = wp.LOG_ERROR
 
 SEEDS_APART = 1000
@@ -69,7 +71,11 @@ def single_precision() -> Iterator[None]:
     torch.set_default_dtype(before)
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.nodeid.startswith(smoke.NAMES):
+            item.add_marker("smoke")
     if config.getoption("--fit-seed"):
         left_out = [item for item in items if item.get_closest_marker("usual_seed")]
         config.hook.pytest_deselected(items=left_out)

@@ -147,9 +147,7 @@ def test_control_characters_of_names_are_escaped(forks: Forks, tmp_path: Path) -
     assert err.count("\n") == 1
     assert "a\\x1b[31m\\n\\udcff.png" in err
     Image.new("RGB", (9, 9)).save(path, "PNG")
-    code, out, _ = forks.run(
-        ["vectorize", path.name, "-o", path.with_suffix(".svg").name, *QUICK], tmp_path
-    )
+    code, out, _ = forks.run(["vectorize", path.name, "-o", path.with_suffix(".svg").name, *QUICK], tmp_path)
     assert code == 0
     assert "\x1b" not in out
     assert "\\x1b[31m" in out

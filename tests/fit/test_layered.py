@@ -61,7 +61,7 @@ def test_the_gradient_is_that_of_all_pictures(device: str, weight: float) -> Non
 
 
 def test_each_level_is_a_picture(device: str) -> None:
-    """Better than the first shapes of a plain run, at little cost; the file has a group for each, in order."""
+    """Better than the first shapes of a plain run; the file has a group for each, in order."""
     levels = (6, 16, 40)
     told: list[Progress] = []
     settings = make_settings(levels=levels, iterations=80)

