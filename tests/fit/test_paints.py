@@ -28,7 +28,8 @@ from warpsplat.svg.viewer import on_white, render_own
 def sky() -> FloatArray:
     """From dark blue to yellow."""
     t = np.broadcast_to(np.linspace(0, 1, 64, dtype=np.float32)[:, None, None], (64, 80, 1))
-    return (1 - t) * np.float32([0.1, 0.2, 0.9]) + t * np.float32([1.0, 0.9, 0.2])
+    ends = np.array([[0.1, 0.2, 0.9], [1.0, 0.9, 0.2]], np.float32)
+    return (1 - t) * ends[0] + t * ends[1]
 
 
 def stripes(grey: float) -> Scene:
