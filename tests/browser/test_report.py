@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.browser.conftest import fits_a_phone
+from tests.browser.conftest import Complaints, fits_a_phone
 
 if TYPE_CHECKING:
     from playwright.sync_api import Dialog, Page
@@ -164,7 +164,7 @@ HOSTILE = (
 )
 
 
-def test_a_hostile_file_stays_a_picture(tab: Page, tmp_path: Path) -> None:
+def test_a_hostile_file_stays_a_picture(tab: Page, complaints: Complaints, tmp_path: Path) -> None:
     image = np.full((32, 48, 3), 90, np.uint8)
     path = tmp_path / "hostile.html"
     name = "</script><script>alert(4)</script>"
@@ -186,3 +186,7 @@ def test_a_hostile_file_stays_a_picture(tab: Page, tmp_path: Path) -> None:
     tab.locator("#list").press("Enter")
     tab.locator(".zoomed").wait_for()  # the small square fills much of the stage now
     assert not said
+    # Newer versions of Chromium say that the page's policy blocks the handlers in the file, one by one.
+    blocked = [line for line in complaints if "inline event handler violates" in line]
+    assert len(blocked) in (0, 2), "onload and onclick of the file, and no other"
+    complaints[:] = [line for line in complaints if line not in blocked]
