@@ -23,10 +23,13 @@ from typing import Any
 from tests import ROOT
 
 QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "12")
+CLOSED = "-"
+"""In place of a file: the stream is closed, as by ``>&-`` in a shell."""
 NOBODY = 65534
 """A user without rights, by custom."""
 
 MOMENTS = {
+    "decoding": ("PIL", "Image", "open"),
     "loading": ("warp", "Module", "load"),
     "training": ("warp", "Launch", "launch"),
     "scoring": ("resvg_py", "svg_to_bytes"),
@@ -44,11 +47,14 @@ class Task:
     folder: str
     stdout: str
     stderr: str
+    """Files that these go to, or ``CLOSED``."""
     moment: str = ""
     """At which ``signal`` comes: one of ``MOMENTS``, or "import NAME"."""
     count: int = 1
     """The how many-th time."""
     signal: int = 0
+    times: int = 1
+    """That it is sent there."""
     ignored: bool = False
     """Ctrl-C is, as under ``nohup``."""
     file_size: int = 0
@@ -69,6 +75,11 @@ class _ImportTrip(importlib.abc.MetaPathFinder):
             self.pull()
 
 
+def _refuse() -> None:
+    """Fail: PyTorch takes seconds to import, and no command needs it."""
+    raise AssertionError("a command imports torch")
+
+
 def _lay_trip(task: Task) -> None:
     """Have the task's signal sent to this process at the task's moment."""
     seen = 0
@@ -77,7 +88,8 @@ def _lay_trip(task: Task) -> None:
         nonlocal seen
         seen += 1
         if seen == task.count:
-            os.kill(os.getpid(), task.signal)
+            for _ in range(task.times):
+                os.kill(os.getpid(), task.signal)
 
     if task.moment.startswith("import "):
         sys.meta_path.insert(0, _ImportTrip(task.moment.removeprefix("import "), pull))
@@ -98,8 +110,13 @@ def _lay_trip(task: Task) -> None:
 def run(task: Task) -> None:
     """Run a task in this process, which is fit for nothing else afterwards."""
     os.chdir(task.folder)
-    for number, name in ((1, task.stdout), (2, task.stderr)):
-        os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+    for number, stream in ((1, "stdout"), (2, "stderr")):
+        name = getattr(task, stream)
+        if name == CLOSED:
+            os.close(number)
+            setattr(sys, stream, None)  # as Python finds it at its start
+        else:
+            os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
     if task.ignored:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     if task.moment:
@@ -135,6 +152,7 @@ def serve() -> None:
     """Run a task, then end the process as Python would, without the clean-up of its origin."""
     from warpsplat.cli.main import main
 
+    sys.meta_path.insert(0, _ImportTrip("torch", _refuse))
     tasks, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     for line in tasks:
@@ -199,7 +217,10 @@ class Forks:
         """Exit code (or minus the signal that ended it), stdout and stderr; ``how``: see ``Task``."""
         task = Task(list(arguments), str(folder), **{"stdout": self.out, "stderr": self.err, **how})
         code = self._ask(task)
-        out, err = ("" if n.startswith("/dev/") else Path(n).read_text() for n in (task.stdout, task.stderr))
+        out, err = (
+            "" if n == CLOSED or n.startswith("/dev/") else Path(n).read_text()
+            for n in (task.stdout, task.stderr)
+        )
         return code, out, err
 
     def _ask(self, task: Task) -> int:

@@ -51,7 +51,7 @@ def example(name: str) -> ModuleType:
 def test_an_image_is_fitted(name: str, cat: str, tmp_path: Path) -> None:
     losses = example(name).main(cat, str(tmp_path / "a.svg"), STEPS, curves=CURVES)
     assert len(losses) == STEPS
-    assert losses[-1] < 0.9 * losses[0]
+    assert losses[-1] < 0.95 * losses[0], "0.86 at most over five seeds"
     assert warpsplat.load_svg(tmp_path / "a.svg").canvas.width == 48
 
 

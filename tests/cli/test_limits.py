@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests import ROOT
-from tests.forks import QUICK, Forks, make_image
+from tests.forks import CLOSED, QUICK, Forks, make_image
 from tests.fuzz.corpus import own_svg
 from warpsplat.jobs.batch.manifest import NAME
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forks]:
-    made = Forks(tmp_path_factory.mktemp("forks"))
-    yield made
-    made.close()
 
 
 @pytest.fixture
@@ -131,18 +121,8 @@ def test_messages_that_nobody_can_take(forks: Forks, folder: Path) -> None:
     assert out.startswith("a.svg: ")
 
 
-@pytest.mark.parametrize("stream", [0, 1])
-def test_a_closed_stream(folder: Path, stream: int) -> None:
+def test_a_closed_stream(forks: Forks, folder: Path) -> None:
     """As ``>&-`` in a shell; runs have that in ``test_main``."""
-    done = subprocess.run(
-        [sys.executable, "-m", "warpsplat", "info"],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        preexec_fn=lambda: os.close(stream),
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-    assert done.returncode in ((0, 4) if stream == 1 else (0,)), done.stderr
-    assert "Traceback" not in done.stderr
+    code, _, err = forks.run(["info"], folder, stdout=CLOSED)
+    assert code in (0, 4), err
+    assert "Traceback" not in err

@@ -11,8 +11,11 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run, shell
+from tests.forks import CLOSED, Forks
 from warpsplat.errors import CapacityError
-from warpsplat.svg.viewer import render_svg
+from warpsplat.svg.viewer import render_own
+
+FULL = "/dev/full"
 
 
 def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
@@ -27,20 +30,6 @@ def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
     for name in ("vectorize", "batch", "render", "bench", "info"):
         assert name in done.stdout
     assert "\\b" not in done.stdout
-
-
-@pytest.mark.slow
-def test_a_run_never_imports_torch(image: Path, tmp_path: Path) -> None:
-    code = (
-        "import sys; from warpsplat.cli.main import main\n"
-        f"try: main(['vectorize', {str(image)!r}, '-o', {str(tmp_path / 'a.svg')!r}, '-q', *{QUICK!r}])\n"
-        "except SystemExit as e: assert not e.code\n"
-        "assert 'torch' not in sys.modules"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    assert done.stdout == ""
 
 
 WRONG = [
@@ -122,42 +111,46 @@ def test_odd_requests_are_one_line(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("streams", "code"),
-    [
-        ("2>&-", 0),
-        (">&-", 0),
-        ("<&- >&- 2>&-", 0),
-        pytest.param(
-            "2>/dev/full", 0, marks=pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux")
-        ),
-        pytest.param(
-            ">/dev/full", 4, marks=pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux")
-        ),
-    ],
+    ("stdout", "stderr", "code"),
+    [("out", CLOSED, 0), (CLOSED, "err", 0), ("out", FULL, 0), (FULL, "err", 4)],
 )
-def test_standard_streams_that_are_full_or_closed(image: Path, streams: str, code: int) -> None:
+def test_standard_streams_that_are_full_or_closed(
+    forks: Forks, image: Path, stdout: str, stderr: str, code: int
+) -> None:
+    if FULL in (stdout, stderr) and not os.path.exists(FULL):
+        pytest.skip("a device of Linux")
     output = image.parent / "a.svg"
-    done = shell(f"$W {streams}", "vectorize", image, "-o", output, "-vv", *QUICK)
-    assert done.returncode == code
-    assert b"Traceback" not in done.stderr
-    assert (b"a.svg: " in done.stdout) == streams.startswith("2>")
-    render_svg(output.read_text())
+    arguments = ["vectorize", str(image), "-o", str(output), "-vv", *QUICK]
+    streams = [n if n in (CLOSED, FULL) else str(image.parent / n) for n in (stdout, stderr)]
+    done, out, err = forks.run(arguments, image.parent, stdout=streams[0], stderr=streams[1])
+    assert done == code
+    assert "Traceback" not in err
+    assert ("a.svg: " in out) == (stdout == "out")
+    render_own(output.read_text())
+
+
+@pytest.mark.slow
+def test_all_standard_streams_are_closed(image: Path) -> None:
+    """From the start of Python, which has none of them then."""
+    output = image.parent / "a.svg"
+    assert shell("$W <&- >&- 2>&-", "vectorize", image, "-o", output, "-vv", *QUICK).returncode == 0
+    render_own(output.read_text())
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="names of bytes")
-def test_control_characters_of_names_are_escaped(tmp_path: Path) -> None:
+def test_control_characters_of_names_are_escaped(forks: Forks, tmp_path: Path) -> None:
     path = tmp_path / os.fsdecode(b"a\x1b[31m\n\xff.png")
     path.write_bytes(b"no image")
-    done = shell("$W", "vectorize", path, *QUICK)
-    assert done.returncode == 3
-    assert done.stderr.count(b"\n") == 1
-    assert b"a\\x1b[31m\\n\\udcff.png" in done.stderr
+    code, _, err = forks.run(["vectorize", path.name, *QUICK], tmp_path)
+    assert code == 3
+    assert err.count("\n") == 1
+    assert "a\\x1b[31m\\n\\udcff.png" in err
     Image.new("RGB", (9, 9)).save(path, "PNG")
-    done = shell("$W", "vectorize", path, "-o", path.with_suffix(".svg"), *QUICK)
-    assert done.returncode == 0
-    assert b"\x1b" not in done.stdout
-    assert b"\\x1b[31m" in done.stdout
+    code, out, _ = forks.run(["vectorize", path.name, "-o", path.with_suffix(".svg").name, *QUICK], tmp_path)
+    assert code == 0
+    assert "\x1b" not in out
+    assert "\\x1b[31m" in out
 
 
 RAISED = [

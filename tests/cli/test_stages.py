@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,15 +18,19 @@ import pytest
 from tests import ROOT
 from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
 from warpsplat.jobs.batch.manifest import NAME
-from warpsplat.svg.viewer import render_svg
+from warpsplat.svg.viewer import render_own
 
 pytestmark = pytest.mark.slow
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 GENTLE = [signal.SIGINT, signal.SIGTERM]
+COMMANDS = ("vectorize", "batch")
+EARLY = ("decoding", "loading")
+"""Moments at which there is nothing to write yet."""
 TRAINING = {"vectorize": 60, "batch": 125}
 """Launches of kernels until the middle of the training, of a batch that of its second image."""
-BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {QUICK[-1]}}}\njobs: [{{images: '*.png'}}]\n"
+STEPS = int(QUICK[-1])
+BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {STEPS}}}\njobs: [{{images: '*.png'}}]\n"
 
 
 def lay_out(folder: Path, command: str) -> list[str]:
@@ -43,94 +48,154 @@ def results(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.glob("*.svg")}
 
 
-class Runner(Forks):
-    """With the results of undisturbed runs."""
-
-    def __init__(self, scratch: Path) -> None:
-        super().__init__(scratch)
-        self.whole: dict[str, dict[str, bytes]] = {}
-        for command in ("vectorize", "batch"):
-            folder = scratch / command
-            code, _, said = self.run(lay_out(folder, command), folder)
-            assert code == 0, said
-            self.whole[command] = results(folder)
-            assert self.whole[command]
-
-
 @pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runner]:
-    made = Runner(tmp_path_factory.mktemp("signals"))
-    yield made
-    made.close()
+def undisturbed(forks: Forks, tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, bytes]]:
+    """What each command makes where no signal comes."""
+    made = {}
+    for command in COMMANDS:
+        folder = tmp_path_factory.mktemp(command)
+        code, _, said = forks.run(lay_out(folder, command), folder)
+        assert code == 0, said
+        made[command] = results(folder)
+        assert made[command]
+    return made
 
 
 def assert_whole(folder: Path) -> None:
     """Every result that is there is a whole SVG, and there is nothing but inputs and results."""
     for data in results(folder).values():
         assert data.rstrip().endswith(b"</svg>")
-        assert render_svg(data.decode(), width=32, height=24).size == (32, 24)
+        assert render_own(data.decode()).size == (32, 24)
     stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml", NAME))]
     assert not stray
 
 
-def assert_mended(runner: Runner, command: str, arguments: list[str], folder: Path) -> None:
-    """The next run makes what an undisturbed one makes, and clears away what was left."""
-    code, _, said = runner.run(arguments, folder)
-    assert code == 0, said
-    assert results(folder) == runner.whole[command]
-    assert_whole(folder)
+SIGNALS = [
+    (command, moment, number)
+    for i, command in enumerate(COMMANDS)
+    for j, moment in enumerate(MOMENTS)
+    for number in (GENTLE[(i + j) % 2], signal.SIGKILL)
+]
+"""Ctrl-C and SIGTERM, which are heard by the same lines, in turns."""
 
 
-@pytest.mark.parametrize("number", CODES)
-@pytest.mark.parametrize("moment", MOMENTS)
-@pytest.mark.parametrize("command", ["vectorize", "batch"])
+@pytest.mark.parametrize(("command", "moment", "number"), SIGNALS)
 def test_a_signal_at_a_stage(
-    runner: Runner, tmp_path: Path, command: str, moment: str, number: signal.Signals
+    forks: Forks,
+    undisturbed: dict[str, dict[str, bytes]],
+    tmp_path: Path,
+    command: str,
+    moment: str,
+    number: signal.Signals,
 ) -> None:
     arguments = lay_out(tmp_path, command)
     # Of a batch, into its second image.
     count = {"training": TRAINING[command], "loading": 1}.get(moment, 2 if command == "batch" else 1)
-    code, _, said = runner.run(arguments, tmp_path, moment=moment, count=count, signal=number)
+    code, _, said = forks.run(arguments, tmp_path, moment=moment, count=count, signal=number)
     assert code == CODES[number], said
     assert "Traceback" not in said
     if number in GENTLE:
         assert_whole(tmp_path)
-        if moment != "loading":
-            made = runner.whole[command] if command == "vectorize" else {"a.svg": b""}
+        if moment not in EARLY:
+            made = undisturbed[command] if command == "vectorize" else {"a.svg": b""}
             assert set(results(tmp_path)) >= set(made), "the best so far is written"
-    assert_mended(runner, command, arguments, tmp_path)
+    # The next run makes what an undisturbed one makes, and clears away what was left.
+    code, _, said = forks.run(arguments, tmp_path)
+    assert code == 0, said
+    assert results(tmp_path) == undisturbed[command]
+    assert_whole(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("number", "moment", "finished"),
+    [
+        (signal.SIGTERM, "training", False),
+        (signal.SIGTERM, "writing", True),
+        (signal.SIGINT, "scoring", True),
+    ],
+)
+def test_what_is_there_is_written(
+    forks: Forks, tmp_path: Path, number: signal.Signals, moment: str, finished: bool
+) -> None:
+    arguments = [*lay_out(tmp_path, "vectorize"), "--json"]
+    count = TRAINING["vectorize"] if moment == "training" else 1
+    code, out, said = forks.run(arguments, tmp_path, moment=moment, count=count, signal=number)
+    assert code == CODES[number], said
+    values = json.loads(out)
+    assert values["stopped"] is not finished
+    assert (values["iterations"] == STEPS) is finished
+    assert values["iterations"] > 0
+    assert (values["psnr"] is None) == (moment == "writing"), (
+        "the score is given up, but a started one is short"
+    )
+    text = (tmp_path / "a.svg").read_text()
+    assert ("stopped" not in text) == finished, "what was cut short does not pass for a finished result"
+    assert values["bytes"] == len(text)
+
+
+@pytest.mark.parametrize(("number", "times"), [(signal.SIGTERM, 1), (signal.SIGINT, 2)])
+def test_with_nothing_to_save_nothing_is_written(
+    forks: Forks, tmp_path: Path, number: signal.Signals, times: int
+) -> None:
+    """A second signal ends the process at once, even where there would be something."""
+    arguments = [*lay_out(tmp_path, "vectorize"), "--json"]
+    moment = "decoding" if times == 1 else "writing"
+    code, out, said = forks.run(arguments, tmp_path, moment=moment, signal=number, times=times)
+    assert code == CODES[number]
+    assert said.strip() == "warpsplat: interrupted"
+    answer = {"error": "interrupted", "exit_code": CODES[number]}
+    assert [json.loads(line) for line in out.splitlines()] == [answer] * (times == 1)
+    assert os.listdir(tmp_path) == ["a.png"]
+
+
+@pytest.mark.parametrize("moment", ["decoding", "training"])
+def test_a_batch_ends_with_its_summary(forks: Forks, tmp_path: Path, moment: str) -> None:
+    arguments = [*lay_out(tmp_path, "batch"), "--json"]
+    count = TRAINING["vectorize"] if moment == "training" else 1
+    code, out, _ = forks.run(arguments, tmp_path, moment=moment, count=count, signal=signal.SIGINT)
+    assert code == CODES[signal.SIGINT]
+    *images, summary = map(json.loads, out.splitlines())
+    assert [(image["image"], image["status"]) for image in images] == [("a.png", "stopped")]
+    assert "status" not in summary
+    assert list(results(tmp_path)) == (["a.svg"] if moment == "training" else [])
 
 
 @pytest.mark.parametrize("number", CODES)
 @pytest.mark.parametrize("moment", ["writing", "renaming"])
 def test_an_old_result_is_kept_or_replaced(
-    runner: Runner, tmp_path: Path, moment: str, number: signal.Signals
+    forks: Forks,
+    undisturbed: dict[str, dict[str, bytes]],
+    tmp_path: Path,
+    moment: str,
+    number: signal.Signals,
 ) -> None:
     arguments = lay_out(tmp_path, "vectorize")
-    old = runner.whole["vectorize"]["a.svg"]
+    old = undisturbed["vectorize"]["a.svg"]
     (tmp_path / "a.svg").write_bytes(old)
     arguments += ["--curves", "5"]
-    code, _, said = runner.run(arguments, tmp_path, moment=moment, signal=number)
+    code, _, said = forks.run(arguments, tmp_path, moment=moment, signal=number)
     assert code == CODES[number], said
     after = (tmp_path / "a.svg").read_bytes()
     assert after == old or (number in GENTLE and after.count(b"<path") == 5)
-    assert runner.run(arguments, tmp_path)[0] == 0
+    assert forks.run(arguments, tmp_path)[0] == 0
     assert (tmp_path / "a.svg").read_bytes().count(b"<path") == 5
     assert_whole(tmp_path)
 
 
-@pytest.mark.parametrize("command", ["vectorize", "batch"])
-def test_an_ignored_ctrl_c_stays_ignored(runner: Runner, tmp_path: Path, command: str) -> None:
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_ignored_ctrl_c_stays_ignored(
+    forks: Forks, undisturbed: dict[str, dict[str, bytes]], tmp_path: Path, command: str
+) -> None:
     """Under ``nohup``, or in the background of a script."""
     arguments = lay_out(tmp_path, command)
     trip: dict[str, Any] = {"moment": "training", "count": TRAINING[command], "signal": signal.SIGINT}
-    code, _, said = runner.run(arguments, tmp_path, ignored=True, **trip)
+    code, _, said = forks.run(arguments, tmp_path, ignored=True, **trip)
     assert code == 0, said
-    assert results(tmp_path) == runner.whole[command]
+    assert results(tmp_path) == undisturbed[command]
 
 
 @pytest.mark.parametrize("number", GENTLE)
-@pytest.mark.parametrize("moment", ["import click", "import numpy", "import warp", "loading"])
+@pytest.mark.parametrize("moment", ["import click", "import numpy", "import warp"])
 def test_a_signal_at_the_start(tmp_path: Path, moment: str, number: signal.Signals) -> None:
     folder = tmp_path / "folder"
     arguments = lay_out(folder, "vectorize")
@@ -144,3 +209,28 @@ def test_a_signal_at_the_start(tmp_path: Path, moment: str, number: signal.Signa
     assert "Traceback" not in said
     assert len(said.strip().splitlines()) <= 1, said
     assert_whole(folder)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_ctrl_c_at_any_early_moment_shows_no_traceback(tmp_path: Path, seed: int) -> None:
+    make_image(tmp_path / "a.png")
+    command = [sys.executable, "-X", "importtime", "-m", "warpsplat", "vectorize", "a.png", "-q"]
+    process = subprocess.Popen(
+        [*command, "-o", "a.svg", "--iterations", "900000", "--device", "cpu"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+    )
+    assert process.stderr
+    for line in process.stderr:
+        if b"click" in line:  # the first import after the one that prepares for signals
+            break
+    time.sleep(random.Random(seed).uniform(0, 0.3))
+    process.send_signal(signal.SIGINT)
+    try:
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert b"Traceback" not in said
+    assert process.returncode in {130, -signal.SIGINT}

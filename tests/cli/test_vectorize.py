@@ -116,6 +116,7 @@ def test_an_output_is_what_its_name_says(image: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.slow
+@pytest.mark.usual_seed
 def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     direct = image.parent / "a.svg"
     assert run("vectorize", image, "-o", direct, "-q", *QUICK) == 0
@@ -126,17 +127,6 @@ def test_standard_input_and_output(image: Path, capsys: pytest.CaptureFixture[st
     assert run("vectorize", "-", *QUICK) == 2
     assert "give -o" in one_line(capsys.readouterr().err)
     assert not os.path.exists("-")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
-def test_a_limit_of_file_size_is_a_failure_to_write(image: Path) -> None:
-    run_it = ("vectorize", image, "-o", image.parent / "a.svg", "--curves", 200, "--iterations", 2)
-    # Without bytecode, of which Python itself would leave half a file in the cache.
-    done = shell("ulimit -f 1; PYTHONDONTWRITEBYTECODE=1 $W", *run_it, "--device", "cpu")
-    assert done.returncode == 4
-    assert b"File too large" in done.stderr
-    assert done.stderr.count(b"\n") == 1
 
 
 def test_importance(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -84,10 +84,11 @@ def test_a_run_comes_nearer_where_the_mask_is_white(device: str) -> None:
     mask = np.zeros((height, width), np.float32)
     mask[:, : width // 2] = 1
     settings = make_settings(curves=12, iterations=60, coarse_pixels=1000, texture=0.0)
-    errors = []
-    for importance in (None, mask):
+    shares = []
+    for importance in (mask, 1 - mask):
         scene = fit(target, settings, Backend.on(device), importance=importance).scene
         squares = (render(scene, backend=Backend.on(device)) - target) ** 2
-        errors.append([squares[mask == white].mean() for white in (0, 1)])
-    assert errors[1][1] < 0.8 * errors[0][1]
-    assert errors[1][0] > errors[0][0]
+        shares.append(squares[mask == 1].sum() / squares.sum())
+    # Of the error, the left half has 0.10 to 0.18 or 0.79 to 0.90, over five seeds.
+    assert shares[0] < 0.4
+    assert shares[1] > 0.5

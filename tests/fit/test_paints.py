@@ -10,6 +10,7 @@ import pytest
 from tests.fit.pictures import picture
 from tests.scenes import random_scene, with_two_stops
 from warpsplat.errors import UsageError
+from warpsplat.fit.paints import choose_paints
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -19,27 +20,34 @@ from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray, Kind, Paint
+from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
 
 
 def sky() -> FloatArray:
-    """From dark to light blue, with a dark hill."""
-    y, x = np.mgrid[:64, :80].astype(np.float32)
-    t = (y / 64)[..., None]
-    image = (1 - t) * np.array([0.1, 0.3, 0.8]) + t * np.array([0.9, 0.85, 0.6])
-    image[y > 50 + 0.01 * (x - 40) ** 2] = [0.1, 0.2, 0.1]
-    return image.astype(np.float32)
+    """From dark blue to yellow."""
+    t = np.broadcast_to(np.linspace(0, 1, 64, dtype=np.float32)[:, None, None], (64, 80, 1))
+    ends = np.array([[0.1, 0.2, 0.9], [1.0, 0.9, 0.2]], np.float32)
+    return (1 - t) * ends[0] + t * ends[1]
 
 
-def flags() -> FloatArray:
-    """Plain colours."""
-    y, x = np.mgrid[:64, :80]
-    image = np.full((64, 80, 3), 0.9, np.float32)
-    image[y < 20] = [0.8, 0.1, 0.1]
-    image[np.hypot(x - 40, y - 38) < 15] = [0.1, 0.2, 0.6]
-    return image
+def stripes(grey: float) -> Scene:
+    """The upper half of a picture in this grey, the lower half in so many stripes as make a usual file."""
+    heights = np.array([32] + [2] * 16)
+    x, y = np.array([(0, 0), (0, 1), (1, 1), (1, 0)]).T
+    corners = np.stack([120 * x - 20 + 0 * heights[:, None], y * heights[:, None]], axis=2)
+    corners[..., 1] += np.cumsum([0, *heights[:-1]])[:, None]
+    sides = [corners + (np.roll(corners, -1, axis=1) - corners) * along for along in (0, 1 / 3, 2 / 3)]
+    greys = np.array([grey] + [0, 0.2] * 8)
+    return Scene.uniform(
+        Kind.FILL,
+        Canvas(80, 64, np.ones(3, np.float32)),
+        np.stack(sides, axis=2).reshape(17, 12, 2).astype(np.float32),
+        Basis.CUBIC,
+        colors=np.repeat(greys[:, None], 3, axis=1).astype(np.float32),
+        opacities=np.ones(17, np.float32),
+    )
 
 
 def run(image: FloatArray, device: str, **options: object) -> Result:
@@ -58,13 +66,21 @@ def test_auto_paints_a_sky_with_ramps(device: str) -> None:
     assert (flat.scene.paint == Paint.FLAT).all()
     assert (auto.scene.paint != Paint.FLAT).any()
     assert "Gradient" not in flat.svg
-    assert auto.score.psnr > flat.score.psnr + 1
+    assert auto.score.psnr > flat.score.psnr + 1, "over five seeds 8 to 12 dB more"
 
 
-def test_auto_paints_a_flat_drawing_flat(device: str) -> None:
-    """Now and then a ramp is worth its bytes where a shape spills over an edge."""
-    files = [run(flags(), device, paint="auto", seed=seed).svg for seed in (2, 3, 4)]
-    assert sum("Gradient" in file for file in files) <= 1
+@pytest.mark.parametrize("ramp", [0.0, 0.3])
+def test_auto_paints_flat_what_is_flat(device: str, ramp: float) -> None:
+    """Shapes in their places, one of them in a wrong colour, or on what gets brighter to the right."""
+    settings = make_settings("draft", paint="auto", curves=17)
+    scene = stripes(0.5)
+    target = render(stripes(0.5 if ramp else 0.7), backend=Backend.on(device)).copy()
+    target[:32] += np.float32(ramp) * np.linspace(-1, 1, 80, dtype=np.float32)[:, None]
+    state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
+    step = Step(state, settings, Target(target, Phase(80, 64)))
+    step.render()
+    choose_paints(step)
+    assert (state.scene().paint != Paint.FLAT).tolist() == [ramp > 0] + [False] * 16
 
 
 @pytest.mark.parametrize("kind", [Paint.LINEAR, Paint.RADIAL])
@@ -73,14 +89,14 @@ def test_one_kind(device: str, kind: Paint) -> None:
     result = run(picture(), device, paint=kind.name.lower(), iterations=80)
     scene = result.scene
     assert set(scene.paint.tolist()) <= {Paint.FLAT, kind}
-    assert (scene.paint == kind).sum() >= 4
-    assert result.svg.count(f"<{kind.name.lower()}Gradient ") >= 4
+    assert (scene.paint == kind).any()
+    assert result.svg.count(f"<{kind.name.lower()}Gradient ") > 0
     again, _ = load_scene(result.svg, 64, 48, "run")
     assert (np.bincount(again.paint, minlength=3) == np.bincount(scene.paint, minlength=3)).all()
     # One circle each: no matrix.
     assert "matrix" not in result.svg
     shown = on_white(render_own(result.svg))
-    assert psnr(255 * render(again, backend=Backend.on(device)), shown) > 40
+    assert psnr(255 * render(again, backend=Backend.on(device)), shown) > 35, "42 to 47 dB over five seeds"
 
 
 def test_a_circle_stays_one_in_training(device: str) -> None:

@@ -176,9 +176,10 @@ def test_small_in_front_with_area_order(device: str) -> None:
     assert (np.diff(sizes) <= 1e-3).all()
 
 
-def test_a_look_at_the_file_that_outgrows_the_arrays(device: str) -> None:
-    """The step is recorded anew, and its loss is then that of the file."""
-    settings = make_settings(curves=20, iterations=100)
+@pytest.mark.parametrize("renderer", ["exact", "splat"])
+def test_a_look_at_the_file_that_outgrows_the_arrays(device: str, renderer: Renderer) -> None:
+    """The step is recorded anew, and its loss is then that of the file, whatever the render shows."""
+    settings = make_settings(curves=20, iterations=100, renderer=renderer)
     step = step_for(picture(), settings, device, threads=1, capacity=Capacity(40, 9))
     before = step._graph
     look_at_file(step)

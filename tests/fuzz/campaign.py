@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import shutil
 import tempfile
@@ -124,10 +125,12 @@ def keep(finding: Finding, folder: Path) -> None:
 
 
 def campaign(
-    cases: Cases, count: int, *, first: int = 0, workers: int = 1, kept: Path | None = None,
-    say: Callable[[str], None] | None = None,
+    cases: Cases, count: int, *, first: int = 0, workers: int = 1, worker: Worker | None = None,
+    kept: Path | None = None, say: Callable[[str], None] | None = None,
 ) -> Report:  # fmt: skip
-    """Run ``count`` cases in ``workers`` processes; each finding is seen twice before it counts."""
+    """Run ``count`` cases in ``workers`` processes, or by ``worker``, which stays open; each finding is seen
+    twice before it counts.
+    """
     report, lock = Report(), threading.Lock()
     todo: queue.SimpleQueue[int] = queue.SimpleQueue()
     for index in range(first, first + count):
@@ -135,19 +138,20 @@ def campaign(
     started = time.monotonic()
 
     def serve() -> None:
-        with Worker() as worker, tempfile.TemporaryDirectory(prefix="fuzz-") as scratch:
+        given = contextlib.nullcontext(worker) if worker else Worker()
+        with given as mine, tempfile.TemporaryDirectory(prefix="fuzz-") as scratch:
             folder = Path(scratch) / "deep" / "down" / "case"
             while True:
                 try:
                     index = todo.get_nowait()
                 except queue.Empty:
                     return
-                finding = run_case(worker, cases[index], folder, report.add)
+                finding = run_case(mine, cases[index], folder, report.add)
                 if finding:
-                    worker.close()  # again, where no earlier case can have a part in it
-                    finding = run_case(worker, finding.case, folder)
+                    mine.close()  # again, where no earlier case can have a part in it
+                    finding = run_case(mine, finding.case, folder)
                 if finding and kept:
-                    finding = shrink(worker, finding, folder)
+                    finding = shrink(mine, finding, folder)
                     keep(finding, kept)
                 with lock:
                     report.cases += 1

@@ -17,9 +17,15 @@ SEED = 21
 COUNTS = {"image": 120, "svg": 60, "yaml": 50, "options": 50, "checkpoint": 40, "manifest": 40}
 
 
+@pytest.fixture(scope="module")
+def worker() -> Iterator[Worker]:
+    with Worker() as made:
+        yield made
+
+
 @pytest.mark.parametrize("target", TARGETS)
-def test_no_input_breaks_the_command_line(target: str) -> None:
-    report = campaign(Cases(SEED, target), COUNTS[target])
+def test_no_input_breaks_the_command_line(worker: Worker, target: str) -> None:
+    report = campaign(Cases(SEED, target), COUNTS[target], worker=worker)
     assert not report.findings, "\n".join(f.line() for f in report.findings)
     assert report.cases == COUNTS[target]
     if target in ("image", "svg", "checkpoint"):
@@ -30,12 +36,6 @@ def test_cases_are_a_function_of_seed_and_number() -> None:
     one, other = Cases(3), Cases(3)
     assert [one[i] for i in (5, 2)] == [other[i] for i in (5, 2)]
     assert one[5].data != Cases(4)[5].data
-
-
-@pytest.fixture(scope="module")
-def worker() -> Iterator[Worker]:
-    with Worker() as made:
-        yield made
 
 
 def test_a_worker_outlives_crashes(worker: Worker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

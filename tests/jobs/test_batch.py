@@ -329,6 +329,7 @@ def test_an_image_is_not_made_where_another_process_just_has(
 
 
 @pytest.mark.slow
+@pytest.mark.usual_seed
 def test_processes_make_the_same_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     images = [str(folder / "in" / name) for name in ("a.png", "b.png", "broken.png", "b.jpg")]
     for workers in ("1", "2"):

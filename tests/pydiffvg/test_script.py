@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -50,13 +51,22 @@ pydiffvg.RenderFunction.serialize_scene(8, 8, [], [], output_type=pydiffvg.Outpu
 """
 
 
+def is_ours(name: str) -> bool:
+    """Whether a module is one that scripts get from this package."""
+    return name.partition(".")[0] in ("pydiffvg", "diffvg", "optimize_svg")
+
+
 @pytest.fixture(autouse=True)
-def _own_modules(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def _own_modules(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     """What a script sees of the interpreter is as before afterwards."""
+    before = {name: module for name, module in sys.modules.items() if is_ours(name)}
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setattr(sys, "path", [*sys.path])
-    monkeypatch.setattr(sys, "modules", sys.modules.copy())
     monkeypatch.chdir(tmp_path)
+    yield
+    for name in filter(is_ours, [*sys.modules]):
+        del sys.modules[name]
+    sys.modules.update(before)
 
 
 def test_a_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

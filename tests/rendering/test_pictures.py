@@ -41,7 +41,7 @@ def test_a_picture_lies_over_what_is_below(device: str, lanes: int, clear: bool)
     place = expected[7:37, 9:50]
     channels = expected.shape[2]
     place[:] = picture.pixels[..., :channels] + (1 - picture.pixels[..., 3:]) * place
-    np.testing.assert_allclose(image, expected, atol=2e-6)
+    np.testing.assert_allclose(image, expected, atol=1e-5)
 
 
 @pytest.mark.parametrize("lanes", [1, 16])

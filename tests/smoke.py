@@ -1,0 +1,65 @@
+"""What a change needs first: ``pytest -m smoke`` runs these, one or two of each part."""
+
+SMOKE = {
+    "kernels": (
+        "kernels/test_composite.py::test_blending_and_adjoint",
+        "kernels/test_adam.py::test_matches_torch",
+        "kernels/grid/test_grid.py::test_adjoint_of_positions",
+        "kernels/loss/test_image.py::test_squared_error",
+        "kernels/loss/test_shape.py::test_bending",
+    ),
+    "rendering": (
+        "rendering/test_mixed.py::test_exact",
+        "rendering/test_mixed.py::test_splat",
+        "rendering/test_soft.py::test_image_and_gradients",
+        "rendering/test_paint.py::test_gradients",
+        "rendering/test_stroker.py::test_image_and_gradients_of_dashes",
+    ),
+    "scene": ("scene/test_scene.py::test_take_and_append",),
+    "files": (
+        "files/test_image.py::test_plain",
+        "files/test_image.py::test_bad_files_give_one_line_with_name_and_cause",
+        "files/test_packed.py",
+    ),
+    "svg": (
+        "svg/test_own_files.py::test_what_is_written_is_read",
+        "svg/test_read_kept.py::test_it_looks_the_same",
+        "svg/test_write.py::test_the_file_looks_as_the_render",
+        "test_metrics.py::test_psnr",
+    ),
+    "trace": ("trace/test_trace.py::test_a_logo", "trace/test_curves.py"),
+    "fit": (
+        "fit/test_step.py::test_a_look_at_the_file_that_outgrows_the_arrays",
+        "fit/test_new_loss.py::test_a_loss_of_the_image_changes_what_is_fitted",
+        "jobs/test_vectorize.py::test_the_loss_falls_and_the_count_stays",  # photographs
+        "jobs/test_line.py::test_jpeg_and_grey_paper",  # line art
+        "jobs/test_subjects.py::test_figures_are_of_the_file_that_is_delivered",  # drawings
+        "jobs/test_vectorize.py::test_target_psnr_out_of_reach_says_so_and_keeps_to_the_curves",
+    ),
+    "jobs": (
+        "jobs/test_plan.py::test_a_batch_file",
+        "jobs/test_batch.py::test_a_run_reports_skips_and_redoes",
+        "jobs/test_checkpoint.py::test_a_run_goes_on_to_the_same_bytes[",
+    ),
+    "api": (
+        "test_api.py::test_what_is_public_is_there_and_light",
+        "test_api.py::test_the_command_line_api_and_file_agree",
+    ),
+    "cli": (
+        "cli/test_vectorize.py::test_vectorize",
+        "cli/test_render.py::test_render",
+        "cli/test_main.py::test_wrong_usage",
+        "cli/test_main.py::test_help_is_quick",
+    ),
+    "others": (
+        "torch/test_gradients.py::test_exact",
+        "pydiffvg/test_render.py::test_area_of_a_circle",
+        "motion/test_recorder.py::test_a_film_ends_with_the_file",
+        "serve/test_app.py::test_an_image_becomes_the_file_of_the_command_line",
+        "portable",
+    ),
+    "conventions": ("test_architecture.py", "test_smoke.py"),
+}
+"""Part -> beginnings of the names that pytest gives tests, within this folder."""
+
+NAMES = tuple(f"tests/{name}" for names in SMOKE.values() for name in names)
