@@ -125,7 +125,7 @@ def test_settings_that_cannot_be_used(visitor: Visitor, settings: dict[str, obje
 @pytest.mark.parametrize(
     ("data", "status", "said"),
     [
-        (b"no image at all\n", 415, "photo.png: not an image, or a format that Pillow cannot read"),
+        (b"no image at all\n", 415, "photo.png: not an image of a format that is read: AVIF, "),
         (b"", 415, "photo.png: nothing came"),
         (picture()[:90], 415, "photo.png: damaged or unsupported image: "),
         (bytes(2_000_001), 413, "photo.png: has 2.0 MB; at most 2 MB are taken"),
