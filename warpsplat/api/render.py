@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from warpsplat.api.run import backend_on
 from warpsplat.api.svg import SvgSource, save_svg, svg_name_of, text_of
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import ImageError, UsageError, shown
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
 from warpsplat.jobs.render import RendererName, drawn
@@ -72,7 +72,7 @@ def _zoom(size: tuple[float, float], width: int | None, height: int | None, scal
         raise UsageError("a scale, and a width or height besides")
     for what, side in (("width", width), ("height", height)):
         if side is not None and (isinstance(side, bool) or int(side) != side or side < 1):
-            raise UsageError(f"{what} must be a whole number from 1, not {side!r}")
+            raise UsageError(f"{what} must be a whole number from 1, not {shown(side)}")
     if scale is not None:
         if not (math.isfinite(scale) and scale > 0):
             raise UsageError(f"scale must be a positive number, not {scale}")

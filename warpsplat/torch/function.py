@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import torch
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
 from warpsplat.scene import Canvas
@@ -109,7 +109,7 @@ def model_of(renderer: str | Model) -> Model:
     if not isinstance(renderer, str):
         return renderer
     if renderer not in MODELS:
-        raise UsageError(f"no renderer {renderer!r}; there are {', '.join(MODELS)}")
+        raise UsageError(f"no renderer {shown(renderer)}; there are {', '.join(MODELS)}")
     return MODELS[renderer]
 
 
@@ -121,7 +121,7 @@ def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewpo
     """
     for name, side in (("width", width), ("height", height)):
         if side is not None and (isinstance(side, bool) or not isinstance(side, int) or side < 1):
-            raise UsageError(f"{name} must be a number of pixels, not {side!r}")
+            raise UsageError(f"{name} must be a number of pixels, not {shown(side)}")
     if width is None and height is None:
         return Viewport(canvas.width, canvas.height)
     scale = width / canvas.width if width is not None else (height or 0) / canvas.height
