@@ -47,6 +47,9 @@ PIXELS_A_BYTE = 10_000
 STRIP_PIXELS = 1 << 20
 """Pixels that are converted at a time."""
 
+WEBP_SIDE = 16_383
+"""Longest side of a WebP [px]: its head has 14 bits for one."""
+
 LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 """What Pillow makes of a sample 1 in PNGs of fewer than 8 bits; their transparent grey it leaves as it is."""
 
