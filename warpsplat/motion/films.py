@@ -67,7 +67,7 @@ def check_format(path: Path) -> None:
 
 
 def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
-    """Pixels of a film per pixel of a picture of ``size``, whose shorter side keeps a pixel where the longer one
+    """Pixels of a film per pixel of a picture of ``size``, whose shorter side keeps a pixel if the longer one
     has no more than ``WEBP_SIDE``, which is as many as encoders of H.264 take.
     """
     if width is not None:
