@@ -24,7 +24,7 @@ from warpsplat.cli.options import (
 )
 from warpsplat.cli.report import index_option
 from warpsplat.cli.say import say
-from warpsplat.errors import ExitCode, UsageError
+from warpsplat.errors import ExitCode, UsageError, shown
 from warpsplat.jobs.options import KINDS
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Shard(click.ParamType):
             return value
         found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", value)
         if not found or not 1 <= int(found[1]) <= int(found[2]):
-            self.fail(f"{value!r} is no I/N, as 1/4 for the first of four parts", param, ctx)
+            self.fail(f"{shown(value)} is no I/N, as 1/4 for the first of four parts", param, ctx)
         return int(found[1]), int(found[2])
 
 

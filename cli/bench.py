@@ -10,7 +10,7 @@ import click
 
 from warpsplat.cli.options import threads_option
 from warpsplat.cli.say import say
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.fit.settings import Renderer
 
 
@@ -22,7 +22,7 @@ def parse_size(text: str) -> tuple[int, int]:
     """
     found = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.strip().lower())
     if not found or not all(16 <= int(n) <= 16384 for n in found.groups()):
-        raise UsageError(f"not a size: {text!r}; write 768x512, each side from 16 to 16384")
+        raise UsageError(f"not a size: {shown(text)}; write 768x512, each side from 16 to 16384")
     return int(found[1]), int(found[2])
 
 

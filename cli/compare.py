@@ -11,7 +11,7 @@ import click
 
 from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
-from warpsplat.errors import Stopped, UsageError, printable
+from warpsplat.errors import Stopped, UsageError, printable, shown
 from warpsplat.jobs.options import BY_NAME, settings_from
 from warpsplat.jobs.tracer import TRACERS, require
 
@@ -36,7 +36,7 @@ def parse_curves(text: str) -> list[int]:
     """
     parts = [part.strip() for part in text.split(",")]
     if not all(part.isascii() and part.isdigit() and len(part) < 9 for part in parts):
-        raise UsageError(f"not numbers of shapes: {text!r}; write 64,256,512")
+        raise UsageError(f"not numbers of shapes: {shown(text)}; write 64,256,512")
     return sorted({int(part) for part in parts})
 
 

@@ -8,6 +8,7 @@ import importlib
 import itertools
 import json
 import os
+import re
 import signal
 import sys
 import traceback
@@ -18,7 +19,7 @@ import click
 from warpsplat._version import __version__
 from warpsplat.cli import signals
 from warpsplat.cli.say import notices, open_standard_streams, say, silence
-from warpsplat.errors import ExitCode, OutputError, explain, printable
+from warpsplat.errors import LONGEST_MESSAGE, ExitCode, OutputError, cut, explain, printable
 
 COMMANDS = {
     "vectorize": "Turn an image into an SVG.",
@@ -171,6 +172,10 @@ def report(error: BaseException, objects: Literal["stdout", "stderr"] | None = N
     return code
 
 
+QUOTED = re.compile(r"""(["'])([^"']*)\1""")
+"""Values in click's messages."""
+
+
 def told(error: BaseException) -> tuple[str, int]:
     """What to say of what was raised, and the exit code for it."""
     number = signals.received() or (signal.SIGINT if isinstance(error, KeyboardInterrupt) else None)
@@ -184,7 +189,10 @@ def told(error: BaseException) -> tuple[str, int]:
         help_of = f" (see {context.command_path} --help)" if context else ""
         if isinstance(error, click.NoSuchOption) and context and context.command is cli:
             help_of = " (options follow a command: warpsplat vectorize IMAGE ...)"
-        return printable(" ".join(error.format_message().split())) + help_of, error.exit_code
+        message = " ".join(error.format_message().split())
+        if isinstance(error, click.BadParameter):
+            message = QUOTED.sub(lambda found: f"{found[1]}{cut(found[2])}{found[1]}", message)
+        return printable(cut(message, LONGEST_MESSAGE)) + help_of, error.exit_code
     return explain(error)
 
 

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import click
 
 from warpsplat.cli.say import set_voice
+from warpsplat.errors import shown
 from warpsplat.jobs.options import OPTIONS, Option
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -102,7 +103,7 @@ class Numbers(click.ParamType):
             return value
         words = str(value).split(",")
         if not all(re.fullmatch(r"[+-]?\d{1,18}", word.strip(), re.ASCII) for word in words):
-            self.fail(f"{value!r} is not a whole number, nor several as 50,200,1000", param, ctx)
+            self.fail(f"{shown(value)} is not a whole number, nor several as 50,200,1000", param, ctx)
         numbers = tuple(int(word) for word in words)
         if len(numbers) == 1:
             return numbers[0]

@@ -14,7 +14,7 @@ from warpsplat.torch import Module, SceneTensors, render
 
 def opaque(path: str) -> Image.Image:
     """A picture on white: all shapes are seen then, and none hides in black where nothing is."""
-    image = Image.open(path).convert("RGBA")
+    image = warpsplat.to_pillow(warpsplat.load_image(path)).convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
 
 

@@ -10,8 +10,11 @@ from pathlib import Path
 import pytest
 
 from warpsplat.errors import ImageError
+from warpsplat.svg.document import Document, Element
+from warpsplat.svg.gradients import parse_link
 from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
 from warpsplat.svg.read import load_scene
+from warpsplat.svg.read_kept import load_kept
 
 LONG = 1_000_000
 SPACES, DIGITS = " " * LONG, "1" * LONG
@@ -65,3 +68,129 @@ def test_what_is_no_number_counts_as_not_said(attribute: str) -> None:
 def test_numbers_that_are_none(shape: str) -> None:
     with pytest.raises(ImageError):
         load_scene(f"{HEAD}>{shape}</svg>", 32, 24, "a.svg")
+
+
+def shapes(body: str) -> int:
+    return len(load_scene(f"{HEAD}>{body}</svg>", 32, 24, "a.svg")[0])
+
+
+def test_links_that_do_not_end() -> None:
+    assert parse_link(f"url({SPACES}x") is None
+    assert parse_link(f'url("{SPACES}x') is None
+    assert parse_link(f"url( '#a b{SPACES}' ){SPACES}red") == ("a b", "red")
+    assert parse_link("url(#a) none") == ("a", "none")
+    assert parse_link('url("#a)b")') == ("a)b", "")
+    assert parse_link('url("#a)b') == ('"#a', "b")
+
+
+@pytest.mark.parametrize(
+    ("sheet", "said"),
+    [
+        ("a" * LONG, None),
+        (LONG // 2 * "}a", None),
+        ("&lt;/style" * (LONG // 10), None),
+        ("@charset " * (LONG // 10), "@-rules"),
+        (f"@namespace{SPACES}", "@-rules"),
+        (f"[{SPACES}a{SPACES}b]{{fill:red}}", "selector"),
+    ],
+    ids=["no brace", "braces that close", "tags", "at-rules", "one", "selector"],
+)
+def test_style_sheets_that_are_none(sheet: str, said: str | None) -> None:
+    body = f"<style>{sheet}</style>{TRIANGLE.removesuffix('</svg>')}"
+    if said is None:
+        assert shapes(body) == 1
+        return
+    with pytest.raises(ImageError, match=said):
+        shapes(body)
+
+
+def gradients(count: int, last: str) -> str:
+    """One that takes over from the next, and so on; the shapes are filled with them."""
+    chain = "".join(f'<linearGradient id="g{i}" href="#g{i + 1}"/>' for i in range(count))
+    ramp = f'<linearGradient id="g{count}"{last}><stop stop-color="red"/><stop offset="1"/></linearGradient>'
+    return chain + ramp + "".join(f'<path fill="url(#g{i})" d="M0 0h9v9z"/>' for i in range(count))
+
+
+@pytest.mark.parametrize("last", ["", ' href="#g0"'], ids=["chain", "ring"])
+def test_gradients_that_refer_to_one_another(last: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is looked at once, or twice in a ring, however many shapes there are."""
+    looks = []
+    linked = Document.linked
+
+    def counted(document: Document, element: Element) -> Element | None:
+        looks.append(element)
+        return linked(document, element)
+
+    monkeypatch.setattr(Document, "linked", counted)
+    assert shapes(gradients(300, last)) == 300
+    assert len(looks) <= 301
+
+
+def test_gradients_in_a_ring_take_over_from_all_of_it() -> None:
+    body = (
+        '<linearGradient id="a" href="#b" x1="1"/><linearGradient id="b" href="#c" x1="2" x2="7"/>'
+        '<linearGradient id="c" href="#a" gradientUnits="userSpaceOnUse" x2="9">'
+        "<stop/><stop/></linearGradient>"
+    )
+    body += "".join(f'<path fill="url(#{name})" d="M0 0h9v9z"/>' for name in "abc")
+    scene = load_scene(f"{HEAD}>{body}</svg>", 32, 24, "a.svg")[0]
+    ends = scene.frames[:, [0, 2]]
+    assert [(x, x + way) for x, way in ends.tolist()] == [(1, 7), (2, 7), (1, 9)]
+
+
+PATH, FILLED = '<path d="M0 0h9v9z"/>', '<path fill="url(#a)" d="M0 0h9v9z"/>'
+CLIP = '<clipPath id="c"><rect width="30" height="20"/></clipPath>'
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("<style>" + 5000 * "g.a{fill:red}" + "</style>" + 5000 * '<g class="a"/>', "too many rules"),
+        ("<style>" + 5000 * "[id~=x]{fill:red}" + f'</style><g id="{LONG * "x "}"/>', "too many rules"),
+        (
+            f'<g stroke="red" stroke-dasharray="{LONG * "1 "}"><path d="M0 0h9"/></g>',
+            "dasharray in more than",
+        ),
+        (f'<g paint-order="{LONG * "fill "}">{PATH}</g>', "paint-order in more than 1000 characters"),
+        (
+            f'<path id="a" d="M0 0{LONG // 100 * "h1"}"/>' + 300 * '<use href="#a"/>',
+            "more than 100000 elements",
+        ),
+        ("".join(f'<use id="u{i}" href="#u{i + 1}"/>' for i in range(9999)), "more than 1000 deep"),
+        (
+            f'<linearGradient id="a">{2000 * "<stop/>"}</linearGradient>{501 * FILLED}',
+            "more than 1000000 stops",
+        ),
+        (
+            f'<linearGradient id="a" gradientTransform="{LONG * "scale(1)"}"><stop/><stop/></linearGradient>'
+            + FILLED,
+            "gradientTransform in more than 1000 characters",
+        ),
+    ],
+    ids=["rules", "words", "dashes", "inherited", "linked data", "links", "stops", "transform"],
+)
+def test_what_multiplies_is_refused(body: str, said: str) -> None:
+    with pytest.raises(ImageError, match=said):
+        shapes(body)
+
+
+def test_groups_that_clip_in_one_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = CLIP + 9 * '<g clip-path="url(#c)">' + 9 * PATH + 9 * "</g>"
+    assert shapes(body) == 9
+    monkeypatch.setattr("warpsplat.svg.structure.MAX_WORK", 80)
+    with pytest.raises(ImageError, match="too many shapes in too many groups"):
+        shapes(body)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"<g{SPACES}><text>a</text></g>",
+        f"<text a='url({SPACES}x'/>",
+        f"<text a='href=&quot;#a{SPACES}x'/>",
+        f"<style>{LONG * 'a'}</style><text>a</text>",
+    ],
+    ids=["tag", "link", "reference", "sheet"],
+)
+def test_spaces_in_what_is_kept(body: str) -> None:
+    assert len(load_kept(f"{HEAD}>{body}{PATH}</svg>", 32, 24, "a.svg").scene) == 2

@@ -90,6 +90,24 @@ NO_MEMORY = (
 """How Warp, CUDA, OpenCV, C++ and Python say that the machine has no more to give, in lower case."""
 
 
+SHOWN = 80
+"""Characters of a refused value that its message shows."""
+
+
+def shown(value: object) -> str:
+    """A value that is refused, as messages show it: as Python writes it, the first ``SHOWN`` characters."""
+    try:
+        words = repr(value)
+    except ValueError:  # a number of thousands of digits
+        words = f"a {type(value).__name__} of very many digits"
+    return cut(words)
+
+
+def cut(text: str, most: int = SHOWN) -> str:
+    """The beginning of a text that may be long."""
+    return text if len(text) <= most else f"{text[:most]} ..."
+
+
 def printable(text: str) -> str:
     """``text`` as one line: control characters, line breaks and undecodable bytes of names are escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
@@ -121,6 +139,4 @@ def explain(error: BaseException) -> tuple[str, ExitCode]:
     else:
         hint = "set WARPSPLAT_TRACEBACK=1 for the traceback"
         message, code = f"internal error: {kind}: {cause} ({hint})", ExitCode.INTERNAL
-    if len(message) > LONGEST_MESSAGE:
-        message = message[:LONGEST_MESSAGE] + " ..."
-    return printable(message), code
+    return printable(cut(message, LONGEST_MESSAGE)), code

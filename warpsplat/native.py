@@ -1,4 +1,4 @@
-"""Below Python: what native code prints behind its back, the memory it keeps; free memory, and cores."""
+"""Below Python: what native code prints behind its back, the memory it keeps; memory, and cores."""
 
 from __future__ import annotations
 
@@ -80,6 +80,39 @@ def free_memory() -> int | None:
             if line.startswith("MemAvailable:"):
                 return int(line.split()[1]) << 10
     return None
+
+
+def machine_memory() -> int | None:
+    """Memory of this machine, or of the container that the program runs in [bytes]; None: unknown."""
+    sizes = []
+    with contextlib.suppress(AttributeError, ValueError, OSError):  # Windows
+        sizes.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    sizes += container_limits()
+    return min(sizes, default=None)
+
+
+def container_limits(root: Path = Path("/")) -> list[int]:
+    """What control groups allow this process [bytes], of either version (Linux).
+
+    ``root``: of the file system.
+    """
+    limits = []
+    with contextlib.suppress(OSError, ValueError):
+        for line in (root / "proc/self/cgroup").read_text().splitlines():
+            number, controllers, path = line.split(":", 2)
+            if number == "0":
+                base, name = root / "sys/fs/cgroup", "memory.max"
+            elif "memory" in controllers.split(","):
+                base, name = root / "sys/fs/cgroup/memory", "memory.limit_in_bytes"
+            else:
+                continue
+            folder = base / path.lstrip("/")
+            for each in (folder, *folder.parents):  # a limit of a group holds for those below
+                with contextlib.suppress(OSError, ValueError):  # "max", or a group that is not seen from here
+                    limits.append(int((each / name).read_text()))
+                if each == base:
+                    break
+    return limits
 
 
 def available_cores() -> int:

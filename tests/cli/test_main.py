@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run, shell
 from tests.forks import CLOSED, Forks
-from warpsplat.errors import CapacityError
+from warpsplat.errors import CapacityError, ExitCode
 from warpsplat.svg.viewer import render_own
 
 FULL = "/dev/full"
@@ -182,3 +182,11 @@ def test_whatever_is_raised_is_one_line_and_a_code(
     monkeypatch.setenv("WARPSPLAT_TRACEBACK", "1")
     assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
     assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--curves", "--seed", "--quality", "--background", "--levels", "--size"])
+def test_a_refused_value_is_shown_by_its_beginning(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """By click as well."""
+    assert run("vectorize", "a.png", option, 5000 * "9") == ExitCode.USAGE
+    said = one_line(capsys.readouterr().err)
+    assert 70 * "9" in said and 90 * "9" not in said

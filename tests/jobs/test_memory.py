@@ -23,7 +23,8 @@ from warpsplat.files.importance import load_importance
 from warpsplat.files.whole import load_whole
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs import memory
-from warpsplat.jobs.memory import container_limits, factor_for, mask_factor, memory_limit, need
+from warpsplat.jobs.memory import factor_for, mask_factor, memory_limit, need
+from warpsplat.native import container_limits
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 import warpsplat.configs
-from tests.cli.helpers import run
+from tests.cli.helpers import one_line, run
 from tests.jobs.helpers import load_jobs, write
 from tests.scenes import random_scene
-from warpsplat.errors import UsageError
+from warpsplat.errors import ExitCode, UsageError
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.jobs.batch.file import MAX_FILE
-from warpsplat.jobs.batch.layers import KEYS
+from warpsplat.jobs.batch.layers import KEYS, command_layer
 from warpsplat.jobs.batch.run import marked
 from warpsplat.jobs.keys import job_key
 from warpsplat.jobs.research import UNSET
@@ -193,13 +193,59 @@ def test_a_batch_file_is_bounded(tmp_path: Path) -> None:
         load_jobs(path)
 
 
-def test_aliases_are_not_multiplied(folder: Path) -> None:
-    """A value of a billion elements takes a line; its message does not take a billion."""
-    lines = ["jobs:", "  - images: in/a.png", "    device:", "      - &a0 [x, x, x, x, x, x, x, x, x]"]
-    lines += [f"      - &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 10)]
-    with pytest.raises(UsageError, match="device: must be one value") as caught:
-        load_jobs(write(folder, "\n".join(lines)))
-    assert len(str(caught.value)) < 1000
+@pytest.mark.parametrize("key", ["device: ", "rates: {points: ", "curves: ", "palette: "])
+def test_aliases_do_not_multiply(folder: Path, key: str) -> None:
+    """A value of a billion elements takes a line; neither building nor saying it takes a billion."""
+    bomb = ["&a0 [x, x, x, x, x, x, x, x, x]"]
+    bomb += [f"&a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 10)]
+    value = f"[{', '.join(bomb)}]" + key.count("{") * "}"
+    with pytest.raises(
+        UsageError, match=r"jobs\.yaml:3: aliases stand for more than 100000 values"
+    ) as caught:
+        load_jobs(write(folder, f"jobs:\n  - images: in/a.png\n    {key}{value}"))
+    assert len(str(caught.value)) < 300
+    with pytest.raises(UsageError, match="aliases stand for more than"):
+        command_layer({}, [f"rates.points={value.removesuffix('}')}"])
+
+
+def test_aliases_that_users_write(folder: Path) -> None:
+    text = """
+presets:
+  small: &small {curves: &few 9, rates: &rates {points: 0.5}}
+jobs:
+  - {images: in/a.png, curves: *few, rates: *rates, output: one}
+  - images: in/a.png
+    rates: {points: 0.25}
+    output: two
+"""
+    jobs = load_jobs(write(folder, text))
+    assert [job.settings.curves for job in jobs] == [9, 512]
+    assert [job.settings.rates["points"] for job in jobs] == [0.5, 0.25]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        f"rates: {{points: [{5000 * 'xyz, '}]}}",
+        f"curves: '{4000 * 'x'}'",
+        f"time-budget: 0x{4000 * 'f'}",
+        f"seed: 0x{4000 * 'f'}",
+        f"palette: ['{4000 * '#'}']",
+    ],
+)
+def test_a_refused_value_is_shown_by_its_beginning(folder: Path, value: str) -> None:
+    with pytest.raises(UsageError, match=r"jobs\.yaml:3: ") as caught:
+        load_jobs(write(folder, f"jobs:\n  - images: in/a.png\n    {value}"))
+    assert len(str(caught.value)) < len(str(folder)) + 250
+
+
+@pytest.mark.parametrize(
+    "key", ["palette", "output", "device", "importance", "size", "quality", "preset", "levels"]
+)
+def test_half_a_character(folder: Path, key: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, f'jobs:\n  - images: in/a.png\n    {key}: "\\ud800"')
+    assert run("batch", path) == ExitCode.USAGE
+    assert "jobs.yaml:3: " in one_line(capsys.readouterr().err)
 
 
 def test_files_of_others_are_named_before_anything_starts(

@@ -125,7 +125,7 @@ def test_settings_that_cannot_be_used(visitor: Visitor, settings: dict[str, obje
 @pytest.mark.parametrize(
     ("data", "status", "said"),
     [
-        (b"no image at all\n", 415, "photo.png: not an image, or a format that Pillow cannot read"),
+        (b"no image at all\n", 415, "photo.png: not an image of a format that is read: AVIF, "),
         (b"", 415, "photo.png: nothing came"),
         (picture()[:90], 415, "photo.png: damaged or unsupported image: "),
         (bytes(2_000_001), 413, "photo.png: has 2.0 MB; at most 2 MB are taken"),
@@ -179,6 +179,16 @@ def test_the_picture_of_an_image_was_made_here(visitor: Visitor) -> None:
         assert shown.size == (20, 30) and shown.getpixel((3, 3)) == (200, 10, 10, 128)
     (told,) = visitor.told()["images"]
     assert (told["width"], told["height"], told["transparent"]) == (20, 30, True)
+
+
+def test_an_image_that_is_longer_than_a_webp_can_be(visitor: Visitor) -> None:
+    """It is shown smaller; with more than a million pixels it is a WebP."""
+    buffer = io.BytesIO()
+    Image.effect_noise((20_000, 60), 90).save(buffer, "JPEG")
+    image = visitor.upload(buffer.getvalue())
+    answer = visitor.client.get(visitor.at("images", image))
+    with Image.open(io.BytesIO(answer.content)) as shown:
+        assert shown.size == (10_000, 30)
 
 
 def test_answers_have_safe_headers(visitor: Visitor) -> None:

@@ -9,12 +9,13 @@ import numpy.typing as npt
 
 from warpsplat.api.run import backend_on
 from warpsplat.api.svg import SvgSource, save_svg, svg_name_of, text_of
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import ImageError, UsageError, shown
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
 from warpsplat.jobs.render import RendererName, drawn
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render_into
+from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size
 
@@ -47,6 +48,7 @@ def render(
     Raises:
         UsageError: sizes of other proportions than the scene's, or of no pixel.
         ImageError: an SVG that cannot be read, or not by this renderer.
+        ResourceError: the picture takes more memory than there is.
     """
     if not isinstance(scene, Scene):
         text = text_of(scene, svg_name_of(scene))
@@ -71,8 +73,8 @@ def _zoom(size: tuple[float, float], width: int | None, height: int | None, scal
     if scale is not None and (width is not None or height is not None):
         raise UsageError("a scale, and a width or height besides")
     for what, side in (("width", width), ("height", height)):
-        if side is not None and (isinstance(side, bool) or int(side) != side or side < 1):
-            raise UsageError(f"{what} must be a whole number from 1, not {side!r}")
+        if side is not None and (isinstance(side, bool) or not 1 <= side <= MOST_SIDE or int(side) != side):
+            raise UsageError(f"{what} must be a whole number from 1 to {MOST_SIDE}, not {shown(side)}")
     if scale is not None:
         if not (math.isfinite(scale) and scale > 0):
             raise UsageError(f"scale must be a positive number, not {scale}")

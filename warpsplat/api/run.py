@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.fit.texts import parse_duration
 from warpsplat.fit.work import Progress
 from warpsplat.jobs.checkpoint import CheckpointFile
@@ -65,7 +65,7 @@ def backend_on(device: str, threads: int | None) -> Iterator[Backend]:
         UsageError: no such device, or number of threads.
     """
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        raise UsageError(f"threads must be a whole number from 1, not {threads!r}")
+        raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
     start_warp()
     backend = Backend.on(choose_device(device), threads)
     with turn(backend.device):

@@ -1,4 +1,4 @@
-"""Reading images: whatever Pillow opens, as sRGB on white, upright.
+"""Reading images: rasters of the formats that are read, as sRGB on white, upright.
 
 A photograph of 50 megapixels is 600 MB as floats, so that beside the result only strips of it are held.
 """
@@ -29,6 +29,13 @@ from warpsplat.scene import FloatArray
 
 Taken = TypeVar("Taken")
 
+FORMATS = (
+    *("PNG", "JPEG", "GIF", "BMP", "PPM", "WEBP", "AVIF", "TIFF", "JPEG2000", "ICO", "QOI", "PCX", "SGI"),
+    *("DDS", "PSD", "TGA"),  # TGA last: it has no mark of its own, so that much else may look like it
+)
+"""What is read, by Pillow's names: formats that are nothing but pixels. Others that Pillow opens are programs
+(EPS, which it gives to Ghostscript), drawings (WMF), wrappings of any other format (IPTC), or hardly seen."""
+
 MIN_SIDE = 2
 """Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""
 
@@ -41,6 +48,9 @@ PIXELS_A_BYTE = 10_000
 
 STRIP_PIXELS = 1 << 20
 """Pixels that are converted at a time."""
+
+WEBP_SIDE = 16_383
+"""Longest side of a WebP [px]: its head has 14 bits for one."""
 
 LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 """What Pillow makes of a sample 1 in PNGs of fewer than 8 bits; their transparent grey it leaves as it is."""
@@ -90,7 +100,7 @@ def read_image(
         with _decoding, warnings.catch_warnings(), _pixel_limit(), messages_hidden():
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(source)) as opened:
+            with open_image(source) as opened:
                 width, height = opened.size
                 if min(width, height) < MIN_SIDE:
                     least = f"at least {MIN_SIDE}x{MIN_SIDE} are needed"
@@ -109,13 +119,24 @@ def read_image(
     except MemoryError:
         raise
     except UnidentifiedImageError:
-        raise ImageError(f"{name}: not an image, or a format that Pillow cannot read") from None
+        raise ImageError(
+            f"{name}: not an image of a format that is read: {', '.join(sorted(FORMATS))}"
+        ) from None
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         limit = f"{MAX_PIXELS / 1e6:g} million pixels"
         raise ImageError(f"{name}: too large: more than {limit}") from None
     except Exception as error:  # Pillow's decoders raise nearly every kind of exception on broken data
         cause = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ImageError(f"{name}: damaged or unsupported image: {cause}") from error
+
+
+def open_image(data: bytes) -> Image.Image:
+    """An image of ``FORMATS``, its head read only: the one place where Pillow opens a file of unknown origin.
+
+    Raises:
+        UnidentifiedImageError: something else.
+    """
+    return Image.open(io.BytesIO(data), formats=FORMATS)
 
 
 _decoding = threading.Lock()
@@ -229,7 +250,7 @@ def image_facts(source: bytes) -> Facts | None:
     try:
         with _decoding, warnings.catch_warnings(), _pixel_limit(), messages_hidden():
             warnings.simplefilter("ignore")
-            with Image.open(io.BytesIO(source)) as image:
+            with open_image(source) as image:
                 width, height = image.size
                 turned = image.getexif().get(ExifTags.Base.Orientation, 1)
                 bands = 4 if is_deep(image) else SAMPLE_BYTES.get(image.mode, 4)

@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.fit.texts import parse_bytes, parse_duration, parse_levels, parse_palette
 from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
@@ -51,7 +51,7 @@ def check_whole(name: str, value: object, low: int, high: int) -> None:
         UsageError: it is not.
     """
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise UsageError(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+        raise UsageError(f"{name} must be a whole number from {low} to {high}, not {shown(value)}")
 
 
 def check_number(name: str, value: object, low: float, high: float) -> None:
@@ -61,7 +61,7 @@ def check_number(name: str, value: object, low: float, high: float) -> None:
         UsageError: it is not.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise UsageError(f"{name} must be a number from {low:g} to {high:g}, not {value!r}")
+        raise UsageError(f"{name} must be a number from {low:g} to {high:g}, not {shown(value)}")
 
 
 def default_rates() -> dict[str, float]:
@@ -248,16 +248,16 @@ class Settings:
             if goal is not None and (
                 isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < math.inf
             ):
-                raise UsageError(f"{name} must be a positive number, not {goal!r}")
+                raise UsageError(f"{name} must be a positive number, not {shown(goal)}")
         for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
             if not isinstance(value, kind):
-                raise UsageError(f"{name} must be a {kind.__name__}, not {value!r}")
+                raise UsageError(f"{name} must be a {kind.__name__}, not {shown(value)}")
         if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
             raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
         switches = ("through_scales", "viewer", "mixed", "ids", "minify", "opaque")
         for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
             if not isinstance(given, bool):
-                raise UsageError(f"{name} must be true or false, not {given!r}")
+                raise UsageError(f"{name} must be true or false, not {shown(given)}")
         self._check_levels()
         if self.colors is not None:
             check_whole("colors", self.colors, 1, MOST_COLORS)
@@ -277,14 +277,15 @@ class Settings:
             ("paint", self.paint, get_args(Painting)),
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
-            raise UsageError(f"background must be auto, none or a colour as #ffffff, not {self.background!r}")
+            given = shown(self.background)
+            raise UsageError(f"background must be auto, none or a colour as #ffffff, not {given}")
         if self.mixed and self.kind != Kind.FILL:
             raise UsageError("mixed and open do not go together")
         if self.mixed and self.renderer != "exact":
             raise UsageError(f"mixed and the renderer {self.renderer} do not go together")
         for name, choice, allowed in choices:
             if choice not in allowed:
-                raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {choice!r}")
+                raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {shown(choice)}")
 
     @property
     def is_limited(self) -> bool:
@@ -399,19 +400,19 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
         UsageError: an unknown name or a value out of range.
     """
     if quality not in PRESETS:
-        raise UsageError(f"quality must be one of {', '.join(PRESETS)}, not {quality!r}")
+        raise UsageError(f"quality must be one of {', '.join(PRESETS)}, not {shown(quality)}")
     known = {f.name for f in fields(Settings)}
     given = {name: value for name, value in overrides.items() if value is not None}
     layered = given.pop("layered", False)
     if not isinstance(layered, bool):
-        raise UsageError(f"layered must be true or false, not {layered!r}")
+        raise UsageError(f"layered must be true or false, not {shown(layered)}")
     if "levels" in given or layered:
         curves = given.get("curves", Settings.curves)
         given["levels"] = parse_levels(given["levels"]) if "levels" in given else levels_of(curves)
         given.setdefault("curves", given["levels"][-1])
     for name in given:
         if name not in known:
-            raise UsageError(f"unknown setting {name!r}")
+            raise UsageError(f"unknown setting {shown(name)}")
     if "time_budget" in given:
         given["time_budget"] = parse_duration(given["time_budget"])
     if "max_bytes" in given:
@@ -445,7 +446,7 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     if isinstance(given.get("basis"), str):
         if given["basis"].upper() not in Basis.__members__:
             choices = ", ".join(Basis.__members__).lower()
-            raise UsageError(f"basis must be one of {choices}, not {given['basis']!r}")
+            raise UsageError(f"basis must be one of {choices}, not {shown(given['basis'])}")
         given["basis"] = Basis[given["basis"].upper()]
     settings = replace(preset, **given)
     if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
@@ -468,5 +469,5 @@ def _known(name: str, given: Mapping[str, Any], known: tuple[str, ...]) -> dict[
     values = {key.replace("-", "_"): value for key, value in given.items()}
     for key in values:
         if key not in known:
-            raise UsageError(f"unknown setting {key!r} in {name}")
+            raise UsageError(f"unknown setting {shown(key)} in {name}")
     return values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 
 DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
@@ -17,15 +17,20 @@ MAX_DIGITS = 15
 """Digits of a time or size in a text: beyond, it is a slip of the keys."""
 
 
+def _words(value: object) -> str:
+    """A text itself; of anything else as much as can be right."""
+    return value if isinstance(value, str) else shown(value)
+
+
 def parse_duration(value: str | float) -> float:
     """``60``, ``60s``, ``2m`` or ``1.5h`` -> seconds.
 
     Raises:
         UsageError: none of these.
     """
-    found = DURATION.fullmatch(str(value).strip())
+    found = DURATION.fullmatch(_words(value).strip())
     if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
-        raise UsageError(f"not a time: {value!r}; write 60s or 2m")
+        raise UsageError(f"not a time: {shown(value)}; write 60s or 2m")
     return float(found[1]) * UNITS[(found[2] or "s").lower()]
 
 
@@ -35,9 +40,9 @@ def parse_bytes(value: str | int) -> int:
     Raises:
         UsageError: none of these.
     """
-    found = SIZE.fullmatch(str(value).strip())
+    found = SIZE.fullmatch(_words(value).strip())
     if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
-        raise UsageError(f"not a size: {value!r}; write 100KB, 1MB or 1GB")
+        raise UsageError(f"not a size: {shown(value)}; write 100KB, 1MB or 1GB")
     return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
 
 
@@ -47,11 +52,11 @@ def parse_levels(value: object) -> tuple[int, ...]:
     Raises:
         UsageError: something else.
     """
-    parts = value if isinstance(value, (list, tuple)) else str(value).split(",")
+    parts = value if isinstance(value, (list, tuple)) else _words(value).split(",")
     try:
         return tuple(int(str(part)) for part in parts)
     except ValueError as error:
-        raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {value!r}") from error
+        raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {shown(value)}") from error
 
 
 PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
@@ -63,12 +68,12 @@ def parse_palette(value: object) -> tuple[str, ...]:
     Raises:
         UsageError: something else.
     """
-    parts = value if isinstance(value, (list, tuple)) else re.split(r"[,\s]+", str(value).strip(", \t\n"))
+    parts = value if isinstance(value, (list, tuple)) else re.split(r"[,\s]+", _words(value).strip(", \t\n"))
     colors: dict[str, None] = {}
     for part in parts:
-        found = PALETTE_COLOR.fullmatch(str(part))
+        found = PALETTE_COLOR.fullmatch(_words(part))
         if not found:
-            raise UsageError(f"palette must be colours as #ff8800,#fff, not {part!r}")
+            raise UsageError(f"palette must be colours as #ff8800,#fff, not {shown(part)}")
         digits = found[1].lower()
         colors["#" + (digits if len(digits) == 6 else "".join(2 * digit for digit in digits))] = None
     return tuple(colors)

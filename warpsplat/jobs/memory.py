@@ -7,10 +7,7 @@ of what its parts hold beside the image: reading it, fitting or tracing, and mea
 from __future__ import annotations
 
 import math
-import os
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -20,6 +17,8 @@ from warpsplat.files.image import Facts, image_facts
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
+from warpsplat.native import machine_memory
+from warpsplat.rendering.room import SHARE, in_words
 from warpsplat.scene import Kind
 from warpsplat.svg.strips import WHOLE_PIXELS
 
@@ -66,9 +65,6 @@ read, a file that is not drawn in strips, and the image on a colour."""
 CLEARED = 150
 """Of a pixel of an image with opacity that an SVG is refined against, of whose size is what finds pixels that
 should be empty (``fit.clear``)."""
-
-SHARE = 0.9
-"""Of the machine's memory, where no limit is given: others are there."""
 
 LEAST_SIDE = 32
 """Of an image that is worked on smaller [px]."""
@@ -232,41 +228,3 @@ def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
         given = "max-memory is" if settings.max_memory else "memory for it is"
         size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
         raise ResourceError(f"{name}: {size}, {given} {in_words(limit)}; refine against a smaller image")
-
-
-def in_words(size: int) -> str:
-    """Bytes, for people."""
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
-
-
-def machine_memory() -> int | None:
-    """Memory of this machine, or of the container that the program runs in [bytes]; None: unknown."""
-    sizes = []
-    with suppress(AttributeError, ValueError, OSError):  # Windows
-        sizes.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    sizes += container_limits()
-    return min(sizes, default=None)
-
-
-def container_limits(root: Path = Path("/")) -> list[int]:
-    """What control groups allow this process [bytes], of either version (Linux).
-
-    ``root``: of the file system.
-    """
-    limits = []
-    with suppress(OSError, ValueError):
-        for line in (root / "proc/self/cgroup").read_text().splitlines():
-            number, controllers, path = line.split(":", 2)
-            if number == "0":
-                base, name = root / "sys/fs/cgroup", "memory.max"
-            elif "memory" in controllers.split(","):
-                base, name = root / "sys/fs/cgroup/memory", "memory.limit_in_bytes"
-            else:
-                continue
-            folder = base / path.lstrip("/")
-            for each in (folder, *folder.parents):  # a limit of a group holds for those below
-                with suppress(OSError, ValueError):  # "max", or a group that is not seen from here
-                    limits.append(int((each / name).read_text()))
-                if each == base:
-                    break
-    return limits

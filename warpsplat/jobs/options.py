@@ -145,8 +145,10 @@ def read_palette(path: Path) -> str:
         if len(found) > PALETTE_BYTES:
             raise UsageError(f"palette {printable(str(path))}: has more than {PALETTE_BYTES} bytes")
         return found.decode("ascii")
-    except (OSError, UnicodeDecodeError) as error:
-        cause = "no text" if isinstance(error, UnicodeDecodeError) else error.strerror
+    except (OSError, ValueError) as error:
+        cause = error.strerror if isinstance(error, OSError) else "no text"
+        if isinstance(error, UnicodeEncodeError) or "\0" in str(path):
+            cause = "holds a character that no name can have"
         raise UsageError(f"palette {printable(str(path))}: {cause}; colours begin with #") from error
 
 

@@ -14,13 +14,13 @@ from warpsplat.fit.settings import RANGES, Settings, solid_color
 from warpsplat.jobs.memory import (
     factor_for,
     facts_of,
-    in_words,
     mask_factor,
     memory_limit,
     need,
     whole_score,
 )
 from warpsplat.metrics import Rows, Score, score_svg
+from warpsplat.rendering.room import in_words
 from warpsplat.scene import FloatArray
 from warpsplat.scene.geometry import enlarged
 from warpsplat.svg.write import resized

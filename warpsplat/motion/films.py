@@ -15,6 +15,7 @@ from pathlib import Path
 from PIL import Image
 
 from warpsplat.errors import UsageError
+from warpsplat.files.image import WEBP_SIDE
 from warpsplat.files.output import GIF_COMMENT, MP4_MARK, WEBP_MARK
 from warpsplat.motion.timing import HOLD
 
@@ -66,13 +67,15 @@ def check_format(path: Path) -> None:
 
 
 def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
-    """Pixels of a film per pixel of a picture of ``size``, whose shorter side keeps a pixel."""
+    """Pixels of a film per pixel of a picture of ``size``, whose shorter side keeps a pixel if the longer one
+    has no more than ``WEBP_SIDE``, which is as many as encoders of H.264 take.
+    """
     if width is not None:
         zoom = width / size[0]
     else:
         most = FORMATS[path.suffix.lower()].side
         zoom = min(most, max(*size, LEAST_SIDE)) / max(size)
-    return max(zoom, 1 / min(size))
+    return min(max(zoom, 1 / min(size)), WEBP_SIDE / max(size))
 
 
 MOST_PIXELS = 80_000_000

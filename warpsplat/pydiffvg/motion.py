@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 
 Tensor = torch.Tensor
 
@@ -33,7 +33,7 @@ class Motion(torch.nn.Module):
         super().__init__()
         mode = settings["transform_mode"]
         if mode not in MODES:
-            raise UsageError(f"transform_mode {mode!r} is none of {', '.join(MODES)}")
+            raise UsageError(f"transform_mode {shown(mode)} is none of {', '.join(MODES)}")
         self.optimizes = bool(settings["optimize_transforms"])
         self._rates = settings["transform_lr"], settings["transform_lr"] * settings["translation_mult"]
         turn, scale, shear, shift = decompose(matrix.double())

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import torch
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.pydiffvg.color import LinearGradient, RadialGradient
 from warpsplat.pydiffvg.parse_svg import gradient_of
 from warpsplat.pydiffvg.save_svg import gradient_element
@@ -28,7 +28,7 @@ def optimizer_of(settings: dict[str, Any], groups: list[dict[str, Any]]) -> torc
     """
     name = settings["optimizer"]
     if name not in OPTIMIZERS:
-        raise UsageError(f"optimizer {name!r} is none of {', '.join(OPTIMIZERS)}")
+        raise UsageError(f"optimizer {shown(name)} is none of {', '.join(OPTIMIZERS)}")
     return OPTIMIZERS[name](groups)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.native import messages_hidden
 from warpsplat.rendering.kernel_cache import use_temporary_folder
 
@@ -40,4 +40,4 @@ def choose_device(name: str = "auto") -> wp.Device:
             return wp.get_device(name)
     except Exception as error:
         found = ", ".join(str(d) for d in wp.get_devices())
-        raise UsageError(f"unknown device {name!r}; here there are: {found}") from error
+        raise UsageError(f"unknown device {shown(name)}; here there are: {found}") from error

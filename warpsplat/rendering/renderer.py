@@ -18,6 +18,7 @@ from warpsplat.rendering.models import EXACT, Job, Model
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
+from warpsplat.rendering.room import check_room
 from warpsplat.rendering.tiles import from_tiles, to_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
@@ -83,9 +84,13 @@ class Renderer:
             capacity: without, a guess that ``make_room`` mends.
             opaque: whether shapes may have opacities beyond OPACITY_RANGE, and gradients even so.
             straight: whether colours are not premultiplied; on a transparent canvas, with any opacities.
+
+        Raises:
+            ResourceError: the picture takes more memory than there is.
         """
         self.parameters, self.viewport = parameters, viewport
         self.backend = parameters.backend
+        check_room(viewport, self.backend.device)
         self.model, self._opaque = model, opaque or straight
         self.film = (
             StraightFilm(self.backend, viewport, parameters.canvas)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.fit.settings import Settings
 from warpsplat.jobs.options import BY_NAME, settings_from
 
@@ -32,7 +32,7 @@ def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str,
         raise UsageError("settings must be an object")
     for name in given:
         if name not in FIELDS:
-            raise UsageError(f"unknown setting {name!r}; there are {', '.join(FIELDS)}")
+            raise UsageError(f"unknown setting {shown(name)}; there are {', '.join(FIELDS)}")
     values: dict[str, Any] = {
         name: value for name in FIELDS if (value := given.get(name)) is not None and value is not False
     }
@@ -40,7 +40,7 @@ def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str,
     for name, value in values.items():
         option = BY_NAME[name]
         if type(value) is not option.type:  # a bool is no number here
-            raise UsageError(f"{name} must be {JSON_NAMES[option.type]}, not {value!r}")
+            raise UsageError(f"{name} must be {JSON_NAMES[option.type]}, not {shown(value)}")
         if option.setting in keywords:
             raise UsageError("closed and open do not go together")
         keywords[option.setting] = value if option.kind is None else option.kind

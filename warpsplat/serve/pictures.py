@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpsplat.errors import ImageError, printable
-from warpsplat.files.image import image_facts, load_image
+from warpsplat.files.image import WEBP_SIDE, image_facts, load_image
 from warpsplat.jobs.render import to_pillow
 from warpsplat.native import release_memory
 from warpsplat.scene import FloatArray
@@ -83,7 +83,10 @@ def read_picture(data: bytes, name: str) -> Picture:
         raise ImageError(f"{name}: nothing came")
     facts = image_facts(data)
     factor = 1
-    while facts and facts.width * facts.height > SHOWN_PIXELS * factor**2:
+    while facts and (
+        facts.width * facts.height > SHOWN_PIXELS * factor**2
+        or max(facts.width, facts.height) > WEBP_SIDE * factor
+    ):
         factor *= 2
     pixels = load_image(data, name, paper=None, factor=factor)
     height, width = pixels.shape[:2]

@@ -15,6 +15,7 @@ import uvicorn
 
 from warpsplat.errors import UsageError, printable
 from warpsplat.serve.app import Service
+from warpsplat.serve.connections import Door, Protocol
 from warpsplat.serve.guard import TOKEN, Guard
 from warpsplat.serve.limits import Limits
 from warpsplat.serve.page import serve_page
@@ -106,7 +107,7 @@ class WarpsplatServer:
         logging.getLogger("uvicorn").setLevel(logging.CRITICAL)  # what it has to say is of clients' making
         config = uvicorn.Config(
             self._guard,
-            http="h11",
+            http=Protocol,
             ws="none",
             lifespan="on",
             log_config=None,
@@ -115,7 +116,7 @@ class WarpsplatServer:
             timeout_keep_alive=5,
             timeout_graceful_shutdown=LAST_ANSWERS,
         )
-        asyncio.run(_Uvicorn(config, self._is_over(stop), ready).serve([self._socket]))
+        asyncio.run(_Uvicorn(config, self._socket, self._is_over(stop), ready).serve([]))
 
     def _is_over(self, stop: Callable[[], bool]) -> Callable[[], bool]:
         def is_over() -> bool:
@@ -130,10 +131,14 @@ class _Uvicorn(uvicorn.Server):
     """Asks whether to stop, in place of signal handlers of its own: ours say what a second Ctrl-C does."""
 
     def __init__(
-        self, config: uvicorn.Config, is_over: Callable[[], bool], ready: Callable[[], None]
+        self,
+        config: uvicorn.Config,
+        listener: socket.socket,
+        is_over: Callable[[], bool],
+        ready: Callable[[], None],
     ) -> None:
         super().__init__(config)
-        self._is_over, self._ready = is_over, ready
+        self._listener, self._is_over, self._ready = listener, is_over, ready
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
@@ -143,9 +148,21 @@ class _Uvicorn(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begin to answer."""
         await super().startup(sockets)
+        self._door = Door(self._listener, self._protocol)
         self._is_over()  # from the first question on a signal is a wish
         self._ready()
 
+    def _protocol(self) -> Protocol:
+        return Protocol(self.config, self.server_state, self.lifespan.state)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Answer no more."""
+        self._door.close()
+        await super().shutdown(sockets)
+
     async def on_tick(self, counter: int) -> bool:
         """Whether to end; asked ten times a second."""
+        for connection in list(self.server_state.connections):
+            assert isinstance(connection, Protocol)
+            connection.close_if_idle()
         return self._is_over() or await super().on_tick(counter)

@@ -46,32 +46,57 @@ def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
     Raises:
         ImageError: a stroke reaches beyond it.
     """
-    following = np.roll(corners, -1, axis=0)
-    doubled = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
-    if not abs(doubled) > TOLERANCE:
+    ring = _oriented(corners)
+    if ring is None:
         return []
-    if doubled < 0:
-        corners = corners[::-1]
     kept: list[Shape] = []
-    for shape in shapes:
-        low, high = shape.box()
-        around = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
-        inward = [_heights(around, a, b) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-        if all((height >= -EDGE).all() for height in inward):
+    for shape, is_inside, is_outside in zip(shapes, *_places(shapes, ring), strict=True):
+        if is_inside:
             kept.append(shape)
-        elif any((height <= EDGE).all() for height in inward):
+        elif is_outside:
             continue
         elif shape.line is None:
-            parts = [part for part in (cut_subpath(s, corners) for s in shape.subpaths) if part]
+            parts = [part for part in (cut_subpath(s, ring) for s in shape.subpaths) if part]
             if parts:
-                kept.append(replace(shape, subpaths=parts, is_rect=False))
+                kept.append(replace(shape, subpaths=parts, is_rect=False, known_box=[]))
         else:
             raise ImageError("a stroke that a viewport cuts off is not supported")
     # A shape that was cut shares its points with none.
     return [
-        replace(shape, is_twin=shape.is_twin and i > 0 and kept[i - 1].subpaths is shape.subpaths)
+        replace(shape, is_twin=False)
+        if shape.is_twin and (i == 0 or kept[i - 1].subpaths is not shape.subpaths)
+        else shape
         for i, shape in enumerate(kept)
     ]
+
+
+def within(shapes: list[Shape], corners: Points) -> list[Shape]:
+    """The shapes that a convex polygon cuts nothing off."""
+    ring = _oriented(corners)
+    if ring is None:
+        return []
+    return [shape for shape, is_inside in zip(shapes, _places(shapes, ring)[0], strict=True) if is_inside]
+
+
+def _oriented(corners: Points) -> Points | None:
+    """The corners so that the inside lies to the left of the sides; None where there is none."""
+    following = np.roll(corners, -1, axis=0)
+    doubled = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
+    if not abs(doubled) > TOLERANCE:
+        return None
+    return corners if doubled > 0 else corners[::-1]
+
+
+def _places(shapes: list[Shape], ring: Points) -> tuple[list[bool], list[bool]]:
+    """Whether each shape lies inside of a polygon, and outside, as far as its box tells."""
+    if not shapes:
+        return [], []
+    boxes = np.stack([shape.box() for shape in shapes])
+    around = boxes.reshape(-1, 4)[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 4, 2)
+    inward = [_heights(around, a, b) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
+    inside = np.all([(height >= -EDGE).all(axis=1) for height in inward], axis=0)
+    outside = np.any([(height <= EDGE).all(axis=1) for height in inward], axis=0)
+    return inside.tolist(), outside.tolist()
 
 
 def _heights(points: Points, a: Points, b: Points) -> Points:

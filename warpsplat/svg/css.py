@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from warpsplat.errors import ImageError
+from warpsplat.svg.values import check_length
 
 Parents = Mapping[ElementTree.Element, ElementTree.Element]
+Classes = Callable[[ElementTree.Element], frozenset[str]]
 
 
 class Declaration(NamedTuple):
@@ -64,12 +66,12 @@ class _Compound:
     is_child: bool
     """Of an element that the compound before is about; else only inside it."""
 
-    def matches(self, element: ElementTree.Element, parents: Parents) -> bool:
+    def matches(self, element: ElementTree.Element, parents: Parents, classes: Classes) -> bool:
         if self.tag and str(element.tag).rpartition("}")[2] != self.tag:
             return False
         if any(element.get("id") != name for name in self.ids):
             return False
-        if self.classes and not set(self.classes) <= set(element.get("class", "").split()):
+        if self.classes and not classes(element).issuperset(self.classes):
             return False
         if self.is_first and element in parents and parents[element][0] is not element:
             return False
@@ -152,9 +154,14 @@ class _Rule:
     order: tuple[tuple[int, ...], int]
     """Specificity and place in the sheet."""
 
-    def matches(self, element: ElementTree.Element, parents: Parents) -> bool:
+    @property
+    def reads_text(self) -> bool:
+        """Whether it looks into values of attributes."""
+        return any(compound.attributes for compound in self.compounds)
+
+    def matches(self, element: ElementTree.Element, parents: Parents, classes: Classes) -> bool:
         *outer, last = self.compounds
-        if not last.matches(element, parents):
+        if not last.matches(element, parents, classes):
             return False
         if not outer:
             return True
@@ -168,7 +175,7 @@ class _Rule:
             here = [False] * (len(outer) + 1)
             for i, compound in enumerate(outer):
                 before = above[i] if compound.is_child else inside[i]
-                here[i + 1] = before and compound.matches(node, parents)
+                here[i + 1] = before and compound.matches(node, parents, classes)
             inside = [a or b for a, b in zip(inside, here, strict=True)]
             above = here
         return above[-1] if last.is_child else inside[-1]
@@ -176,7 +183,22 @@ class _Rule:
 
 ANIMATED = "uses animation, not supported: take the still SVG of the same picture"
 
-RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
+AT_RULE = re.compile(r"@(?:charset|namespace)\b[^;{}]{0,1000};|@font-face\s*\{[^{}]*\}")
+"""Those that say nothing of elements. Without a bound, each of many that do not end is looked through to the
+end of the text."""
+
+
+def rules(css: str) -> Iterator[tuple[str, str]]:
+    """Selectors and declarations of each rule of a text without comments and at-rules."""
+    parts = re.split(r"([{}])", css)  # texts, and what stands between them
+    for i in range(1, len(parts) - 2, 2):
+        if parts[i] == "{" and parts[i + 2] == "}":
+            yield parts[i - 1], parts[i + 1]
+
+
+MAX_WORK = 5_000_000
+"""Most looks at elements to find out which rules say something of them: they are as many as rules times
+elements where selectors are plain."""
 
 
 class StyleSheet:
@@ -193,14 +215,17 @@ class StyleSheet:
         """
         self._rules: dict[str, list[_Rule]] = {}
         """By what the last compound asks for first."""
-        css = without_comments(css).replace("<!--", "").replace("-->", "")
+        self._classes: dict[ElementTree.Element, frozenset[str]] = {}
+        self._work = 0
+        css = AT_RULE.sub("", without_comments(css).replace("<!--", "").replace("-->", ""))
         if "@keyframes" in css:
             raise ImageError(ANIMATED)
-        if "@" in re.sub(r"""@(?:charset|namespace)\b[^;{}]*;|@font-face\s*\{[^{}]*\}""", "", css):
+        if "@" in css:
             raise ImageError("uses a style sheet with @-rules, not supported")
-        css = re.sub(r"""@(?:charset|namespace)\b[^;{}]*;|@font-face\s*\{[^{}]*\}""", "", css)
-        for place, (selectors, body) in enumerate(RULE.findall(css)):
+        for place, (selectors, body) in enumerate(rules(css)):
             said = tuple(d for d in declarations(body) if d.name in known)
+            for one in said:
+                check_length(one.name, one.value)
             for selector in selectors.split(",") if said else ():
                 compounds = _compounds(selector.strip())
                 weight = tuple(map(sum, zip(*(c.weight() for c in compounds), strict=True)))
@@ -209,13 +234,44 @@ class StyleSheet:
                 )
 
     def of(self, element: ElementTree.Element, parents: Parents) -> Sequence[Declaration]:
-        """What the rules say of an element, what counts most last."""
+        """What the rules say of an element, what counts most last.
+
+        Raises:
+            ImageError: there are too many rules for too many elements.
+        """
         if not self._rules:
             return ()
         keys = ["", str(element.tag).rpartition("}")[2], f"#{element.get('id', '')}"]
-        keys += [f".{name}" for name in set(element.get("class", "").split())]
-        rules = [rule for key in keys for rule in self._rules.get(key, ()) if rule.matches(element, parents)]
-        return [d for rule in sorted(rules, key=lambda rule: rule.order) for d in rule.declarations]
+        keys += [f".{name}" for name in self._classes_of(element)]
+        asked = [rule for key in keys for rule in self._rules.get(key, ())]
+        depth = _depth(element, parents) if any(len(rule.compounds) > 1 for rule in asked) else 0
+        text = sum(map(len, element.attrib.values())) // CHARACTERS
+        self._work += sum(1 + text * rule.reads_text + depth * (len(rule.compounds) - 1) for rule in asked)
+        if self._work > MAX_WORK:
+            raise ImageError("has a style sheet of too many rules for its elements")
+        said = [rule for rule in asked if rule.matches(element, parents, self._classes_of)]
+        self._work += SAID * len(said)
+        return [d for rule in sorted(said, key=lambda rule: rule.order) for d in rule.declarations]
+
+    def _classes_of(self, element: ElementTree.Element) -> frozenset[str]:
+        if element not in self._classes:
+            self._classes[element] = frozenset(element.get("class", "").split())
+        return self._classes[element]
+
+
+SAID = 10
+"""Looks at elements that take as long as what a rule says does."""
+
+CHARACTERS = 100
+"""Of an attribute that take as long as a look at an element."""
+
+
+def _depth(element: ElementTree.Element, parents: Parents) -> int:
+    depth = 0
+    while element in parents:
+        element = parents[element]
+        depth += 1
+    return depth
 
 
 def _key(compound: _Compound) -> str:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
 from xml.etree import ElementTree
 
+from warpsplat.errors import ImageError
 from warpsplat.svg.css import StyleSheet
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.style import KNOWN, ROOT, Style, element_style
 
 Element = ElementTree.Element
+
+Found = TypeVar("Found")
 
 HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
 """Attributes that link elements; the first counts more (SVG 2, 16.1.3)."""
@@ -37,11 +42,31 @@ class Document:
             if "id" in element.attrib:
                 self._by_id.setdefault(element.attrib["id"], element)
             if name_of(element) == "style" and element.get("type", "text/css") == "text/css":
-                css.append("".join(element.itertext()))
+                # Not what is in further elements: of many within each other that would be many times as much.
+                css.append("".join([element.text or "", *(child.tail or "" for child in element)]))
         self.css = "\n".join(css)
         """Of all style sheets."""
         self._sheet = StyleSheet(self.css, KNOWN)
         self._styles: dict[Element, Style] = {}
+        self.found: dict[tuple[Callable[..., Any], Element], Any] = {}
+        """What functions have found out about elements, once however many others refer to these."""
+
+    def once(self, find: Callable[[Element, Document], Found], element: Element) -> Found:
+        """What ``find`` finds out about an element, from ``found`` where it is there.
+
+        Raises:
+            ImageError: as ``find`` does.
+        """
+        key = find, element
+        if key not in self.found:
+            try:
+                self.found[key] = find(element, self)
+            except ImageError as error:
+                self.found[key] = error
+        found = self.found[key]
+        if isinstance(found, ImageError):
+            raise ImageError(str(found))
+        return cast("Found", found)
 
     def linked(self, element: Element) -> Element | None:
         """What an element links to; None if it links to nothing in this document."""

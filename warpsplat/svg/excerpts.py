@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterable, Sequence
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Sequence
 from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 from warpsplat.errors import ImageError
-from warpsplat.svg.css import RULE, without_comments
+from warpsplat.svg.css import AT_RULE, rules, without_comments
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.inspect import view_box
 
 HEAD = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
-ATTRIBUTE = re.compile(r"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
+ATTRIBUTE = re.compile(r"""(?<!\s)\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
 REFERENCE = re.compile(
-    r"""url\(\s*(?:["']|&quot;|&apos;)?\s*\#([^"'()\s&]+)|href\s*=\s*["']\s*\#([^"']+?)\s*["']"""
+    r"""url\(\s*(?:(?:["']|&quot;|&apos;)\s*)?\#([^"'()\s&]+)|href\s*=\s*["']\s*\#([^"']+)["']"""
 )
 """Mention of another element."""
+
+ENTITY = re.compile(r"&([^&;\s]+);")
 
 STYLE_OF_ROOTS = re.compile(r"(?<![\w-])(?:x|y|width|height|overflow)\s*:[^;\"']*;?")
 OF_ROOTS = frozenset({"x", "y", "width", "height", "version", "baseProfile", "overflow"})
 """What means nothing, or something else, where a root has become an element: in its style, and attributes."""
 
-AT_RULE = re.compile(r"@(?:charset|namespace)\b[^;{}]*;|@font-face\s*\{[^{}]*\}")
 RELATIVE = re.compile(r"[+~](?!=)|:(?!hover|active|focus|visited|link)")
 """Selectors that ask which elements lie before others, some of which are not in an excerpt."""
 
@@ -72,13 +75,22 @@ class Excerpts:
         """What the elements, those that they are in, and style sheets refer to."""
         given = {inner for element in elements for inner in element.iter()}
         found: set[Element] = set()
-        todo = [self._document.css, *(text for element in elements for text in self._texts(element))]
+        seen: set[Element] = set()
+
+        def tags(element: Element) -> Iterator[str]:
+            """Start tags of what is in an element and around it, each once in all."""
+            for one in (*element.iter(), *self.path(element)):
+                if one not in seen:
+                    seen.add(one)
+                    yield self._slice(*self._spans[one][:2])
+
+        todo = [self._document.css, *(tag for element in elements for tag in tags(element))]
         while todo:
             for names in REFERENCE.findall(todo.pop()):
-                target = self._document.called(names[0] or names[1])
+                target = self._document.called(names[0] or names[1].rstrip())
                 if target is not None and target not in given and target not in found:
                     found.add(target)
-                    todo += self._texts(target)
+                    todo += tags(target)
         return [element for element in found if not found & set(self.path(element))]
 
     def style(self, scope: str) -> str:
@@ -88,29 +100,29 @@ class Excerpts:
             ImageError: rules that ask for what is not in an excerpt.
         """
         css = without_comments(self._document.css).replace("<!--", "").replace("-->", "")
-        rules = [rule for rule in AT_RULE.findall(css) if rule.startswith("@font-face")]
-        for selectors, body in RULE.findall(AT_RULE.sub("", css)):
+        said = [rule for rule in AT_RULE.findall(css) if rule.startswith("@font-face")]
+        for selectors, body in rules(AT_RULE.sub("", css)):
             for selector in map(str.strip, selectors.split(",")):
-                if RELATIVE.search(re.sub(r"\[[^\]]*\]", "", selector)):
+                if RELATIVE.search(re.sub(r"\[[^\[\]]*\]", "", selector)):
                     raise ImageError(f"uses the style sheet selector {selector[:40]!r}, which cannot be kept")
             scoped = ",".join(f".{scope} {selector.strip()}" for selector in selectors.split(","))
-            rules.append(f"{scoped}{{{body.strip()}}}")
-        return f"<style>{escape(''.join(rules))}</style>" if rules else ""
-
-    def _texts(self, element: Element) -> list[str]:
-        return [self._whole(element), *(self._slice(*self._spans[above][:2]) for above in self.path(element))]
+            said.append(f"{scoped}{{{body.strip()}}}")
+        return f"<style>{escape(''.join(said))}</style>" if said else ""
 
     def _slice(self, start: int, end: int) -> str:
         text = self._data[start:end].decode("utf-8", "surrogatepass")
-        for name, value in self._entities.items():
-            text = text.replace(f"&{name};", value)
-        return text
+        if not self._entities:
+            return text
+        return ENTITY.sub(lambda found: self._entities.get(found[1], found[0]), text)
 
     def _whole(self, element: Element) -> str:
         """An element without style sheets, which ``style`` has."""
         start, _, _, end = self._spans[element]
         parts = []
-        for sheet_start, sheet_end in self._sheets:
+        first = bisect_left(self._sheets, (start, 0))
+        for sheet_start, sheet_end in itertools.islice(self._sheets, first, None):
+            if sheet_start >= end:
+                break
             if start <= sheet_start and sheet_end <= end:
                 parts.append(self._slice(start, sheet_start))
                 start = sheet_end

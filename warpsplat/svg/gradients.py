@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, ti
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Subpath
 from warpsplat.svg.style import Style
-from warpsplat.svg.values import Color, Viewport, fraction, parse_color
+from warpsplat.svg.values import Color, Viewport, check_length, fraction, parse_color
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,22 @@ GRADIENTS = {"linearGradient", "radialGradient"}
 BLACK = Flat((0.0, 0.0, 0.0))
 """What is filled with a colour that is none; viewers agree on no other."""
 
-LINK = re.compile(r"""url\(\s*(["']?)\s*#?(.*?)\s*\1\s*\)\s*(.*)""", re.DOTALL)
+LINK = re.compile(r"""url\(\s*(["']?)\s*#?""")
+ENDS = {quote: re.compile(rf"{quote}\s*\)") for quote in ("", "'", '"')}
+"""How a link begins, and how it ends, by its quote. One pattern for both has many ways to share out spaces
+between its parts, and tries them all where there is no end."""
+
+
+def parse_link(text: str) -> tuple[str, str] | None:
+    """What ``url(#name)`` at the start of ``text`` names, and what comes after it; None: there is no link."""
+    found = LINK.match(text)
+    if not found:
+        return None
+    start = found.end()
+    end = ENDS[found[1]].search(text, start)
+    if not end:  # of a quote that does not end: a part of the name
+        start, end = found.start(1), ENDS[""].search(text, start)
+    return (text[start : end.start()].rstrip(), text[end.end() :].lstrip()) if end else None
 
 
 def resolve_paint(
@@ -70,11 +85,12 @@ def resolve_paint(
     Raises:
         ImageError: a pattern, or a paint that only some viewers know.
     """
-    found = LINK.match(text.strip())
-    if not found:
+    link = parse_link(text.strip())
+    if not link:
         return flat_paint(text, style)
-    element = document.called(found[2])
-    fallback = flat_paint(found[3], style) if found[3] else None
+    name, rest = link
+    element = document.called(name)
+    fallback = flat_paint(rest, style) if rest else None
     if element is None:
         return fallback
     if name_of(element) in {"pattern", "mesh", "meshgradient", "hatch", "solidcolor"}:
@@ -105,19 +121,20 @@ def _gradient(
     matrix: Matrix,
     fallback: Flat | None,
 ) -> Colouring | None:
-    chain = list(_chain(element, document))
-    with_stops = next((e for e in chain if any(name_of(child) == "stop" for child in e)), None)
-    if with_stops is None or any(name_of(e) not in GRADIENTS for e in chain[: chain.index(with_stops) + 1]):
+    heritage = _heritage(element, document)
+    if heritage.stops is None:
         return fallback
-    offsets, stops = _stops(with_stops, document)
+    offsets, stops = document.once(_stops, heritage.stops)
     if len(stops) == 1:
         return stops[0]
     is_radial = name_of(element) == "radialGradient"
 
     def said(name: str) -> str | None:
         """An attribute of the gradient or of those that it takes over from."""
-        alike = (e for e in chain if name in e.attrib and (name in COMMON or name_of(e) == name_of(element)))
-        return next((e.attrib[name] for e in alike if name_of(e) in GRADIENTS), None)
+        text = heritage.said.get(("" if name in COMMON else name_of(element), name))
+        if text is not None:
+            check_length(name, text)
+        return text
 
     of_box = said("gradientUnits") != "userSpaceOnUse"
     box = tight_box(subpaths)
@@ -156,14 +173,52 @@ COMMON = {"gradientUnits", "gradientTransform", "spreadMethod"}
 """Attributes that linear gradients take over from radial ones, and the other way round."""
 
 
-def _chain(element: Element, document: Document) -> Iterator[Element]:
-    """A gradient and those that it links to, one after another."""
-    seen: set[Element] = set()
+PLACES = {"x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "fr"}
+"""Those that they take over from their own kind only."""
+
+
+@dataclass(frozen=True)
+class Heritage:
+    """What a gradient has of its own and of those that it links to, one after another."""
+
+    stops: Element | None
+    """The first one with stops; None where there is none, or what is no gradient comes before."""
+    said: dict[tuple[str, str], str]
+    """Attributes by kind of gradient, empty for ``COMMON``, and name."""
+
+
+def _heritage(element: Element, document: Document) -> Heritage:
+    """Each gradient of a document is looked at once, whatever links to it; twice where links go in a ring."""
+    found = document.found
+    way: dict[Element, None] = {}
     at: Element | None = element
-    while at is not None and at not in seen:
-        yield at
-        seen.add(at)
+    while at is not None and (_heritage, at) not in found and at not in way:
+        way[at] = None
         at = document.linked(at)
+    back = list(way)[::-1]
+    heritage: Heritage = found.get((_heritage, at), NOTHING) if at is not None else NOTHING
+    if at in way:  # a ring: the first one of it takes over from the last one as well, so it needs two rounds
+        for one in back[: back.index(at) + 1]:
+            heritage = _taken_over(one, heritage)
+    for one in back:
+        found[_heritage, one] = heritage = _taken_over(one, heritage)
+    return heritage
+
+
+NOTHING = Heritage(None, {})
+
+
+def _taken_over(element: Element, heritage: Heritage) -> Heritage:
+    kind = name_of(element)
+    if kind not in GRADIENTS:
+        return Heritage(None, heritage.said)
+    own = {
+        ("" if name in COMMON else kind, name): text
+        for name, text in element.attrib.items()
+        if name in COMMON or name in PLACES
+    }
+    has_stops = any(name_of(child) == "stop" for child in element)
+    return Heritage(element if has_stops else heritage.stops, {**heritage.said, **own})
 
 
 def _linear_frame(get: Callable[[str, str], float]) -> Matrix | None:

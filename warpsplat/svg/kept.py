@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from warpsplat.errors import ImageError
-from warpsplat.svg.clip import clipped
+from warpsplat.svg.clip import clipped, within
 from warpsplat.svg.document import Document, Element
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import Shape
@@ -37,16 +37,17 @@ class Keeping:
     """Which elements of a document are kept: the smallest that show the same without what is around them."""
 
     def __init__(self, document: Document) -> None:
-        self._css = document.css
+        self._blends = "mix-blend-mode" in document.css
+        self._isolates = "isolation" in document.css
 
     def part(self, element: Element, error: ImageError) -> Kept:
         """An element that cannot be read for the reason that ``error`` says."""
-        styles = [self._css, *(child.get("style", "") for child in element.iter())]
-        return Kept(element, str(error), any("mix-blend-mode" in style for style in styles))
+        blends = self._blends or any("mix-blend-mode" in child.get("style", "") for child in element.iter())
+        return Kept(element, str(error), blends)
 
     def isolates(self, group: Element) -> bool:
         """Whether what is in a group blends with nothing below the group, clips aside."""
-        return "isolation" in self._css or "isolation" in group.get("style", "")
+        return self._isolates or "isolation" in group.get("style", "")
 
     def inside(self, parts: list[Part], clip: Points | None) -> list[Part]:
         """The parts of a group that isolates, or clips.
@@ -59,10 +60,11 @@ class Keeping:
         return parts if clip is None else list(self._clipped(parts, clip))
 
     def _clipped(self, parts: list[Part], clip: Points) -> Iterator[Part]:
+        inside = {id(shape) for shape in within(shapes_of(parts), clip)}
         for _, run in groupby(parts, lambda part: id(part.element)):
             alike = list(run)
             element, shapes = alike[0].element, shapes_of(alike)
-            if not shapes:
+            if all(id(shape) in inside for shape in shapes):
                 yield from alike
                 continue
             try:

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, cut, shown
 from warpsplat.svg.numbers import number
 from warpsplat.svg.write import GRIDS, MARK, NAMESPACE
 
@@ -70,7 +70,7 @@ def parse_size(text: str, unit: str = "mm") -> Sheet:
     check_unit(unit)
     found = SIZE.fullmatch(text.strip())
     if not found:
-        raise UsageError(f"not a size: {text!r}; write 200x150mm")
+        raise UsageError(f"not a size: {shown(text)}; write 200x150mm")
     factor = MILLIMETRES[(found[3] or unit).lower()]
     return _checked(Sheet(float(found[1]) * factor, float(found[2]) * factor, unit=unit), text)
 
@@ -90,7 +90,7 @@ def parse_page(name: str, width: int, height: int, margin: float = MARGIN, unit:
     """
     check_unit(unit)
     if name.lower() not in PAGES:
-        raise UsageError(f"page must be one of {', '.join(PAGES)}, not {name!r}")
+        raise UsageError(f"page must be one of {', '.join(PAGES)}, not {shown(name)}")
     short, long = PAGES[name.lower()]
     sides = (long, short) if width > height else (short, long)
     return _checked(Sheet(*sides, margin, unit), f"{name} with margins of {margin:g} mm")
@@ -103,13 +103,13 @@ def check_unit(unit: str) -> None:
         UsageError: they cannot.
     """
     if unit not in MILLIMETRES:
-        raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {unit!r}")
+        raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {shown(unit)}")
 
 
 def _checked(sheet: Sheet, name: str) -> Sheet:
     for side in (sheet.width, sheet.height):
         if not 0 < side <= LARGEST or sheet.margin < 0 or side <= 2 * sheet.margin:
-            raise UsageError(f"size {name} leaves no room, or has a side beyond {LARGEST:g} mm")
+            raise UsageError(f"size {cut(name)} leaves no room, or has a side beyond {LARGEST:g} mm")
     return sheet
 
 
@@ -121,7 +121,7 @@ def check_placing(size: str, page: str, unit: str) -> None:
     """
     for name, value in (("size", size), ("page", page), ("units", unit)):
         if not isinstance(value, str):  # as batch files and callers in Python may give it
-            raise UsageError(f"{name} must be text, not {value!r}")
+            raise UsageError(f"{name} must be text, not {shown(value)}")
     if size and page:
         raise UsageError("size and page do not go together")
     if size:

@@ -39,7 +39,8 @@ def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]
 
 def unused(prefix: str, text: str) -> str:
     """``prefix``, longer by as many of its last letter that no name in ``text`` is it and a digit."""
-    while re.search(rf"\b{prefix}\d", text):
+    taken = set(re.findall(rf"\b({prefix}{prefix[-1]}*)\d", text))
+    while prefix in taken:
         prefix += prefix[-1]
     return prefix
 

@@ -160,11 +160,17 @@ def _layers(names: list[str]) -> IntArray:
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int32)
 
 
+MAX_STOPS = 1_000_000
+"""Most stops of all shapes: those that share a gradient have each their own."""
+
+
 def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:
     """The scene with the gradients of its shapes."""
     ramps = [shape.paint if isinstance(shape.paint, Gradient) else None for shape in shapes]
     if not any(ramps):
         return scene
+    if sum(len(ramp.stops) for ramp in ramps if ramp) > MAX_STOPS:
+        raise ImageError(f"its gradients add up to more than {MAX_STOPS} stops")
     stops = list(chain.from_iterable(ramp.stops for ramp in ramps if ramp))
     return replace(
         scene,

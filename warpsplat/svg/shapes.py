@@ -7,7 +7,7 @@ because a picture that silently lost something is worse than none.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -64,10 +64,15 @@ class Shape:
     element: Element | None = None
     """That draws it and can be kept in its place; None where it cannot be."""
 
+    known_box: list[Points] = field(default_factory=list, repr=False, compare=False)
+    """``box``, once it was asked for; copies share it as long as they have the same outline."""
+
     def box(self) -> Points:
         """Least and largest coordinates, shape (2, 2)."""
-        reach = self.line.reach if self.line else 0.0
-        return tight_box(self.subpaths) + np.array([[-reach], [reach]])
+        if not self.known_box:
+            reach = self.line.reach if self.line else 0.0
+            self.known_box.append(tight_box(self.subpaths) + np.array([[-reach], [reach]]))
+        return self.known_box[0]
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,8 @@ class Place:
     viewport: Viewport
     context: tuple[str, str]
     """What ``context-fill`` and ``context-stroke`` mean."""
+    is_linked: bool = False
+    """Whether a link shows it, so that more of them may."""
 
 
 def element_shapes(element: Element, document: Document, place: Place) -> list[Shape]:
@@ -97,8 +104,11 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
     if style["visibility"] != "visible":
         raise ImageError(f"visibility {style['visibility'][:40]!r} is not known")
     line = _line(style, place) if style["stroke"] != "none" else None
-    data = outline(tag, element.attrib, place.viewport)
-    own = cubics(data, keep_dots=line is not None and line.cap != Cap.BUTT)
+    keeps_dots = line is not None and line.cap != Cap.BUTT
+    if tag == "path" and place.is_linked:
+        own = document.once(_with_dots if keeps_dots else _without_dots, element)
+    else:
+        own = cubics(outline(tag, element.attrib, place.viewport), keep_dots=keeps_dots)
     if not own:
         return []
     fill, stroke = (
@@ -121,6 +131,14 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
             shapes.reverse()
         shapes[1] = replace(shapes[1], is_twin=True)
     return shapes
+
+
+def _with_dots(path: Element, _: Document) -> list[Subpath]:
+    return cubics(path.get("d", ""), keep_dots=True)
+
+
+def _without_dots(path: Element, _: Document) -> list[Subpath]:
+    return cubics(path.get("d", ""), keep_dots=False)
 
 
 ANIMATIONS = {"animate", "animateTransform", "animateMotion", "set"}

@@ -35,6 +35,15 @@ from warpsplat.svg.values import Viewport, fraction, parse_color
 MAX_LINKED = 100_000
 """Most elements that links may add up to: they may multiply."""
 
+LINKED_CHARACTERS = 50
+"""Of the attributes of what is linked that count as an element."""
+
+MAX_WORK = 5_000_000
+"""Most shapes that groups may add up to that clip or fade: in one another they multiply."""
+
+PAIRS = 30
+"""Of shapes that are compared in the time that one is clipped."""
+
 MAX_DEPTH = 1000
 """Deepest nesting with what is linked."""
 
@@ -173,6 +182,8 @@ class _Walk:
         self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
         self._linked = 0
+        self._said_once: set[Element] = set()
+        self._work = 0
 
     def parts_in(self, matrix: Matrix, viewport: Viewport) -> list[Part]:
         """All shapes, drawn by ``matrix``, and what is kept."""
@@ -202,6 +213,8 @@ class _Walk:
         tag = name_of(element)
         if tag not in VISITED and tag not in REFUSED:
             return
+        if context.path:
+            self._add_linked(self._said(element) + (len(element) if tag in DRAWN else 0))
         style = self._document.style_in(element, context.style)
         if style["display"] == "none":
             return
@@ -220,7 +233,8 @@ class _Walk:
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         if tag in DRAWN:
             first = len(self._shapes)
-            shapes = element_shapes(element, self._document, Place(style, matrix, viewport, context.paints))
+            place = Place(style, matrix, viewport, context.paints, bool(context.path))
+            shapes = element_shapes(element, self._document, place)
             if self._keep and not context.link:
                 shapes = [replace(shape, element=element) for shape in shapes]
             if context.level:
@@ -237,16 +251,26 @@ class _Walk:
             self._children(element, inner)
 
     def _children(self, element: Element, context: _Context) -> None:
-        if context.depth > MAX_DEPTH:
-            raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
+        _check_depth(context)
         if context.path:
-            self._linked += len(element)
-            if self._linked > MAX_LINKED:
-                raise ImageError(f"links add up to more than {MAX_LINKED} elements")
+            self._add_linked(len(element))
         self._todo.extend((child, context) for child in reversed(element))
+
+    def _said(self, element: Element) -> int:
+        """As how many elements counts what one that is linked says: as none the first time."""
+        if element not in self._said_once:
+            self._said_once.add(element)
+            return 0
+        return sum(map(len, element.attrib.values())) // LINKED_CHARACTERS
+
+    def _add_linked(self, count: int) -> None:
+        self._linked += count
+        if self._linked > MAX_LINKED:
+            raise ImageError(f"links add up to more than {MAX_LINKED} elements")
 
     def _link(self, element: Element, context: _Context, unit: _Unit) -> None:
         """A ``use``."""
+        _check_depth(context)
         if self._document.links_out(element):
             raise ImageError("uses an element of another file, not supported")
         target = self._document.linked(element)
@@ -261,15 +285,14 @@ class _Walk:
         path = (*context.path, target)
         inner = replace(context, path=path, paints=(fill, stroke), use_size=(None, None), link=unit)
         if tag == "symbol":
+            self._add_linked(self._said(target))
             self._nested(element, inner, target, unit)
             return
         inner = replace(inner, matrix=product(context.matrix, translation(x, y)))
         if tag == "svg":
             width, height = (attribute(element.attrib, name, viewport) for name in ("width", "height"))
             inner = replace(inner, use_size=(width, height))
-        self._linked += 1
-        if self._linked > MAX_LINKED:
-            raise ImageError(f"links add up to more than {MAX_LINKED} elements")
+        self._add_linked(1)
         self._todo.append((target, inner))
 
     def _is_inside(self, element: Element, target: Element) -> bool:
@@ -327,6 +350,9 @@ class _Walk:
         if end.clip is None and end.opacity == 1 and not isolates:
             return
         parts = self._shapes[end.first :]
+        self._work += len(parts) + (len(parts) ** 2 // PAIRS if end.opacity < 1 else 0)
+        if self._work > MAX_WORK:
+            raise ImageError("has too many shapes in too many groups, one in the other, that clip or fade")
         if self._keep:
             parts = self._keep.inside(parts, end.clip)
         elif end.clip is not None:
@@ -356,6 +382,11 @@ class _Walk:
         self._shapes.append(
             Shape([polygon(moved(matrix, corners))], Flat(*color), 1.0, None, Rule.NONZERO, is_rect=True)
         )
+
+
+def _check_depth(context: _Context) -> None:
+    if context.depth > MAX_DEPTH:
+        raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
 
 
 VISITED = {*DRAWN, "svg", "g", "a", "use"}

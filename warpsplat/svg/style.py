@@ -10,7 +10,7 @@ from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import power
 from warpsplat.svg.css import Declaration, declarations
 from warpsplat.svg.inspect import LENGTH
-from warpsplat.svg.values import length
+from warpsplat.svg.values import check_length, length
 
 INHERITED = {
     "color": "black",
@@ -85,6 +85,8 @@ def element_style(element: ElementTree.Element, rules: Sequence[Declaration], pa
     style = {**parent, **OWN}
     tag = str(element.tag).rpartition("}")[2]
     for name, value in _said(element.attrib, rules).items():
+        if len(element) and name in INHERITED:
+            check_length(name, value)
         if name in GEOMETRY:
             if tag in DRAWN:
                 raise ImageError(f"sets {name} by style, not supported")

@@ -35,6 +35,20 @@ class Viewport:
         return math.sqrt((self.width * self.width + self.height * self.height) / 2)
 
 
+MAX_VALUE = 1000
+"""Longest value [characters] of what many elements may take over from one: each of them reads it."""
+
+
+def check_length(name: str, value: str) -> None:
+    """Refuse a value of more than ``MAX_VALUE``.
+
+    Raises:
+        ImageError: it is longer.
+    """
+    if len(value) > MAX_VALUE:
+        raise ImageError(f"says {name} in more than {MAX_VALUE} characters, not supported")
+
+
 def length(text: str, reference: float, name: str, font_size: float = 16.0) -> float | None:
     """A length [user units]; percentages are of ``reference``. None for what is no length.
 

@@ -7,7 +7,7 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import torch
@@ -21,6 +21,7 @@ from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Renderer
+from warpsplat.rendering.room import check_room
 from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
 from warpsplat.torch.tensors import attributes_of
@@ -208,18 +209,33 @@ def clear_cache() -> None:
     ENGINES.clear()
 
 
+def check_pictures(pictures: Sequence[Picture]) -> None:
+    """Whether there is memory for pictures of one size and device.
+
+    Raises:
+        UsageError: the device is neither a CPU nor CUDA.
+        ResourceError: there is not.
+    """
+    check_room(pictures[0].viewport, _device_of(pictures[0]), len(pictures))
+
+
 @contextlib.contextmanager
 def engine_of(picture: Picture) -> Iterator[Engine]:
     """The engine of ``picture``, for this thread alone and on torch's current stream."""
-    if picture.device.type not in ("cpu", "cuda"):
-        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
-    _start()
-    device = wp.device_from_torch(picture.device)
+    device = _device_of(picture)
     with turn(device), _on_stream(picture.device):
         engine = ENGINES.get(picture)
         with engine.lock:
             engine.follow(picture.device)
             yield engine
+
+
+def _device_of(picture: Picture) -> wp.Device:
+    if picture.device.type not in ("cpu", "cuda"):
+        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
+    _start()
+    device: wp.Device = wp.device_from_torch(picture.device)
+    return device
 
 
 @functools.cache

@@ -7,12 +7,13 @@ from typing import Any, Literal
 
 import torch
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
-from warpsplat.torch.engine import Picture, engine_of
+from warpsplat.torch.engine import Picture, check_pictures, engine_of
 from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
 
 Tensor = torch.Tensor
@@ -44,6 +45,7 @@ def render(
 
     Raises:
         UsageError: no such size, renderer or device, or no scene.
+        ResourceError: a picture takes more memory than there is.
         ValueError: a scene that the model cannot show, or a number that is not finite.
     """
     scenes = [scene] if isinstance(scene, SceneTensors) else list(scene)
@@ -71,7 +73,11 @@ def draw(pictures: Sequence[Picture], values: Sequence[Mapping[str, Tensor]]) ->
     """Pictures of one size and device from all attributes that their shapes have, unchecked.
 
     Shape (picture, height, width, 4).
+
+    Raises:
+        ResourceError: they take more memory than there is.
     """
+    check_pictures(pictures)
     names = tuple(map(tuple, values))
     images: Tensor = _Render.apply(pictures, names, *(value for each in values for value in each.values()))
     return images
@@ -109,7 +115,7 @@ def model_of(renderer: str | Model) -> Model:
     if not isinstance(renderer, str):
         return renderer
     if renderer not in MODELS:
-        raise UsageError(f"no renderer {renderer!r}; there are {', '.join(MODELS)}")
+        raise UsageError(f"no renderer {shown(renderer)}; there are {', '.join(MODELS)}")
     return MODELS[renderer]
 
 
@@ -120,8 +126,10 @@ def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewpo
         UsageError: a side is not a number of pixels, or the two would stretch the canvas.
     """
     for name, side in (("width", width), ("height", height)):
-        if side is not None and (isinstance(side, bool) or not isinstance(side, int) or side < 1):
-            raise UsageError(f"{name} must be a number of pixels, not {side!r}")
+        if side is not None and (
+            isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= MOST_SIDE
+        ):
+            raise UsageError(f"{name} must be a number of pixels, not {shown(side)}")
     if width is None and height is None:
         return Viewport(canvas.width, canvas.height)
     scale = width / canvas.width if width is not None else (height or 0) / canvas.height

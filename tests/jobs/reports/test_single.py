@@ -208,3 +208,16 @@ def test_by_the_library_and_back(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     text = warpsplat.report(SVG, grain(), path, name="a", device="cpu")
     assert path.read_text("utf-8") == text
+
+
+@pytest.mark.parametrize("size", [(17_000, 2), (2, 17_000)])
+def test_an_image_that_is_longer_than_a_webp_can_be(size: tuple[int, int]) -> None:
+    width, height = size
+    image = np.random.default_rng(0).integers(0, 256, (height, width, 3)).astype(np.uint8)
+    shown = shown_image(image, None)
+    assert (shown.width, shown.height) == size and shown.is_reduced
+    assert shown.pixels.shape[:2] == (height // 2, width // 2)
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'
+    svg = f'{head}<path d="M0 0h9v9z"/></svg>'
+    page = report_page(svg, image, Backend.on("cpu", 1), Facts(), name="long.png", svg_name="a.svg").text
+    assert f"{width} × {height}" in page and "data:image/webp;base64," in page

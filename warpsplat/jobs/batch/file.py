@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import ImageError, UsageError, cut, shown
 from warpsplat.files.inputs import read_input
 
 MAX_FILE = 1 << 20
@@ -20,6 +20,9 @@ MAX_DEPTH = 16
 
 MAX_SCALAR = 4096
 """Longest single value [characters]: that of the longest path."""
+
+MAX_ALIASED = 100_000
+"""Most values that the aliases of a file stand for: those of aliases of aliases multiply."""
 
 
 class BatchFile:
@@ -36,7 +39,7 @@ class BatchFile:
         self.loader: Any = None
         try:
             self.loader = yaml.SafeLoader(text)
-            self._check()
+            _check(self.loader, self.error)
             self.root = yaml.compose(text, yaml.SafeLoader)
             self.loader = yaml.SafeLoader("")
         except yaml.MarkedYAMLError as error:
@@ -49,18 +52,6 @@ class BatchFile:
             # An escape beyond Unicode, say: the scanner lets chr() raise.
             cause = str(error).splitlines()[0]
             raise self.error(self.loader.line + 1 if self.loader else 1, f"not valid YAML: {cause}") from None
-
-    def _check(self) -> None:
-        """Refuse what is too deep or too long for a batch file before it is built."""
-        depth = 0
-        while self.loader.check_event():
-            event = self.loader.get_event()
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            line = event.start_mark.line + 1 if event.start_mark else 1
-            if depth > MAX_DEPTH:
-                raise self.error(line, f"nested deeper than {MAX_DEPTH} levels")
-            if isinstance(event, yaml.ScalarEvent) and len(event.value) > MAX_SCALAR:
-                raise self.error(line, f"a value of more than {MAX_SCALAR} characters")
 
     def error(self, line: int, message: str) -> UsageError:
         """An error that names the file and the line."""
@@ -83,10 +74,10 @@ class BatchFile:
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
             if key not in allowed:
                 raise self.error(
-                    line, f"unknown key {key[:100]!r} in {where}; known are: {', '.join(allowed)}"
+                    line, f"unknown key {shown(key)} in {where}; known are: {', '.join(allowed)}"
                 )
             if key in result:
-                raise self.error(line, f"key {key!r} is there twice in {where}")
+                raise self.error(line, f"key {shown(key)} is there twice in {where}")
             result[key] = (line, value_node)
         return result
 
@@ -110,7 +101,60 @@ class BatchFile:
             UsageError: it is no text, or holds what no name can.
         """
         if not isinstance(value, str):
-            raise self.error(line, f"{key}: must be text, not {value!r}")
+            raise self.error(line, f"{key}: must be text, not {shown(value)}")
         if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
-            raise self.error(line, f"{key}: {value!r} holds a character that no name can have")
+            raise self.error(line, f"{key}: {shown(value)} holds a character that no name can have")
         return value
+
+
+def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
+    """Refuse what is too deep, too long or too much for a batch file before it is built.
+
+    Raises:
+        UsageError: by ``error``, of a line and a message.
+    """
+    sizes: dict[str, int] = {}
+    """Values that each anchor stands for, itself among them."""
+    around: list[tuple[str, int]] = []
+    """Anchors of the collections that are open, and how many values there were before each."""
+    values = aliased = 0
+    while loader.check_event():
+        event = loader.get_event()
+        line = event.start_mark.line + 1 if event.start_mark else 1
+        anchor = getattr(event, "anchor", None) or ""
+        size = 0
+        if isinstance(event, yaml.AliasEvent):
+            size = sizes.get(anchor, 1)
+            aliased += size
+            if aliased > MAX_ALIASED:
+                raise error(
+                    line, f"aliases stand for more than {MAX_ALIASED} values, the last is *{cut(anchor)}"
+                )
+        elif isinstance(event, yaml.CollectionStartEvent):
+            around.append((anchor, values))
+            size = 1
+            if len(around) > MAX_DEPTH:
+                raise error(line, f"nested deeper than {MAX_DEPTH} levels")
+        elif isinstance(event, yaml.ScalarEvent):
+            size = sizes[anchor] = 1 + len(event.value) // CHARACTERS
+            if len(event.value) > MAX_SCALAR:
+                raise error(line, f"a value of more than {MAX_SCALAR} characters")
+        values += size
+        if isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = around.pop()
+            sizes[anchor] = values - before
+
+
+CHARACTERS = 100
+"""Of a long value that count as one more."""
+
+
+def plain(text: str) -> Any:
+    """A value as YAML has it, within the bounds of batch files.
+
+    Raises:
+        UsageError: beyond them.
+        yaml.YAMLError: no plain value.
+    """
+    _check(yaml.SafeLoader(text), lambda _, message: UsageError(message))
+    return yaml.safe_load(text)

@@ -14,8 +14,8 @@ from typing import Any
 
 import yaml
 
-from warpsplat.errors import UsageError
-from warpsplat.jobs.batch.file import BatchFile
+from warpsplat.errors import UsageError, cut, shown
+from warpsplat.jobs.batch.file import BatchFile, plain
 from warpsplat.jobs.options import BY_NAME, KINDS, settings_from
 from warpsplat.jobs.research import NESTED, RESEARCH_KEYS
 
@@ -103,10 +103,10 @@ def checked(key: str, value: Any, place: Place) -> None:
             raise UsageError(f"{name} has no value")
         if key in KINDS:
             if value is not True:
-                raise UsageError(f"must be true, not {value!r}; leave it out or give the other kind")
+                raise UsageError(f"must be true, not {shown(value)}; leave it out or give the other kind")
         elif key in TEXT_KEYS:
             if not isinstance(value, str):
-                raise UsageError(f"must be text, not {value!r}")
+                raise UsageError(f"must be text, not {shown(value)}")
         elif key == "curves" and isinstance(value, str) and "," in value:
             numbers = ", ".join(word.strip() for word in value.split(","))
             raise UsageError(f"takes one number; for one job with each, {MATRIX}: {{{key}: [{numbers}]}}")
@@ -131,13 +131,13 @@ def assigned(text: str) -> tuple[str, Any]:
     name, found, written = text.partition("=")
     key, dot, inner = name.partition(".")
     if not found:
-        raise UsageError(f"--set {text}: must be KEY=VALUE")
+        raise UsageError(f"--set {cut(text)}: must be KEY=VALUE")
     if key not in KEYS or bool(dot) != (key in NESTED) or (dot and inner not in NESTED[key]):
-        raise UsageError(f"--set {text}: unknown key {name[:100]!r}; the keys are those of batch files")
+        raise UsageError(f"--set {cut(text)}: unknown key {shown(name)}; the keys are those of batch files")
     try:
-        value = written if key in TEXT_KEYS else yaml.safe_load(written)
+        value = written if key in TEXT_KEYS else plain(written)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise UsageError(f"--set {text}: no plain value") from error
+        raise UsageError(f"--set {cut(text)}: no plain value") from error
     return key, {inner: value} if dot else value
 
 
@@ -158,8 +158,8 @@ def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Va
     for text in sets:
         key, value = assigned(text)
         if key in layer and not (key in NESTED and not layer[key].value.keys() & value.keys()):
-            raise UsageError(f"--set {text}: {key} is given twice")
-        one = _given(f"--set {text}", key, value)
+            raise UsageError(f"--set {cut(text)}: {key} is given twice")
+        one = _given(f"--set {cut(text)}", key, value)
         layer[key] = Value({**layer[key].value, **value}, one.place, one.base) if key in layer else one
     _check_kinds(layer)
     return layer

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.files.output import check_folder, check_target
 from warpsplat.files.remote import check_remote, is_remote, is_url, remote
 from warpsplat.fit.settings import DEFAULT_QUALITY, Settings
@@ -115,7 +115,8 @@ def filled_in(item: Wanted) -> Path:
         if found[0] in ("{{", "}}"):
             return found[0][0]
         if found[1] not in fields:
-            raise item.place(f"output: {found[0]!r} is no field; they are stem, name, folder, and all keys")
+            named = shown(found[0])
+            raise item.place(f"output: {named} is no field; they are stem, name, folder, and all keys")
         text = _text(fields[found[1]])
         return text if found[1] == "folder" else text.replace("/", "_").replace(os.sep, "_")
 

@@ -29,7 +29,7 @@ from typing import Any
 
 import yaml
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.remote import is_remote, is_url, remote
 from warpsplat.fit.settings import Settings
@@ -118,7 +118,7 @@ def _presets(file: BatchFile, line: int, node: yaml.Node) -> dict[str, Layer]:
         raise file.error(line, "presets: must be a mapping of names to settings")
     names = tuple(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
     return {
-        name: layer_of(file, file.mapping(inner, f"preset {name[:100]!r}", (MATRIX, *KEYS)))
+        name: layer_of(file, file.mapping(inner, f"preset {shown(name)}", (MATRIX, *KEYS)))
         for name, (_, inner) in file.mapping(node, "presets", names).items()
     }
 
@@ -131,7 +131,7 @@ def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets:
     name = file.text(line, PRESET, file.value(node))
     if name not in presets:
         known = ", ".join(presets) or "none"
-        raise file.error(line, f"{PRESET}: there is no {name[:100]!r}; known are: {known}")
+        raise file.error(line, f"{PRESET}: there is no {shown(name)}; known are: {known}")
     return {**presets[name], PRESET: Value(name, file.place(line), file.path.parent)}
 
 

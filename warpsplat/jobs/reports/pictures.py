@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from warpsplat.files.image import WEBP_SIDE
 from warpsplat.files.sources import ImageSource, image_of
 from warpsplat.jobs.memory import facts_of
 from warpsplat.pages.embed import image_uri
@@ -59,13 +60,17 @@ class Shown:
 
 
 def shown_image(source: ImageSource, name: str | None, most: int = PAGE_PIXELS) -> Shown:
-    """The image, smaller by a whole factor where it has more than ``most`` pixels.
+    """The image, smaller by a whole factor where it has more than ``most`` pixels or is too long for a WebP.
 
     Raises:
         ImageError, TypeError: as ``image_of``.
     """
     facts = facts_of(source)
-    factor = max(1, math.ceil(math.sqrt(facts.width * facts.height / most))) if facts else 1
+    factor = 1
+    if facts:
+        factor = math.ceil(
+            max(1, math.sqrt(facts.width * facts.height / most), max(facts.width, facts.height) / WEBP_SIDE)
+        )
     pixels = image_of(source, name, factor=factor)
     height, width = pixels.shape[:2]
     return Shown(pixels, facts.width if facts else width, facts.height if facts else height)

@@ -1,0 +1,114 @@
+"""Which formats are read: those that are nothing but pixels."""
+
+from __future__ import annotations
+
+import ast
+import io
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from PIL import EpsImagePlugin, Image, ImageFile
+
+import warpsplat
+from tests import ROOT
+from tests.cli.helpers import one_line, run
+from warpsplat.errors import ExitCode, ImageError
+from warpsplat.files.image import FORMATS, image_facts, load_image
+from warpsplat.files.importance import load_importance
+from warpsplat.jobs.batch.images import ENDINGS
+from warpsplat.serve.pictures import read_picture
+
+ENDLESS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 16 16\n%%EndComments\n{} loop\nshowpage\n%%EOF\n"
+"""A program that does not end."""
+
+PIXELS = set(FORMATS) | {"MPO"}
+"""An MPO is a JPEG with further ones behind it, and opened as one."""
+
+REFUSED = {
+    *("EPS", "PDF", "WMF", "FPX", "MIC", "BUFR", "GRIB", "HDF5", "MPEG"),  # programs, documents, stubs, films
+    *("IPTC", "ICNS", "CUR", "DIB", "DCX", "FITS", "FLI", "FTEX", "BLP", "GBR", "IM", "IMT", "MCIDAS"),
+    *("MSP", "PALM", "PCD", "PIXAR", "SPIDER", "SUN", "XBM", "XPM", "XVTHUMB"),
+}
+"""What Pillow knows besides, looked at one by one."""
+
+
+@pytest.fixture
+def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Those that Ghostscript would have run; it need not be installed."""
+    ran: list[str] = []
+
+    def interpret(*_: object, **__: object) -> object:
+        ran.append("gs")
+        return Image.new("RGB", (16, 16)).im
+
+    monkeypatch.setattr(EpsImagePlugin, "Ghostscript", interpret)
+    return ran
+
+
+def test_postscript_is_run_by_nothing_that_reads_images(tmp_path: Path, programs: list[str]) -> None:
+    path = tmp_path / "x.png"
+    path.write_bytes(ENDLESS)
+    said = rf"x\.png: not an image of a format that is read: {', '.join(sorted(FORMATS))}$"
+    for read in (
+        lambda: load_image(path),
+        lambda: load_image(ENDLESS, "x.png"),
+        lambda: load_importance(path, 16, 16),
+        lambda: read_picture(ENDLESS, "x.png"),
+        lambda: warpsplat.load_image(path),
+    ):
+        with pytest.raises(ImageError, match=said):
+            read()
+    assert image_facts(ENDLESS) is None
+    assert programs == []
+
+
+def test_the_program_says_so_in_one_line(
+    tmp_path: Path, programs: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.png"
+    path.write_bytes(ENDLESS)
+    assert run("vectorize", path, "-o", tmp_path / "x.svg") == ExitCode.INPUT
+    assert "x.png: not an image of a format that is read: AVIF, BMP, " in one_line(capsys.readouterr().err)
+    assert programs == []
+
+
+def test_every_format_of_pillows_is_decided_on() -> None:
+    """One that a later Pillow knows is not read, and shows up here."""
+    Image.init()
+    assert not PIXELS & REFUSED
+    assert (set(Image.OPEN) | set(Image.SAVE)) - PIXELS == REFUSED & (set(Image.OPEN) | set(Image.SAVE))
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_no_format_that_is_read_starts_a_program(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("starts a program")
+
+    Image.init()
+    factory = Image.OPEN[form][0]
+    assert not (isinstance(factory, type) and issubclass(factory, ImageFile.StubImageFile))
+    if form not in Image.SAVE:  # PSD
+        return
+    data = io.BytesIO()
+    Image.new("RGB", (16, 16), "teal").save(data, form)
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    monkeypatch.setattr(os, "system", refuse)
+    assert load_image(data.getvalue(), form).shape == (16, 16, 3)
+
+
+def test_the_formats_of_folders_are_read() -> None:
+    Image.init()
+    assert {Image.registered_extensions()[ending] for ending in ENDINGS if ending != ".jfif"} <= PIXELS
+
+
+def test_files_of_unknown_origin_are_opened_in_one_place() -> None:
+    calls = [
+        f"{path.relative_to(ROOT)}: {ast.unparse(node)}"
+        for folder in ("warpsplat", "cli", "examples")
+        for path in (ROOT / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Image.open"
+    ]
+    assert calls == ["warpsplat/files/image.py: Image.open(io.BytesIO(data), formats=FORMATS)"]

@@ -1,0 +1,71 @@
+"""Pictures that no memory holds are refused before anything is allocated for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+import torch
+
+import warpsplat
+from tests.scenes import random_scene
+from warpsplat import pydiffvg
+from warpsplat.errors import ResourceError, UsageError
+from warpsplat.rendering import backend, room
+from warpsplat.scene import Kind
+from warpsplat.torch import SceneTensors
+from warpsplat.torch import render as render_tensors
+
+SCENE = random_scene(Kind.FILL, width=40, height=40)
+
+
+def by_pydiffvg(side: int) -> object:
+    path = pydiffvg.Path(
+        num_control_points=torch.tensor([0, 0, 0]),
+        points=torch.tensor([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0]]),
+        is_closed=True,
+    )
+    group = pydiffvg.ShapeGroup(shape_ids=torch.tensor([0]), fill_color=torch.tensor([1.0, 0.0, 0.0, 1.0]))
+    scene = pydiffvg.RenderFunction.serialize_scene(side, side, [path], [group])
+    return pydiffvg.RenderFunction.apply(side, side, 2, 2, 0, None, *scene)
+
+
+WAYS: dict[str, Callable[[int], object]] = {
+    "scene": lambda side: warpsplat.render(SCENE, side, device="cpu"),
+    "splat": lambda side: warpsplat.render(SCENE, side, side, device="cpu", renderer="splat"),
+    "scale": lambda side: warpsplat.render(SCENE, scale=side / 40, device="cpu"),
+    "tensors": lambda side: render_tensors(SceneTensors.of(SCENE), side, side),
+    "several": lambda side: render_tensors([SceneTensors.of(SCENE)] * 3, side),
+    "pydiffvg": by_pydiffvg,
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("side", [30_000, 200_000])
+def test_what_no_memory_holds(way: str, side: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "machine_memory", lambda: 8 * 10**9)
+    made: list[int] = []
+    array = backend.Backend.array
+
+    def counted(self: backend.Backend, dtype: object, *shape: int) -> object:
+        made.extend(shape)
+        return array(self, dtype, *shape)
+
+    monkeypatch.setattr(backend.Backend, "array", counted)
+    with pytest.raises(ResourceError, match=rf"of {side}x{side} px would take about .* 7\.2 GB; draw it"):
+        WAYS[way](side)
+    assert max(made, default=0) < 10**6
+
+
+def test_what_is_small_is_drawn_without_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "machine_memory", lambda: pytest.fail("asked"))
+    assert warpsplat.render(SCENE, 80, device="cpu").shape == (80, 80, 4)
+    assert render_tensors(SceneTensors.of(SCENE), 80).shape == (80, 80, 4)
+
+
+def test_sides_beyond_any_number() -> None:
+    for way in ("scene", "tensors"):
+        with pytest.raises(UsageError, match=r"width must be a (whole )?number"):
+            WAYS[way](10**400)
+    with pytest.raises(ResourceError, match="GB"):
+        warpsplat.render(SCENE, scale=1e300, device="cpu")
