@@ -126,7 +126,7 @@ def test_a_stream_of_events_is_not_idle(monkeypatch: pytest.MonkeyPatch) -> None
     with Visitor() as visitor, visitor.client.stream("GET", visitor.at("events")) as answer:
         lines = answer.iter_lines()
         next(lines)
-        until(lambda: looks[-1] > looks[0] + 1)
+        until(lambda: looks and looks[-1] > looks[0] + 1)
         visitor.upload(picture())
         assert any('"photo.png"' in line for line in lines)
 
