@@ -8,41 +8,48 @@ from typing import Any
 import warpsplat
 from tests.golden.pictures import PICTURES
 
-SHORT: dict[str, Any] = {"curves": 16, "iterations": 60}
+TURNED = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 48" width="64" height="48">
+<defs><linearGradient id="g" gradientTransform="rotate(20)"><stop stop-color="#fa8"/>
+<stop offset="1" stop-color="#a64"/></linearGradient></defs><rect width="64" height="48" fill="#1e3c78"/>
+<ellipse cx="30" cy="25" rx="24" ry="15" transform="rotate(17 32 24)" fill="url(#g)"/>
+<path d="M8 40A9 6 30 1 1 20 44L14 30Z" fill="#345" fill-opacity=".7"/>
+<path d="M5 8Q30 2 58 9" fill="none" stroke="#fff" stroke-width="2" stroke-dasharray="5 2"/>
+</svg>"""
+"""Something to refine: arcs, turns, a gradient and dashes."""
+
+SHORT: dict[str, Any] = {"curves": 16, "iterations": 40}
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "photo closed": ("photo", {**SHORT}),
     "photo closed, another seed": ("photo", {**SHORT, "seed": 7}),
     "photo closed, draft": ("photo", {**SHORT, "quality": "draft"}),
-    "photo closed, high": ("photo", {**SHORT, "quality": "high"}),
     "photo open": ("photo", {**SHORT, "open": True}),
     "photo mixed": ("sketch", {**SHORT, "subject": "photo", "mixed": True}),
     "photo layered": ("photo", {**SHORT, "layered": True}),
-    "photo levels": ("photo", {"levels": "4,8,16", "iterations": 60}),
+    "photo levels": ("photo", {"levels": "4,8,16", "iterations": 40}),
     "photo opaque": ("photo", {**SHORT, "opaque": True}),
     "photo colors": ("photo", {**SHORT, "colors": 5}),
     "photo palette": ("photo", {**SHORT, "palette": "#302018,#806040,#c0a080,#f0e8e0"}),
     "photo linear": ("photo", {**SHORT, "paint": "linear"}),
     "photo radial": ("photo", {**SHORT, "paint": "radial"}),
-    "photo auto paint": ("photo", {**SHORT, "paint": "auto"}),
     "photo importance": ("photo", {**SHORT, "importance": "sketch"}),
     "photo splat": ("photo", {**SHORT, "renderer": "splat"}),
     "photo gaussian": ("photo", {**SHORT, "renderer": "gaussian"}),
-    "photo target-psnr": ("photo", {"target_psnr": 22.0, "iterations": 60}),
-    "photo max-bytes": ("photo", {"max_bytes": 900, "iterations": 60}),
+    "photo target-psnr": ("photo", {"target_psnr": 22.0, "iterations": 40}),
+    "photo max-bytes": ("photo", {"max_bytes": 900, "iterations": 40}),
     "photo minified": ("photo", {**SHORT, "minify": True, "precision": 2, "ids": True}),
     "transparent closed": ("transparent", {**SHORT}),
     "drawing": ("logo", {"subject": "drawing"}),
-    "drawing, draft": ("logo", {"subject": "drawing", "quality": "draft"}),
     "drawing, colors": ("logo", {"subject": "drawing", "colors": 3}),
     "drawing, max-bytes": ("logo", {"subject": "drawing", "max_bytes": 320}),
     "drawing, shaded": ("shaded", {"subject": "drawing"}),
     "drawing, transparent": ("transparent", {"subject": "drawing"}),
     "line": ("sketch", {"subject": "line"}),
     "line on a page": ("sketch", {"subject": "line", "page": "a5"}),
-    "line, mixed": ("sketch", {"subject": "line", "mixed": True}),
+    "line, mixed": ("logo", {"subject": "line", "mixed": True}),
     "pixel": ("sprite", {"subject": "pixel"}),
-    "photo of a drawing": ("logo", {**SHORT, "subject": "photo", "paint": "auto"}),
+    "photo auto paint": ("shaded", {**SHORT, "subject": "photo", "paint": "auto"}),
+    "refined": ("shaded", {"svg": TURNED, "iterations": 40}),
     "auto, logo": ("logo", {}),
     "auto, sketch": ("sketch", {}),
     "auto, sprite": ("sprite", {}),
@@ -57,6 +64,8 @@ def text_of(name: str, threads: int | None = None) -> str:
         mask = PICTURES[given["importance"]]()
         height, width = PICTURES[picture]().shape[:2]
         given["importance"] = mask[:height, :width]
+    if "svg" in given:
+        return warpsplat.refine(given.pop("svg"), PICTURES[picture](), **given).svg
     return warpsplat.vectorize(PICTURES[picture](), **given).svg
 
 
