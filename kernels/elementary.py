@@ -41,15 +41,9 @@ def power(base: wp.float32, exponent: wp.int32) -> wp.float32:
 
 
 @wp.func
-def quarter_turns(angle: wp.float32) -> wp.float32:
-    """Whole quarter turns next to an angle [radians, up to 10^4]."""
-    return wp.rint(angle * TWO_OVER_PI)
-
-
-@wp.func
 def sine_and_cosine(angle: wp.float32) -> wp.vec2:
     """(sine, cosine) of an angle [radians, up to 10^4]."""
-    turns = quarter_turns(angle)
+    turns = wp.rint(angle * TWO_OVER_PI)  # whole quarter turns
     x = (angle - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW
     z = x * x
     s = x + x * z * (-1.6666667e-1 + z * (8.3333333e-3 + z * (-1.9841270e-4 + z * 2.7557319e-6)))

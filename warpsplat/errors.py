@@ -95,7 +95,7 @@ SHOWN = 80
 
 
 def shown(value: object) -> str:
-    """A value that is refused, as messages show it: as Python writes it, the first ``SHOWN`` characters."""
+    """Return a refused value for a message: the first ``SHOWN`` characters of its ``repr``."""
     try:
         words = repr(value)
     except ValueError:  # a number of thousands of digits
@@ -104,7 +104,7 @@ def shown(value: object) -> str:
 
 
 def cut(text: str, most: int = SHOWN) -> str:
-    """The beginning of a text that may be long."""
+    """Return a text, shortened to ``most`` characters if it is longer."""
     return text if len(text) <= most else f"{text[:most]} ..."
 
 

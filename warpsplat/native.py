@@ -92,7 +92,7 @@ def machine_memory() -> int | None:
 
 
 def container_limits(root: Path = Path("/")) -> list[int]:
-    """What control groups allow this process [bytes], of either version (Linux).
+    """Return the memory limits that control groups of either version set for this process [bytes] (Linux).
 
     ``root``: of the file system.
     """

@@ -12,7 +12,7 @@ from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.size import BETWEEN, FEWER_ROUNDS, PRICE_STEP, PRICES, Sketch, Tries, best_within
+from warpsplat.jobs.size import DEAREST, FEWER_ROUNDS, PRICE_STEP, PRICES, Sketch, Tries, best_within
 from warpsplat.jobs.subjects import decided
 from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import Backend
@@ -97,11 +97,11 @@ def test_what_shows_more_is_taken() -> None:
         assert made.render_psnr == (30.0 if regions == 8 else 24.0)
         prices = [price for count, price in asked if count == 8]
         assert prices[:2] == [PRICE_STEP, PRICE_STEP**0.5], "what has room left is made less simple"
-        assert len(prices) <= PRICES + BETWEEN
+        assert len(prices) <= PRICES
 
 
 def test_where_nothing_fits_the_smallest_is_taken() -> None:
-    """After so many tries as there are prices, and no more."""
+    """Every price is tried once for each of two drawings."""
     asked: list[float] = []
 
     def again(drawing: Drawing, price: float) -> Sketch:
@@ -112,7 +112,7 @@ def test_where_nothing_fits_the_smallest_is_taken() -> None:
         sketch(2, 1000, 40.0), 10, lambda count: sketch(count, 500, 10.0), again, lambda: False, None
     )
     assert len(made.scene) == 1
-    assert len(asked) <= 2 * PRICES
+    assert asked == 2 * [8.0, 64.0, 512.0, DEAREST]
 
 
 def test_a_size_leaves_drawings_what_they_are() -> None:

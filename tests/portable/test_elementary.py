@@ -28,7 +28,6 @@ CASES: dict[str, tuple[Callable[..., np.ndarray], Callable[..., float], tuple[np
     "cos": (elementary.cos, math.cos, (np.concatenate([ANGLES, SMALL]),)),
     "tan": (elementary.tan, math.tan, (np.concatenate([ANGLES, SMALL]),)),
     "arctan2": (elementary.arctan2, math.atan2, (PLANE[0], PLANE[1])),
-    "arccos": (elementary.arccos, math.acos, (SMALL,)),
     "power": (elementary.power, math.pow, (np.abs(WIDE), 3 * SMALL)),
     "hypot": (elementary.hypot, math.hypot, (WIDE, SMALL[RANDOM.permutation(500)])),
 }
@@ -43,7 +42,6 @@ PINNED = {
     "cos": "4fd4107557244f81",
     "tan": "fdf54e7590e884e4",
     "arctan2": "535c6b245a6026b5",
-    "arccos": "1472409ec1289c77",
     "power": "c6d1c3e509503e95",
     "hypot": "4bb15269da3c08bf",
 }

@@ -33,8 +33,8 @@ FORMATS = (
     *("PNG", "JPEG", "GIF", "BMP", "PPM", "WEBP", "AVIF", "TIFF", "JPEG2000", "ICO", "QOI", "PCX", "SGI"),
     *("DDS", "PSD", "TGA"),  # TGA last: it has no mark of its own, so that much else may look like it
 )
-"""What is read, by Pillow's names: formats that are nothing but pixels. Others that Pillow opens are programs
-(EPS, which it gives to Ghostscript), drawings (WMF), wrappings of any other format (IPTC), or hardly seen."""
+"""Formats that are read, by Pillow's names: those that are nothing but pixels. Others that Pillow opens are
+programs (EPS, which it gives to Ghostscript), drawings (WMF), containers of other formats (IPTC), or rare."""
 
 MIN_SIDE = 2
 """Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""

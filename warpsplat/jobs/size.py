@@ -20,19 +20,19 @@ FEWER_ROUNDS = 5
 
 
 class Tries:
-    """The progress of drawings of fewer and fewer regions or nodes, until a file has its size."""
+    """Progress of the search for a drawing that fits: with fewer and fewer regions or nodes."""
 
     def __init__(self, report: Report | None, most: int) -> None:
         """``most``: bytes of the file."""
         self._meter, self._most = Meter(report), most
         self._regions = 0
         self.left = float(FEWER_ROUNDS)
-        """How many of fewer regions follow ..."""
+        """Attempts with fewer regions still to come."""
         self.priced = 2.0 * USUAL_PRICES
-        """... and how many of fewer nodes."""
+        """Attempts with fewer nodes still to come."""
 
     def begun(self, traced: Scene) -> Report | None:
-        """What the next one reports to."""
+        """Return the callback for the next drawing's progress."""
         if not self._regions:
             self._regions = max(len(traced), 1)
             fits = FINISHED * len(write_svg(traced)) <= self._most
@@ -58,31 +58,26 @@ class Sketch:
     """Its outlines, of the picture before it was enlarged (``enlargement``); None: it stays as it is."""
 
 
-PRICE_STEP, PRICES = 8, 5
-"""From one price of a byte to a higher one, as a factor, and how many are tried."""
+PRICE_STEP, DEAREST = 8.0, 4096.0
+"""The factor from one price of a byte to the next, and the highest price that is tried."""
 
-DEAREST = 8**5
-"""The last of them."""
+PRICES, USUAL_PRICES = 7, 3
+"""Most prices that are tried, and how many it takes on average."""
 
-USUAL_PRICES = 3
-"""How many are tried in the mean."""
-
-BETWEEN, FULL = 2, 0.97
-"""Prices tried between two, of which one makes a file too large and the other one less than this full."""
+FULL = 0.97
+"""The share of the allowed bytes from which a file is full enough."""
 
 
 def _simpler(
     sketch: Sketch, most: int, finished_again: Callable[[Drawing, float], Sketch], over: Stop
 ) -> Sketch | None:
-    """A drawing with fewer nodes, on a coarser grid, that is as good as it can be within ``most`` bytes; None
-    where there is none.
-    """
+    """Return the best drawing within ``most`` bytes with fewer nodes on a coarser grid; None if none fits."""
     best: Sketch | None = None
-    low, high, price = 1.0, math.inf, float(PRICE_STEP)
-    for _ in range(PRICES + BETWEEN):
+    low, high, price = 1.0, math.inf, PRICE_STEP
+    for _ in range(PRICES):
         if sketch.drawing is None or over() or (best and best.size > FULL * most):
             break
-        if best is None and price >= DEAREST:
+        if best is None and price > DEAREST:
             break
         made = finished_again(sketch.drawing, price)
         if made.size > most:
@@ -104,7 +99,7 @@ def best_within(
     over: Stop,
     tries: Tries | None,
 ) -> Fit:
-    """The best drawing within ``most`` bytes, or the smallest one where there is none.
+    """Return the best drawing within ``most`` bytes, or the smallest one if none fits.
 
     Regions go, or nodes; or, from the fewest regions that are still too large, both.
 
@@ -133,7 +128,7 @@ def best_within(
 def _with_fewer_regions(
     first: Sketch, most: int, drawn: Callable[[int], Sketch], over: Stop, tries: Tries | None
 ) -> tuple[Sketch, list[Sketch]]:
-    """The drawing of the most regions within ``most`` bytes, and those too large, from ``first`` on."""
+    """Return the drawing with the most regions within ``most`` bytes, and those that were too large."""
     low, high = 0, len(first.fit.scene)  # regions that fit into the size, and that do not
     best, size, large = first, first.size, [first]
     for _ in range(FEWER_ROUNDS):

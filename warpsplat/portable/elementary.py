@@ -169,12 +169,6 @@ def arctan2(y: Values, x: Values) -> Result:
     return np.copysign(angle, y)
 
 
-def arccos(x: Values) -> Result:
-    """Return the angle [radians] whose cosine is ``x``, from 0 to pi."""
-    x = np.asarray(x, np.float64)
-    return arctan2(np.sqrt((1 - x) * (1 + x)), x)
-
-
 def hypot(x: Values, y: Values) -> Result:
     """Return the length of the vector (x, y), whose square must be finite."""
     x, y = np.asarray(x), np.asarray(y)

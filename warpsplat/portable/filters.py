@@ -19,7 +19,7 @@ from warpsplat.portable import elementary
 Floats = npt.NDArray[Any]
 Indices = npt.NDArray[np.intp]
 Border = Literal["reflect101", "replicate"]
-"""What lies beyond an image: its reflection in its outermost pixels' middles, or copies of these pixels."""
+"""How an image continues past its border: reflected about the outermost pixels, or by copies of them."""
 
 BAND = 1 << 16
 """Numbers in a band: a few such arrays fit a processor's second cache."""

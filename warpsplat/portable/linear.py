@@ -20,7 +20,7 @@ SWEEPS = 30
 """Rounds of Jacobi rotations at most; they converge quadratically, within ten."""
 
 DEPENDENT = 1e-20
-"""What is left of the square of a column that others nearly make up, over the whole."""
+"""Share of a column's square below which the other columns nearly make it up."""
 
 LOOPED = 64
 """Products with a longer inner index are summed by NumPy at once rather than term by term."""

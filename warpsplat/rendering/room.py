@@ -9,13 +9,13 @@ from warpsplat.native import machine_memory
 from warpsplat.rendering.backend import Viewport
 
 SHARE = 0.9
-"""Of a machine's memory that may be taken: others are there."""
+"""Share of a machine's memory that may be taken, as other programs need some."""
 
 MOST_SIDE = (1 << 31) - 1
 """Largest side of a picture [px]: kernels count in 32 bits."""
 
 PIXEL = 48
-"""Of a pixel [bytes], as measured: the film and its gradient, a slot of each tile, and the picture itself."""
+"""Bytes for each pixel, as measured: the film and its gradient, a slot of each tile, the picture itself."""
 
 SMALL = 1 << 28
 """Bytes that are not asked for: asking how many there are takes longer than many a picture."""
@@ -41,7 +41,7 @@ def check_room(viewport: Viewport, device: wp.Device, count: int = 1) -> None:
 
 
 PICTURE = 16
-"""Of a pixel of a picture that is done: four channels."""
+"""Bytes for each pixel of a finished picture: four channels."""
 
 
 def in_words(size: int) -> str:

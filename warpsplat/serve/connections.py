@@ -1,4 +1,4 @@
-"""Connections: no more than there are files for, and none that is only held."""
+"""Limits on connections: no more than the process may open files, and none that stays idle."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ MOST = 500
 LEAST = 2
 
 OTHERS = 24
-"""Files that are left for all else: pipes to processes that draw, compiled kernels, what the system opens."""
+"""Open files kept in reserve: pipes to worker processes, compiled kernels, the system's own."""
 
 HEAD_TIME = 5.0
-"""For a request to come, from the connection or the last answer on [s]."""
+"""Longest wait for a request, after connecting or after the last response [s]."""
 
 BODY_TIME = 60.0
-"""For more of what is being sent to come [s]."""
+"""Longest pause within the body of a request [s]."""
 
 RETRY = 1.0
-"""Between two tries to take a connection where the system gives no more files [s]."""
+"""Pause before accepting again when the system is out of files [s]."""
 
 SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
-"""What the system says then."""
+"""Errors that mean so."""
 
 
 def most_connections() -> int:
-    """How many connections this process has files for."""
+    """Return how many connections this process has open files for."""
     try:
         import resource
     except ImportError:  # Windows
@@ -50,37 +50,37 @@ def most_connections() -> int:
 
 
 class Protocol(H11Protocol):
-    """HTTP on a connection that knows since when it waits for its client."""
+    """An HTTP connection that can tell whether its client is idle."""
 
     ended: Callable[[], object] = staticmethod(lambda: None)
-    """Called when the connection is gone."""
+    """Called when the connection is closed."""
     heard = 0.0
-    """When something came, or was answered, last [s, of the loop]."""
+    """Time at which data last arrived [s, the loop's clock]."""
     since = 0.0
-    """Since when a request is waited for [s, of the loop]."""
+    """Time from which it has waited for a request [s, the loop's clock]."""
 
     def connection_made(self, transport: Any) -> None:
-        """It begins."""
+        """Start both clocks."""
         self.heard = self.since = self.loop.time()
         super().connection_made(transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is gone."""
+        """Report that the connection is closed."""
         super().connection_lost(exc)
         self.ended()
 
     def data_received(self, data: bytes) -> None:
-        """Something came."""
+        """Note the time, and parse the data."""
         self.heard = self.loop.time()
         super().data_received(data)
 
     def on_response_complete(self) -> None:
-        """A request is answered."""
+        """Wait for the next request from now on."""
         self.since = self.loop.time()
         super().on_response_complete()
 
     def close_if_idle(self) -> None:
-        """End it where its client has taken too long."""
+        """Close the connection if its client has kept it waiting for too long."""
         now = self.loop.time()
         if self.cycle is None or self.cycle.response_complete:
             late = now - self.since > HEAD_TIME
@@ -90,15 +90,15 @@ class Protocol(H11Protocol):
             self.transport.abort()
 
 
-class Door:
-    """Takes connections from a socket that listens, as long as there is room; others wait in the system."""
+class Acceptor:
+    """Accepts connections while there are files for them; others wait in the system's queue."""
 
     def __init__(self, listener: socket.socket, make: Callable[[], Protocol]) -> None:
-        """Within a running loop. ``make``: the other end of a connection."""
+        """Start accepting, within a running loop. ``make`` returns the protocol of a new connection."""
         listener.setblocking(False)
         self._listener, self._make = listener, make
         self._room = asyncio.Semaphore(most_connections())
-        self._has_said = False
+        self._has_warned = False
         self._task = asyncio.get_running_loop().create_task(self._accept())
 
     async def _accept(self) -> None:
@@ -110,7 +110,7 @@ class Door:
             except OSError as error:
                 self._room.release()
                 if error.errno in SHORT:
-                    self._say(error)
+                    self._warn(error)
                 await asyncio.sleep(RETRY)
                 continue
             protocol = self._make()
@@ -121,13 +121,13 @@ class Door:
                 connection.close()
                 self._room.release()
 
-    def _say(self, error: OSError) -> None:
-        """That there are no more files: once, as it may be so for long."""
-        if not self._has_said:
-            self._has_said = True
+    def _warn(self, error: OSError) -> None:
+        """Warn once that the system is out of files."""
+        if not self._has_warned:
+            self._has_warned = True
             logging.getLogger("warpsplat").warning("connections have to wait: %s", error.strerror)
 
     def close(self) -> None:
-        """Take no more, and listen no more."""
+        """Stop accepting and close the listening socket."""
         self._task.cancel()
         self._listener.close()

@@ -15,7 +15,7 @@ import uvicorn
 
 from warpsplat.errors import UsageError, printable
 from warpsplat.serve.app import Service
-from warpsplat.serve.connections import Door, Protocol
+from warpsplat.serve.connections import Acceptor, Protocol
 from warpsplat.serve.guard import TOKEN, Guard
 from warpsplat.serve.limits import Limits
 from warpsplat.serve.page import serve_page
@@ -148,7 +148,7 @@ class _Uvicorn(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begin to answer."""
         await super().startup(sockets)
-        self._door = Door(self._listener, self._protocol)
+        self._door = Acceptor(self._listener, self._protocol)
         self._is_over()  # from the first question on a signal is a wish
         self._ready()
 

@@ -234,7 +234,7 @@ class StyleSheet:
                 )
 
     def of(self, element: ElementTree.Element, parents: Parents) -> Sequence[Declaration]:
-        """What the rules say of an element, what counts most last.
+        """Return the declarations that apply to an element, the strongest last.
 
         Raises:
             ImageError: there are too many rules for too many elements.
@@ -263,7 +263,7 @@ SAID = 10
 """Looks at elements that take as long as what a rule says does."""
 
 CHARACTERS = 100
-"""Of an attribute that take as long as a look at an element."""
+"""Characters of an attribute that take as long to check as an element."""
 
 
 def _depth(element: ElementTree.Element, parents: Parents) -> int:

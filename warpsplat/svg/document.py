@@ -49,10 +49,10 @@ class Document:
         self._sheet = StyleSheet(self.css, KNOWN)
         self._styles: dict[Element, Style] = {}
         self.found: dict[tuple[Callable[..., Any], Element], Any] = {}
-        """What functions have found out about elements, once however many others refer to these."""
+        """Results of ``once`` for each element, however many others refer to it."""
 
     def once(self, find: Callable[[Element, Document], Found], element: Element) -> Found:
-        """What ``find`` finds out about an element, from ``found`` where it is there.
+        """Return ``find``'s result for an element, computed once.
 
         Raises:
             ImageError: as ``find`` does.

@@ -58,7 +58,7 @@ between its parts, and tries them all where there is no end."""
 
 
 def parse_link(text: str) -> tuple[str, str] | None:
-    """What ``url(#name)`` at the start of ``text`` names, and what comes after it; None: there is no link."""
+    """Return the name in ``url(#name)`` at the start of ``text``, and the text after it; None without one."""
     found = LINK.match(text)
     if not found:
         return None
@@ -179,7 +179,7 @@ PLACES = {"x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "fr"}
 
 @dataclass(frozen=True)
 class Heritage:
-    """What a gradient has of its own and of those that it links to, one after another."""
+    """A gradient's own attributes and those it inherits through its chain of links."""
 
     stops: Element | None
     """The first one with stops; None where there is none, or what is no gradient comes before."""

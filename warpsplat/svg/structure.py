@@ -36,13 +36,13 @@ MAX_LINKED = 100_000
 """Most elements that links may add up to: they may multiply."""
 
 LINKED_CHARACTERS = 50
-"""Of the attributes of what is linked that count as an element."""
+"""Characters of a linked element's attributes that count as one element."""
 
 MAX_WORK = 5_000_000
 """Most shapes that groups may add up to that clip or fade: in one another they multiply."""
 
 PAIRS = 30
-"""Of shapes that are compared in the time that one is clipped."""
+"""Shapes that are compared in the time that one is clipped."""
 
 MAX_DEPTH = 1000
 """Deepest nesting with what is linked."""

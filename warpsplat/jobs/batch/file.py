@@ -146,7 +146,7 @@ def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
 
 
 CHARACTERS = 100
-"""Of a long value that count as one more."""
+"""Characters of a long value that count as one more value."""
 
 
 def plain(text: str) -> Any:
