@@ -25,13 +25,13 @@ from warpsplat.cli.options import (
 from warpsplat.cli.report import index_option
 from warpsplat.cli.say import say
 from warpsplat.errors import ExitCode, UsageError, shown
-from warpsplat.jobs.options import KINDS
+from warpsplat.run.options import KINDS
 
 if TYPE_CHECKING:
+    from warpsplat.batch.executors.tasks import Executor
+    from warpsplat.batch.manifest import Manifest
+    from warpsplat.batch.plan import Job
     from warpsplat.cli.signals import Interrupt
-    from warpsplat.jobs.batch.manifest import Manifest
-    from warpsplat.jobs.batch.plan import Job
-    from warpsplat.jobs.executors.tasks import Executor
 
 
 @dataclass(frozen=True)
@@ -179,14 +179,14 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
     Raises:
         WarpsplatError: what concerns the batch as a whole.
     """
+    from warpsplat.batch.index import Index
+    from warpsplat.batch.layers import command_layer
+    from warpsplat.batch.manifest import NAME, Manifest
+    from warpsplat.batch.plan import home_of, in_shard, plan_jobs
+    from warpsplat.batch.reports import Reports
+    from warpsplat.batch.run import Batch, Report
     from warpsplat.cli import signals
     from warpsplat.cli.batch_show import Show
-    from warpsplat.jobs.batch.index import Index
-    from warpsplat.jobs.batch.layers import command_layer
-    from warpsplat.jobs.batch.manifest import NAME, Manifest
-    from warpsplat.jobs.batch.plan import home_of, in_shard, plan_jobs
-    from warpsplat.jobs.batch.reports import Reports
-    from warpsplat.jobs.batch.run import Batch, Report
 
     planned = plan_jobs(inputs, command_layer(flags, sets))
     home = home_of(planned, inputs)
@@ -238,9 +238,9 @@ def executor_for(jobs: Sequence[Job], manner: Manner, interrupt: Interrupt) -> t
     """
     if manner.cluster:
         return manner.cluster.executor(manner.workers), manner.threads or 1
-    from warpsplat.jobs.executors.pool import Pool
-    from warpsplat.jobs.executors.serial import Serial
-    from warpsplat.jobs.executors.split import divided
+    from warpsplat.batch.executors.pool import Pool
+    from warpsplat.batch.executors.serial import Serial
+    from warpsplat.batch.executors.split import divided
     from warpsplat.rendering.device import choose_device, start_warp
 
     start_warp()
@@ -255,8 +255,8 @@ def check_ours(jobs: list[Job], manifest: Manifest) -> None:
     Raises:
         UsageError: there are some; the message names them.
     """
+    from warpsplat.batch.run import not_ours
     from warpsplat.cli.batch_show import NAMED
-    from warpsplat.jobs.batch.run import not_ours
 
     found = not_ours(jobs, manifest)
     if found:

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import click
 
+from warpsplat.batch.run import Report
+from warpsplat.batch.totals import Totals
 from warpsplat.cli.run import SUBJECTS
 from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
 from warpsplat.errors import printable
-from warpsplat.jobs.batch.run import Report
-from warpsplat.jobs.batch.totals import Totals
-from warpsplat.jobs.formats import is_picture
+from warpsplat.run.formats import is_picture
 
 NAMED = 20
 """Most files that one message names."""

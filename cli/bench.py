@@ -105,9 +105,9 @@ def command(size: str, device: str, threads: int | None, verbose: int, as_json: 
     while it is timed.
     """
     width, height = parse_size(size)
-    from warpsplat.jobs.bench import bench
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
+    from warpsplat.tools.bench import bench
 
     start_warp()
     values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)

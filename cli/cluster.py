@@ -11,7 +11,7 @@ import click
 from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
-    from warpsplat.jobs.executors.tasks import Executor
+    from warpsplat.batch.executors.tasks import Executor
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -29,7 +29,7 @@ class Cluster:
         Raises:
             UsageError: Ray is not installed.
         """
-        from warpsplat.jobs.executors.ray import RayCluster
+        from warpsplat.batch.executors.ray import RayCluster
 
         return RayCluster(self.address, workers=workers, gpus=self.gpus)
 

@@ -12,17 +12,17 @@ import click
 from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.cli.say import say
 from warpsplat.errors import Stopped, UsageError, printable, shown
-from warpsplat.jobs.options import BY_NAME, settings_from
-from warpsplat.jobs.tracer import TRACERS, require
+from warpsplat.run.options import BY_NAME, settings_from
+from warpsplat.tools.tracer import TRACERS, require
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from warpsplat.fit.settings import Settings
-    from warpsplat.jobs.compare import Comparison, Row
-    from warpsplat.jobs.result import Result
-    from warpsplat.jobs.tracer import Tracer
+    from warpsplat.run.result import Result
     from warpsplat.scene import FloatArray
+    from warpsplat.tools.compare import Comparison, Row
+    from warpsplat.tools.tracer import Tracer
 
 TABLES, FIGURES, PLOT = "comparison.md", "comparison.json", "comparison.svg"
 """What a folder gets besides the SVGs."""
@@ -47,7 +47,7 @@ def svg_name(image: Path, program: str, setting: str) -> str:
 
 def result_names(images: Sequence[Path], settings: Sequence[Settings], tracer: Tracer) -> list[str]:
     """Names of all files that a comparison writes."""
-    from warpsplat.jobs.compare import OURS
+    from warpsplat.tools.compare import OURS
 
     made = [(OURS, str(ours.curves)) for ours in settings]
     made += [(tracer.name, setting) for setting in tracer.settings]
@@ -142,10 +142,10 @@ def command(
     from warpsplat.cli.signals import Interrupt
     from warpsplat.files.image import load_image
     from warpsplat.files.output import write_result
-    from warpsplat.jobs.compare import Comparison, compare, warm_up
-    from warpsplat.jobs.vectorize import vectorize
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
+    from warpsplat.run.vectorize import vectorize
+    from warpsplat.tools.compare import Comparison, compare, warm_up
 
     start_warp()
     backend = Backend.on(choose_device(device), threads)
@@ -176,7 +176,7 @@ def command(
 def publish(found: Comparison, output: Path | None, *, as_json: bool, quiet: bool) -> None:
     """Write tables, figures and plot into the folder, and print tables or figures."""
     from warpsplat.files.output import write_result
-    from warpsplat.jobs.report import markdown, plot
+    from warpsplat.tools.compare_tables import markdown, plot
 
     tables, figures = markdown(found), json.dumps(found.as_dict())
     if output:

@@ -25,7 +25,7 @@ def command(device: str, as_json: bool) -> None:
     seconds, in which kernels are compiled where they are not yet. What is
     broken comes with a hint; the exit code is 7 then.
     """
-    from warpsplat.doctor import checks
+    from warpsplat.tools.doctor import checks
 
     found = []
     for check in checks(device):

@@ -14,7 +14,7 @@ from warpsplat.cli.say import say
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(as_json: bool) -> None:
     """Show the version, the devices and where compiled kernels are kept; doctor checks them."""
-    from warpsplat.doctor import check_cache, check_devices, check_machine, check_packages, check_python
+    from warpsplat.tools.doctor import check_cache, check_devices, check_machine, check_packages, check_python
 
     python, packages, found = (check().values for check in (check_python, check_packages, check_devices))
     devices = [{"name": d["name"], "description": d["description"]} for d in found["devices"]]

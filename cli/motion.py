@@ -17,9 +17,9 @@ from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
     from warpsplat.fit.work import Progress
-    from warpsplat.jobs.result import Result
     from warpsplat.motion.recorder import Recorder
-    from warpsplat.terminal.preview import Preview
+    from warpsplat.motion.terminal.preview import Preview
+    from warpsplat.run.result import Result
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

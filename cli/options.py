@@ -1,6 +1,6 @@
 """Options that commands share.
 
-Those that decide the result come from ``warpsplat.jobs.options``; one that is not given is None.
+Those that decide the result come from ``warpsplat.run.options``; one that is not given is None.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import click
 
 from warpsplat.cli.say import set_voice
 from warpsplat.errors import shown
-from warpsplat.jobs.options import OPTIONS, Option
+from warpsplat.run.options import OPTIONS, Option
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -10,10 +10,10 @@ from typing import Any, TextIO
 
 from warpsplat.cli.say import say
 from warpsplat.errors import ImageError
-from warpsplat.jobs.result import Result
-from warpsplat.terminal.blocks import HALF
-from warpsplat.terminal.detect import Terminal, measured, terminal
-from warpsplat.terminal.preview import Preview
+from warpsplat.motion.terminal.blocks import HALF
+from warpsplat.motion.terminal.detect import Terminal, measured, terminal
+from warpsplat.motion.terminal.preview import Preview
+from warpsplat.run.result import Result
 
 LARGEST = 1600
 """Longer side of a finished picture that is made to be shown [px]: more than any terminal takes."""

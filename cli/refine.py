@@ -16,7 +16,7 @@ from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
 from warpsplat.files.output import check_output
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.options import BY_NAME
+from warpsplat.run.options import BY_NAME
 
 
 @click.command("refine", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
@@ -78,7 +78,7 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
-    from warpsplat.jobs.formats import ENDINGS, check_format
+    from warpsplat.run.formats import ENDINGS, check_format
 
     check_output(output, svg, image, endings=ENDINGS, overwrite=overwrite)
     check_format(output)
@@ -129,7 +129,7 @@ def command(
     elif not quiet:
         say(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
     if report:
-        from warpsplat.jobs.reports.command import refine_command
+        from warpsplat.pages.reports.command import refine_command
 
         line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
         write_report(report, result, image, shown, output, line, device=device, threads=threads)

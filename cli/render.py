@@ -43,8 +43,8 @@ def command(
     from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.marks import mark_png
     from warpsplat.files.output import check_output, write_result
-    from warpsplat.jobs.formats import PICTURE_ENDINGS, check_format, write_named
-    from warpsplat.jobs.render import NO_GAUSSIANS, check_scale, to_png
+    from warpsplat.run.formats import PICTURE_ENDINGS, check_format, write_named
+    from warpsplat.run.render import NO_GAUSSIANS, check_scale, to_png
     from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
     from warpsplat.svg.viewer import draw_png
 

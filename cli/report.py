@@ -14,7 +14,7 @@ from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output
 
 if TYPE_CHECKING:
-    from warpsplat.jobs.result import Result
+    from warpsplat.run.result import Result
 
 ENDINGS = (".html", ".htm")
 """Of names of pages."""

@@ -23,9 +23,9 @@ from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.work import Progress, TimeLeft
-from warpsplat.jobs.result import Result
-from warpsplat.jobs.suggest import Suggestion
 from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.run.result import Result
+from warpsplat.run.suggest import Suggestion
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}

@@ -12,7 +12,7 @@ from warpsplat.cli.options import threads_option
 from warpsplat.cli.say import say, set_voice
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import UsageError
-from warpsplat.serve.limits import Limits
+from warpsplat.pages.serve.limits import Limits
 
 HOST, PORT = "127.0.0.1", 8765
 
@@ -70,11 +70,11 @@ def command(
     from warpsplat.rendering.device import choose_device, start_warp
 
     try:
-        from warpsplat.serve.server import WarpsplatServer, is_loopback
+        from warpsplat.pages.serve.server import WarpsplatServer, is_loopback
     except ModuleNotFoundError as error:
         raise UsageError(f'serve: {error}; pip install "warpsplat[serve]" installs it') from error
-    from warpsplat.jobs.options import settings_from
-    from warpsplat.serve.worker import Machine
+    from warpsplat.pages.serve.worker import Machine
+    from warpsplat.run.options import settings_from
 
     limits = Limits(upload=parse_bytes(max_upload))
     settings_from({"max_memory": max_memory})  # what cannot be used is said now

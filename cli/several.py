@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from warpsplat.batch.images import Found
+from warpsplat.batch.layers import Place
+from warpsplat.batch.names import Wanted, check_outputs, fields_of, name_results
 from warpsplat.cli.report import check_report
 from warpsplat.cli.request import Request
 from warpsplat.cli.run import run_several, say_about
@@ -16,15 +19,12 @@ from warpsplat.errors import UsageError, printable
 from warpsplat.files.inputs import STANDARD, read_input
 from warpsplat.files.output import check_output, write_result
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.batch.images import Found
-from warpsplat.jobs.batch.layers import Place
-from warpsplat.jobs.batch.names import Wanted, check_outputs, fields_of, name_results
-from warpsplat.jobs.formats import ENDINGS
-from warpsplat.jobs.options import settings_from
-from warpsplat.jobs.reports.command import several_command
-from warpsplat.jobs.reports.several import Version, several_page
-from warpsplat.jobs.result import Result
-from warpsplat.jobs.several import check_several
+from warpsplat.pages.reports.command import several_command
+from warpsplat.pages.reports.several import Version, several_page
+from warpsplat.run.formats import ENDINGS
+from warpsplat.run.options import settings_from
+from warpsplat.run.result import Result
+from warpsplat.run.several import check_several
 
 COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Of the table."""

@@ -14,7 +14,7 @@ from warpsplat.errors import UsageError
 if TYPE_CHECKING:
     from warpsplat.cli.request import Request
     from warpsplat.fit.settings import Settings
-    from warpsplat.jobs.suggest import Suggestion
+    from warpsplat.run.suggest import Suggestion
 
 suggest_option = click.option(
     "--suggest",
@@ -36,8 +36,8 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
         raise UsageError("--suggest and --curves do not go together")
     from warpsplat.cli.run import suggest_file
     from warpsplat.files.inputs import input_name, read_input
-    from warpsplat.jobs.options import settings_from
-    from warpsplat.jobs.suggest import check_suggesting
+    from warpsplat.run.options import settings_from
+    from warpsplat.run.suggest import check_suggesting
 
     image, _ = request.image, request.inputs
     settings = settings_from(given)
@@ -60,7 +60,7 @@ def _command(request: Request, settings: Settings, made: Suggestion) -> str:
     from dataclasses import replace
 
     from warpsplat.files.inputs import STANDARD
-    from warpsplat.jobs.reports.command import vectorize_command
+    from warpsplat.pages.reports.command import vectorize_command
 
     image = request.image
     output = "FILE.svg" if image == STANDARD else str(Path(image.name).with_suffix(".svg"))

@@ -10,7 +10,7 @@ from warpsplat.errors import printable
 
 def summary(output: Path, values: dict[str, Any]) -> str:
     """One line on the result, for people."""
-    from warpsplat.jobs.formats import PICTURE_ENDINGS
+    from warpsplat.run.formats import PICTURE_ENDINGS
 
     name = "standard output" if str(output) == "-" else printable(str(output))
     note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""

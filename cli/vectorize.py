@@ -24,7 +24,7 @@ from warpsplat.cli.say import say
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
-from warpsplat.jobs.options import settings_from
+from warpsplat.run.options import settings_from
 
 
 @click.command("vectorize", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
@@ -129,7 +129,7 @@ def single(
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import check_output
-    from warpsplat.jobs.formats import ENDINGS, check_format
+    from warpsplat.run.formats import ENDINGS, check_format
 
     image, overwrite, report = request.image, request.overwrite, request.report
     if request.output is None and image == STANDARD:
@@ -163,7 +163,7 @@ def single(
     elif not request.quiet:
         say(summary(output, values), err=aside)
     if report:
-        from warpsplat.jobs.reports.command import vectorize_command
+        from warpsplat.pages.reports.command import vectorize_command
 
         line = vectorize_command(settings, str(image), str(output), *request.flags)
         write_report(
@@ -180,8 +180,8 @@ def several(
     Raises:
         UsageError: what can be said of one image only.
     """
+    from warpsplat.batch.names import is_pattern
     from warpsplat.files.inputs import STANDARD
-    from warpsplat.jobs.batch.names import is_pattern
 
     if as_uri:
         raise UsageError("--data-uri takes one image")

@@ -1,1 +1,1 @@
-"""Example job files for ``warpsplat batch``."""
+"""Example batch files."""

@@ -85,7 +85,7 @@ def adam_update(
     """A step of Adam, one thread a number; bounds are kept by projection.
 
     Where the gradient, the moments or the value are not finite nothing is updated, so that they stay as they
-    are for ``fit.mend`` to find.
+    are for ``fit.recover`` to find.
     """
     i, j = wp.tid()
     row = offset + i

@@ -27,19 +27,19 @@ SMOKE = {
         "svg/test_write.py::test_the_file_looks_as_the_render",
         "test_metrics.py::test_psnr",
     ),
-    "trace": ("trace/test_trace.py::test_a_logo", "trace/test_curves.py"),
+    "trace": ("drawing/trace/test_trace.py::test_a_logo", "drawing/trace/test_curves.py"),
     "fit": (
         "fit/test_step.py::test_a_look_at_the_file_that_outgrows_the_arrays",
         "fit/test_new_loss.py::test_a_loss_of_the_image_changes_what_is_fitted",
-        "jobs/test_vectorize.py::test_the_loss_falls_and_the_count_stays",  # photographs
-        "jobs/test_line.py::test_jpeg_and_grey_paper",  # line art
-        "jobs/test_subjects.py::test_figures_are_of_the_file_that_is_delivered",  # drawings
-        "jobs/test_vectorize.py::test_target_psnr_out_of_reach_says_so_and_keeps_to_the_curves",
+        "run/test_vectorize.py::test_the_loss_falls_and_the_count_stays",  # photographs
+        "drawing/test_line_art.py::test_jpeg_and_grey_paper",  # line art
+        "drawing/test_subjects.py::test_figures_are_of_the_file_that_is_delivered",  # drawings
+        "run/test_vectorize.py::test_target_psnr_out_of_reach_says_so_and_keeps_to_the_curves",
     ),
     "jobs": (
-        "jobs/test_plan.py::test_a_batch_file",
-        "jobs/test_batch.py::test_a_run_reports_skips_and_redoes",
-        "jobs/test_checkpoint.py::test_a_run_goes_on_to_the_same_bytes[",
+        "batch/test_plan.py::test_a_batch_file",
+        "batch/test_batch.py::test_a_run_reports_skips_and_redoes",
+        "run/test_checkpoint.py::test_a_run_goes_on_to_the_same_bytes[",
     ),
     "api": (
         "test_api.py::test_what_is_public_is_there_and_light",
@@ -55,7 +55,7 @@ SMOKE = {
         "torch/test_gradients.py::test_exact",
         "pydiffvg/test_render.py::test_area_of_a_circle",
         "motion/test_recorder.py::test_a_film_ends_with_the_file",
-        "serve/test_app.py::test_an_image_becomes_the_file_of_the_command_line",
+        "pages/serve/test_app.py::test_an_image_becomes_the_file_of_the_command_line",
         "portable",
     ),
     "conventions": ("test_architecture.py", "test_smoke.py"),

@@ -17,7 +17,7 @@ from PIL import Image
 import warpsplat
 from tests import ROOT
 from tests.cli.helpers import run
-from warpsplat.jobs.options import OPTIONS
+from warpsplat.run.options import OPTIONS
 from warpsplat.scene import Kind
 
 QUICK = {"curves": 6, "iterations": 30, "subject": "photo"}

@@ -17,7 +17,7 @@ from PIL import Image
 
 from tests import ROOT
 from warpsplat.cli.main import cli
-from warpsplat.jobs.options import KINDS
+from warpsplat.run.options import KINDS
 from warpsplat.svg.inspect import inspect_svg
 
 DOCS = ROOT / "docs"

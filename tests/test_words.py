@@ -11,7 +11,7 @@ import pytest
 import warpsplat
 from tests import ROOT
 from warpsplat.cli.main import COMMANDS, cli
-from warpsplat.jobs.options import OPTIONS
+from warpsplat.run.options import OPTIONS
 
 OTHERWISE = re.compile(r"(?<![-\w`])(?<!zier )(?<!quadratic )(?<!cubic )curves?\b(?![=:`])")
 """``curve`` in another meaning than that of a piece of an outline, and not as the name of the flag."""

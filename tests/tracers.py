@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 
-from warpsplat.jobs.tracer import Options, Tracer
+from warpsplat.tools.tracer import Options, Tracer
 
 SIZES: dict[str, Options] = {"one": {"bands": 1}, "four": {"bands": 4}}
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from warpsplat.api.images import starting_scene as starting_scene
     from warpsplat.api.refine import refine as refine
     from warpsplat.api.render import render as render
-    from warpsplat.api.report import report as report
     from warpsplat.api.several import vectorize_several as vectorize_several
     from warpsplat.api.suggest import suggest as suggest
     from warpsplat.api.svg import load_svg as load_svg
@@ -32,12 +31,13 @@ if TYPE_CHECKING:
     from warpsplat.fit.settings import make_settings as make_settings
     from warpsplat.fit.work import Progress as Progress
     from warpsplat.fit.work import Snapshot as Snapshot
-    from warpsplat.jobs.render import to_pillow as to_pillow
-    from warpsplat.jobs.result import Result as Result
-    from warpsplat.jobs.suggest import Expected as Expected
-    from warpsplat.jobs.suggest import Suggestion as Suggestion
     from warpsplat.metrics import Score as Score
     from warpsplat.motion.recorder import Recorder as Recorder
+    from warpsplat.pages.report import report as report
+    from warpsplat.run.render import to_pillow as to_pillow
+    from warpsplat.run.result import Result as Result
+    from warpsplat.run.suggest import Expected as Expected
+    from warpsplat.run.suggest import Suggestion as Suggestion
     from warpsplat.scene import Canvas as Canvas
     from warpsplat.scene import Scene as Scene
 
@@ -47,7 +47,7 @@ _HOMES = {
     "suggest": "warpsplat.api.suggest",
     "refine": "warpsplat.api.refine",
     "render": "warpsplat.api.render",
-    "report": "warpsplat.api.report",
+    "report": "warpsplat.pages.report",
     **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.api.images"),
     **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.api.svg"),
     **dict.fromkeys(
@@ -57,10 +57,10 @@ _HOMES = {
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
     "Recorder": "warpsplat.motion.recorder",
-    "to_pillow": "warpsplat.jobs.render",
-    "Result": "warpsplat.jobs.result",
+    "to_pillow": "warpsplat.run.render",
+    "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",
-    **dict.fromkeys(("Expected", "Suggestion"), "warpsplat.jobs.suggest"),
+    **dict.fromkeys(("Expected", "Suggestion"), "warpsplat.run.suggest"),
 }
 """Where each name comes from. They are imported when they are asked for: the command line starts light."""
 

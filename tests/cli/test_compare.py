@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.cli.helpers import one_line, run
 from tests.tracers import bands, stub
-from warpsplat.jobs.tracer import TRACERS, Options
+from warpsplat.tools.tracer import TRACERS, Options
 
 QUICK = ["--against", "vtracer", "--curves", "8,4", "--iterations", "12", "--device", "cpu"]
 REPORTS = {"comparison.md", "comparison.json", "comparison.svg"}
@@ -118,7 +118,7 @@ def test_packages_that_are_missing(
     """Said before any work."""
     monkeypatch.chdir(image.parent)
     monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr("warpsplat.jobs.training.fit", None)
+    monkeypatch.setattr("warpsplat.run.training.fit", None)
     assert run("compare", image, *QUICK, *folder) == 2
     assert f"pip install {module}" in one_line(capsys.readouterr().err)
     assert list(image.parent.iterdir()) == [image]
@@ -151,7 +151,7 @@ def test_wrong_requests_are_one_line_before_any_work(
 ) -> None:
     use(monkeypatch)
     monkeypatch.chdir(image.parent)
-    monkeypatch.setattr("warpsplat.jobs.training.fit", None)
+    monkeypatch.setattr("warpsplat.run.training.fit", None)
     Path("text.png").write_text("no image")
     Image.new("RGB", (9, 9)).save("photo.jpg")
     before = set(Path().iterdir())

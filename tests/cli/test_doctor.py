@@ -11,8 +11,8 @@ import pytest
 import warp as wp
 
 from tests.cli.helpers import run
-from warpsplat import doctor
 from warpsplat.rendering.renderer import Renderer
+from warpsplat.tools import doctor
 
 
 def looked_at(capsys: pytest.CaptureFixture[str], code: int) -> dict[str, dict[str, Any]]:

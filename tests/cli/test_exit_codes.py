@@ -20,8 +20,8 @@ from PIL import Image
 from tests import ROOT
 from tests.cli.helpers import run
 from tests.fuzz.corpus import own_svg
+from warpsplat.batch.manifest import NAME
 from warpsplat.errors import ExitCode
-from warpsplat.jobs.batch.manifest import NAME
 
 CPU = "--device cpu"
 QUICK = f"{CPU} --curves 4 --iterations 4"

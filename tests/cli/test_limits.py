@@ -11,7 +11,7 @@ import pytest
 
 from tests.forks import CLOSED, QUICK, Forks, make_image
 from tests.fuzz.corpus import own_svg
-from warpsplat.jobs.batch.manifest import NAME
+from warpsplat.batch.manifest import NAME
 
 pytestmark = pytest.mark.slow
 

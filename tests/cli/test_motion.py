@@ -13,8 +13,8 @@ from PIL import Image
 from tests.cli.helpers import QUICK, one_line, run
 from warpsplat.cli import preview as cli_preview
 from warpsplat.cli import signals
+from warpsplat.motion.terminal import detect
 from warpsplat.svg.viewer import render_own
-from warpsplat.terminal import detect
 
 SHORT = [*QUICK[:2], "--iterations", "40", *QUICK[4:]]
 

@@ -19,9 +19,9 @@ from tests.cli.helpers import QUICK, one_line, run
 from warpsplat.cli.run import Bar
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.vectorize import vectorize
 from warpsplat.native import available_cores
 from warpsplat.rendering.backend import THREADS_PER_CORE, Backend
+from warpsplat.run.vectorize import vectorize
 from warpsplat.svg.viewer import render_svg
 
 

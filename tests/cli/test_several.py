@@ -13,11 +13,11 @@ from PIL import Image
 import warpsplat
 from tests.cli.helpers import one_line, run
 from warpsplat.cli.main import main
-from warpsplat.fit.survey import Worth
+from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.suggest import suggestion
+from warpsplat.run.suggest import suggestion
 from warpsplat.scene import FloatArray
-from warpsplat.trace.trace import Traced, trace
+from warpsplat.search.survey import Worth
 
 FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
 
@@ -180,7 +180,7 @@ def test_a_drawing_that_has_fewer_regions_is_traced_once(
         calls.append(most)
         return trace(image, most=most)
 
-    monkeypatch.setattr("warpsplat.jobs.subjects.trace", noted)
+    monkeypatch.setattr("warpsplat.drawing.subjects.trace", noted)
     settings = warpsplat.make_settings(subject="drawing")
     few, many, most = warpsplat.vectorize_several(path, [1, 9, 99], settings=settings, device="cpu")
     assert len(calls) == 2, "what 9 limit as little as 99 do is made once"
@@ -203,8 +203,8 @@ def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
 
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.fit.survey.STEPS", 60)
-    monkeypatch.setattr("warpsplat.fit.survey.INTERVAL", 10)
+    monkeypatch.setattr("warpsplat.search.survey.STEPS", 60)
+    monkeypatch.setattr("warpsplat.search.survey.INTERVAL", 10)
 
 
 @pytest.mark.usefixtures("quickly")

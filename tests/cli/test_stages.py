@@ -17,7 +17,7 @@ import pytest
 
 from tests import ROOT
 from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
-from warpsplat.jobs.batch.manifest import NAME
+from warpsplat.batch.manifest import NAME
 from warpsplat.svg.viewer import render_own
 
 pytestmark = pytest.mark.slow

@@ -14,11 +14,11 @@ from PIL import EpsImagePlugin, Image, ImageFile
 import warpsplat
 from tests import ROOT
 from tests.cli.helpers import one_line, run
+from warpsplat.batch.images import ENDINGS
 from warpsplat.errors import ExitCode, ImageError
 from warpsplat.files.image import FORMATS, image_facts, load_image
 from warpsplat.files.importance import load_importance
-from warpsplat.jobs.batch.images import ENDINGS
-from warpsplat.serve.pictures import read_picture
+from warpsplat.pages.serve.pictures import read_picture
 
 ENDLESS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 16 16\n%%EndComments\n{} loop\nshowpage\n%%EOF\n"
 """A program that does not end."""

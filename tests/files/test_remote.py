@@ -13,13 +13,13 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import run
+from warpsplat.batch.images import find_images
+from warpsplat.batch.plan import in_shard, plan_jobs
 from warpsplat.errors import ImageError, OutputError, UsageError
 from warpsplat.files import remote as module
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import may_replace, write_result
 from warpsplat.files.remote import find_remote, is_remote, is_url, listed, remote
-from warpsplat.jobs.batch.images import find_images
-from warpsplat.jobs.batch.plan import in_shard, plan_jobs
 
 fsspec = pytest.importorskip("fsspec")
 pytest.importorskip("upath")

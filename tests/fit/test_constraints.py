@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.fit.drawings import drawing, logo, polygon, seam
+from tests.drawing.drawings import drawing, logo, polygon, seam
 from tests.helpers import relative_error
 from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Joint, Keeper
 from warpsplat.kernels.constants import NONE

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fit.test_goals import made
+from tests.search.test_goals import made
+from warpsplat.drawing.costs import Costs
+from warpsplat.drawing.fit_outlines import Refinement
+from warpsplat.drawing.tidy import REFIT, finish_drawing
+from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.costs import Course, score_cost
-from warpsplat.fit.drawing import Refinement
-from warpsplat.fit.drawing_costs import Costs
-from warpsplat.fit.goals import ROUNDS, rounds_left
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Density, Settings, make_settings
-from warpsplat.fit.tidy import REFIT, finish_drawing
 from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
-from warpsplat.trace.trace import trace
+from warpsplat.search.goals import ROUNDS, rounds_left
 
 
 def course(settings: Settings, **more: Any) -> Course:

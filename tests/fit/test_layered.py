@@ -15,17 +15,17 @@ from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import fit
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import levels_of, make_settings
-from warpsplat.fit.several import Start
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_levels
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
+from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
+from warpsplat.search.several import Start
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg

@@ -11,8 +11,8 @@ from warpsplat.errors import UsageError
 from warpsplat.fit.density import densify
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.streaks import Streaks
-from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray, Kind
 
 BAR = cv2.RotatedRect((40.0, 30.0), (50.0, 4.0), 30.0)

@@ -15,11 +15,11 @@ from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.jobs.result import Result
-from warpsplat.jobs.vectorize import vectorize
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
+from warpsplat.run.result import Result
+from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own

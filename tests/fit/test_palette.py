@@ -17,9 +17,9 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_palette
-from warpsplat.jobs.options import settings_from
-from warpsplat.jobs.vectorize import vectorize
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.options import settings_from
+from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 
 COLOR = re.compile(r'(?:fill|stroke)="(#[0-9a-f]{3,6})"')

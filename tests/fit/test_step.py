@@ -8,11 +8,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from tests.fit.drawings import seam
+from tests.drawing.drawings import seam
 from tests.fit.pictures import picture
 from tests.kernels.modules import kernel_modules, kernels_of
 from tests.scenes import mixed_scene, picture_scene, with_gradients
-from warpsplat.fit.drawing import Refinement, start
+from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from tests import ROOT
 from tests.forks import make_image
+from warpsplat.batch.manifest import NAME, entry_of
 from warpsplat.errors import WarpsplatError
-from warpsplat.jobs.batch.manifest import NAME, entry_of
 from warpsplat.svg.viewer import render_svg
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)

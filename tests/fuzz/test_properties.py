@@ -18,15 +18,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from PIL import Image
 
+from tests.batch.helpers import load_jobs
 from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
-from tests.jobs.helpers import load_jobs
+from warpsplat.batch.layers import KEYS
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
 from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.texts import parse_bytes, parse_duration
-from warpsplat.jobs.batch.layers import KEYS
 from warpsplat.metrics import psnr
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests.fit.drawings import logo, seam
+from tests.drawing.drawings import logo, seam
 from tests.scenes import random_scene
 from warpsplat.scene import Kind
 from warpsplat.svg import commands

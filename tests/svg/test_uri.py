@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.fit.drawings import logo
+from tests.drawing.drawings import logo
 from warpsplat.svg.uri import data_uri
 from warpsplat.svg.write import minified, write_svg
 

@@ -11,8 +11,8 @@ MODULES = (
     "warpsplat",
     *(f"warpsplat.api.{name}" for name in ("vectorize", "several", "suggest", "refine", "render", "report")),
     "warpsplat.cli.main",
-    "warpsplat.jobs.bench",
-    "warpsplat.jobs.vectorize",
+    "warpsplat.tools.bench",
+    "warpsplat.run.vectorize",
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from warpsplat.files.sources import ImageSource, image_of
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.prepare import load_target
+from warpsplat.run.prepare import load_target
 from warpsplat.scene import FloatArray, Kind, Scene
 
 

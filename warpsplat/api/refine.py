@@ -11,11 +11,11 @@ from warpsplat.api.svg import SvgSource, svg_name_of, text_of
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.stages import INTERVAL
-from warpsplat.jobs.formats import write_named
-from warpsplat.jobs.memory import check_refined
-from warpsplat.jobs.prepare import load_target
-from warpsplat.jobs.refine import refine as refine_scene
-from warpsplat.jobs.result import Result
+from warpsplat.run.formats import write_named
+from warpsplat.run.memory import check_refined
+from warpsplat.run.prepare import load_target
+from warpsplat.run.refine import refine as refine_scene
+from warpsplat.run.result import Result
 
 
 def refine(

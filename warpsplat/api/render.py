@@ -12,10 +12,10 @@ from warpsplat.api.svg import SvgSource, save_svg, svg_name_of, text_of
 from warpsplat.errors import ImageError, UsageError, shown
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
-from warpsplat.jobs.render import RendererName, drawn
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render_into
 from warpsplat.rendering.room import MOST_SIDE
+from warpsplat.run.render import RendererName, drawn
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size
 

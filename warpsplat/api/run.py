@@ -10,10 +10,10 @@ from pathlib import Path
 from warpsplat.errors import UsageError, shown
 from warpsplat.fit.texts import parse_duration
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.checkpoint import CheckpointFile
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.turns import turn
+from warpsplat.run.checkpoint import CheckpointFile
 
 Callback = Callable[[Progress], bool | None]
 """Called with each report of a run; one that returns True ends it with the shapes as they are."""

@@ -10,8 +10,8 @@ from warpsplat.api.run import Callback, Watch, backend_on
 from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.jobs.result import Result
-from warpsplat.jobs.several import vectorize_several as make_several
+from warpsplat.run.result import Result
+from warpsplat.run.several import vectorize_several as make_several
 
 
 def vectorize_several(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from warpsplat.api.run import Callback, Watch, backend_on
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.jobs.suggest import Suggestion, suggest_curves
+from warpsplat.run.suggest import Suggestion, suggest_curves
 
 
 def suggest(

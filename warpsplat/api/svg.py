@@ -12,8 +12,8 @@ from warpsplat.files.sources import ImageSource, Readable, image_of, source_byte
 from warpsplat.fit.export import export
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import make_settings
-from warpsplat.jobs.formats import write_named
 from warpsplat.metrics import Score, score_svg
+from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
 from warpsplat.svg.read import load_scene

@@ -11,9 +11,9 @@ from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.settings import Painting, Quality, Renderer, Settings, Subject
 from warpsplat.fit.stages import INTERVAL
-from warpsplat.jobs.options import settings_from
-from warpsplat.jobs.result import Result
-from warpsplat.jobs.vectorize import vectorize_image
+from warpsplat.run.options import settings_from
+from warpsplat.run.result import Result
+from warpsplat.run.vectorize import vectorize_image
 from warpsplat.scene import Kind
 
 

@@ -13,9 +13,9 @@ from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.costs import Course, serial
 from warpsplat.fit.importance import pixel_weights
-from warpsplat.fit.mend import mend
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
+from warpsplat.fit.recover import mend
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.saved import step_content, step_from
 from warpsplat.fit.schedule import (

@@ -115,7 +115,7 @@ class Settings:
     """All that decides the result, besides the image."""
 
     subject: Subject = "auto"
-    """What the image shows: ``photo`` is fitted, the others are traced (``jobs.subjects``)."""
+    """What the image shows: ``photo`` is fitted, the others are traced (``drawing.subjects``)."""
     kind: Kind = Kind.FILL
     """Of new shapes."""
     mixed: bool = False
@@ -197,7 +197,7 @@ class Settings:
     """The best file that has no more [bytes]; ``curves`` as for ``target_psnr``."""
     max_memory: int | None = None
     """Memory that the run may take [bytes]: a larger image is worked on at a smaller size. None: what the
-    machine has (``jobs.memory``)."""
+    machine has (``run.memory``)."""
     colors: int | None = None
     """Most different colours that the file may have; its fills are opaque then."""
     palette: tuple[str, ...] = ()

@@ -51,7 +51,7 @@ class FitState:
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: there was none."""
     renewed: int = 0
-    """Times that a shape was set anew since a number of its was not finite (``fit.mend``)."""
+    """Times that a shape was set anew since a number of its was not finite (``fit.recover``)."""
 
     @staticmethod
     def start(

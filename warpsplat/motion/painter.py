@@ -7,11 +7,11 @@ from PIL import Image
 from warpsplat.errors import CapacityError
 from warpsplat.fit.export import export, shown_paths
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.render import to_pillow
 from warpsplat.motion.shown import Size, picture
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.run.render import to_pillow
 from warpsplat.scene import Scene
 from warpsplat.svg.write import GRIDS, resized
 

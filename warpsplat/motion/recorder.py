@@ -12,12 +12,12 @@ import numpy as np
 from warpsplat.errors import UsageError
 from warpsplat.files.output import write_result
 from warpsplat.fit.work import Progress
-from warpsplat.jobs.result import Result
 from warpsplat.motion import drawing, films, training
 from warpsplat.motion.timing import LONGEST, SECONDS, SHORTEST, kept
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.turns import turn
+from warpsplat.run.result import Result
 from warpsplat.scene import Scene
 
 What = Literal["training", "drawing"]

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from warpsplat.fit.export import export, shown_paths
 from warpsplat.fit.settings import Settings
-from warpsplat.jobs.result import Result
 from warpsplat.motion import moving
 from warpsplat.motion.films import Frame, ticks_of, zoom_of
 from warpsplat.motion.painter import Painter
 from warpsplat.motion.shown import picture, screen, size_of
 from warpsplat.motion.timing import kept, showings
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.result import Result
 from warpsplat.scene import Canvas, Scene
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.write import GRIDS, MARK, write_svg

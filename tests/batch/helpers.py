@@ -1,0 +1,27 @@
+"""Batch files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from warpsplat.batch.layers import Layer
+from warpsplat.batch.plan import Job, plan_jobs
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "jobs.yaml"
+    path.write_text(text)
+    return path
+
+
+def load_jobs(path: Path, command: Layer | None = None) -> list[Job]:
+    """Of a batch file."""
+    return plan_jobs([str(path)], command)
+
+
+def answers(out: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """What ``batch --json`` said of each image, and of all."""
+    values = [json.loads(line) for line in out.splitlines()]
+    return values[:-1], values[-1]

@@ -1,0 +1,374 @@
+"""What a run of a batch does: made, skipped, failed, goals."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.batch.helpers import answers, load_jobs, write
+from tests.cli.helpers import one_line, run
+from warpsplat.batch.executors.serial import Serial
+from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, Stop, Task
+from warpsplat.batch.executors.work import do
+from warpsplat.batch.manifest import NAME, Manifest, entry_of
+from warpsplat.batch.run import Batch, Report
+from warpsplat.cli.batch_show import Show
+
+
+def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "defaults: {curves: 4, iterations: 6, device: cpu, output: out}\njobs: [{images: in/*.png}]\n"
+    path = write(folder, text)
+    assert run("batch", path) == 5
+    captured = capsys.readouterr()
+    assert "3 images: 2 made, 0 skipped, 1 failed" in captured.out
+    assert "broken.png: not an image" in captured.err
+    assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg", NAME]
+    made = [entry_of(line) for line in (folder / "out" / NAME).read_bytes().splitlines()]
+    psnr = [entry.figures["psnr"] for entry in made if entry and entry.event == "made"]
+    times = {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
+
+    assert run("batch", path, "--json") == 5
+    images, values = answers(capsys.readouterr().out)
+    assert (values["made"], values["skipped"], values["failed"]) == (0, 2, 1)
+    assert [r["psnr"] for r in images if r["status"] == "skipped"] == psnr, "figures of what was made before"
+    assert times == {p: p.stat().st_mtime_ns for p in (folder / "out").iterdir()}
+
+    noise = np.random.default_rng(9).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(folder / "in" / "a.png")  # another image under the old name
+    (folder / "in" / "broken.png").unlink()
+    assert run("batch", path, "--json") == 0
+    assert answers(capsys.readouterr().out)[1]["made"] == 1
+
+    write(folder, text.replace("curves: 4", "curves: 5"))
+    assert run("batch", path, "-q") == 0
+    assert capsys.readouterr() == ("", "")
+    assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_interrupted_run_says_what_is_left(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, as_json: bool
+) -> None:
+    for i in range(5):
+        shutil.copy(folder / "in" / "a.png", folder / "in" / f"more{i}.png")
+    usual = Show.hear
+
+    def hear(show: Show, report: Report) -> None:
+        usual(show, report)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Show, "hear", hear)
+    settings = ("--curves", 4, "--iterations", 6, "--device", "cpu", "--workers", 1)
+    arguments = ("batch", folder / "in", "-o", folder / "out", *settings, *(["--json"] if as_json else []))
+    assert run(*arguments) == 130
+    captured = capsys.readouterr()
+    assert one_line(captured.err) == "warpsplat: interrupted; the same command goes on with the rest"
+    if as_json:
+        (image,), values = answers(captured.out)
+        assert image["status"] == "made"
+        assert (values["images"], values["made"], values["not_started"]) == (9, 1, 8)
+    else:
+        assert "\n9 images: 1 made, 0 skipped, 0 failed, 8 not started (" in captured.out
+    monkeypatch.undo()
+    assert run(*arguments) == 5
+    out, err = capsys.readouterr()
+    assert "not started" not in out and "not_started" not in out and "goes on" not in err
+
+
+def test_a_stopped_result_is_made_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, "jobs: [{images: in/a.png, curves: 30, iterations: 5, device: cpu}]")
+    assert run("batch", path, "-q") == 0
+    output = load_jobs(path)[0].output
+    svg = output.read_text()
+    for made in (0, 1):
+        assert run("batch", path, "--json") == 0
+        assert answers(capsys.readouterr().out)[1]["made"] == made
+        assert output.read_text() == svg
+        output.write_text(svg[: svg.index("<!--")] + "<!--warpsplat stopped" + svg[svg.index("-->") :])
+
+
+def test_missed_goals_have_their_exit_code(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "jobs: [{images: in/a.png, curves: 3, iterations: 3, target-psnr: 90, output: out, device: cpu}]"
+    assert run("batch", write(folder, text)) == 6
+    assert "goal missed: target-psnr 90 dB" in capsys.readouterr().err
+    assert (folder / "out/a.svg").exists()
+
+
+class PanicException(BaseException):
+    pass
+
+
+FAILURES: list[tuple[BaseException, str]] = [
+    (MemoryError(), "not enough memory"),
+    (RuntimeError("Failed to allocate 99 bytes on device 'cpu'"), "not enough memory: Failed to allocate 99"),
+    (PanicException("index out of bounds"), "renderer gave up: index out of bounds"),
+    (RecursionError("too deep"), "internal error: RecursionError: too deep"),
+    (OSError(28, "No space left on device", "/x"), "/x: No space left"),
+]
+
+
+@pytest.mark.parametrize(("error", "words"), FAILURES)
+def test_whatever_an_image_throws_is_its_own_failure(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    words: str,
+) -> None:
+    def load(data: bytes, name: str, *, paper: object, factor: int) -> np.ndarray:
+        if name.endswith("a.png"):
+            raise error
+        return np.full((24, 32, 3), 0.5, np.float32)
+
+    monkeypatch.setattr("warpsplat.files.sources.load_image", load)
+    text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
+    assert run("batch", write(folder, text), "--json") == 5
+    captured = capsys.readouterr()
+    images, _ = answers(captured.out)
+    assert [r["status"] for r in images] == ["failed", "made"]
+    assert words in images[0]["error"]
+    assert "a.png" in images[0]["error"]
+    assert words in captured.err
+
+
+def test_a_line_break_in_a_name_breaks_no_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, 'jobs: [{images: "in/\\nx.png", device: cpu}]\n')
+    assert run("batch", path) == 5
+    assert capsys.readouterr().err.splitlines() == [
+        "[1/1] failed: in/\\nx.png: no such file".replace("in/", f"{folder}/in/"),
+        "failed:",
+        f"  {folder}/in/\\nx.png: no such file",
+    ]
+
+
+def test_another_mask_makes_another_result(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By its content; one that is missing or of other proportions is the failure of its image."""
+    (folder / "masks").mkdir()
+    mask = folder / "masks" / "face.png"
+    Image.new("L", (64, 48), "white").save(mask)
+    text = "jobs: [{images: in/a.png, curves: 4, iterations: 6, device: cpu, importance: masks/face.png}]"
+    path = write(folder, text)
+    for made in (1, 0):
+        assert run("batch", path, "--json") == 0
+        assert answers(capsys.readouterr().out)[1]["made"] == made
+    assert load_jobs(write(folder, text.replace(", importance: masks/face.png", "")))[0].output.exists()
+    assert run("batch", folder / "jobs.yaml", "--json") == 0
+    assert answers(capsys.readouterr().out)[1]["made"] == 1, "without it"
+    write(folder, text)
+    half = Image.new("L", (64, 48), "white")
+    half.paste("black", (0, 0, 32, 48))
+    half.save(mask)
+    assert run("batch", path, "--json") == 0
+    assert answers(capsys.readouterr().out)[1]["made"] == 1
+    for break_it, cause in (
+        (lambda: half.resize((48, 48)).save(mask), "48x48 pixels"),
+        (mask.unlink, "no such file"),
+    ):
+        break_it()
+        assert run("batch", path) == 5
+        message = capsys.readouterr().err
+        assert f"{folder / 'in' / 'a.png'}: {mask}: {cause}" in message
+
+
+def test_a_mask_is_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, "jobs:\n  - images: in/a.png\n    importance: 3\n")
+    assert run("batch", path) == 2
+    assert f"{path}:3: importance: must be text, not 3" in capsys.readouterr().err
+
+
+SMALL = ("--curves", "3", "--iterations", "3", "--device", "cpu")
+
+
+def test_what_bears_no_mark_is_known_by_the_manifest(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where a run was killed after the file was there and before that was noted."""
+    arguments = ("batch", folder / "in" / "a.png", folder / "in" / "b.png", "-o", folder / "out", *SMALL)
+    assert run(*arguments, "--minify", "--curves", "40") == 0
+    svgs = {path: path.read_bytes() for path in (folder / "out").glob("*.svg")}
+    assert len(svgs) == 2
+    assert not any(b"warpsplat" in data for data in svgs.values())
+    notes = folder / "out" / NAME
+    lines = notes.read_bytes().splitlines(keepends=True)
+    assert [json.loads(line)["event"] for line in lines] == ["writing", "made"] * 2
+    notes.write_bytes(b"".join(lines[:3]))
+    capsys.readouterr()
+    assert run(*arguments, "--minify", "--curves", "40", "--json") == 0
+    images, totals = answers(capsys.readouterr().out)
+    assert (totals["skipped"], totals["made"]) == (2, 0)
+    assert all(image["psnr"] > 5 for image in images)
+    assert svgs == {path: path.read_bytes() for path in (folder / "out").glob("*.svg")}
+    notes.unlink()
+    assert run(*arguments, "--minify", "--curves", "40") == 2, "without it, they may be anybody's"
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_without_a_manifest_figures_are_those_of_the_files(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("batch", folder / "in" / "a.png", "-o", folder / "out", *SMALL, "--json")
+    assert run(*arguments, "--curves", "30") == 0
+    (made,), _ = answers(capsys.readouterr().out)
+    (folder / "out" / NAME).unlink()
+    for _ in range(2):  # then they are noted
+        assert run(*arguments, "--curves", "30") == 0
+        (found,), _ = answers(capsys.readouterr().out)
+        assert found["status"] == "skipped"
+        assert (found["psnr"], found["bytes"]) == (made["psnr"], made["bytes"])
+
+
+def test_failures_are_tried_again_when_asked_or_changed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = folder / "in" / "broken.png"
+    arguments = ("batch", broken, "-o", folder / "out", *SMALL, "--json")
+
+    def tried(*more: str, code: int = 5) -> bool:
+        assert run(*arguments, *more) == code
+        (image,), _ = answers(capsys.readouterr().out)
+        return not image.get("before", False)
+
+    assert tried()
+    assert not tried()
+    assert tried("--retry-failed")
+    assert not tried()
+    assert tried("--seed", "7"), "other settings"
+    broken.write_bytes(b"something else")
+    assert tried()
+    broken.write_bytes((folder / "in" / "a.png").read_bytes())
+    assert tried(code=0)
+
+
+def test_a_dry_run_writes_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(folder, "jobs: [{images: 'in/*.png', output: out, curves: 3, iterations: 3, device: cpu}]")
+    assert run("batch", path, "--dry-run") == 0
+    said = capsys.readouterr().out
+    assert f"{folder / 'out' / 'a.svg'}: would be made of {folder / 'in' / 'a.png'}" in said
+    assert not (folder / "out").exists()
+    assert run("batch", path, "-q") == 5
+    before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
+    capsys.readouterr()
+    assert run("batch", path, "--dry-run", "--set", "seed=0") == 0
+    captured = capsys.readouterr()
+    assert "already made with these settings" in captured.out
+    assert "broken.png: not an image" in captured.err
+    assert {p: p.read_bytes() for p in (folder / "out").iterdir()} == before
+
+
+def test_several_images_of_vectorize(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    assert run("vectorize", "in/a.png", "in/b.png", "-o", "out/", *SMALL) == 0
+    assert sorted(os.listdir("out")) == ["a.svg", "b.svg", NAME]
+    for more, words in (
+        (("-o", "x.svg"), "x.svg: is not a folder"),
+        (("-o", "-"), "standard output"),
+        (("-",), "standard input"),
+        (("--data-uri",), "one image"),
+    ):
+        capsys.readouterr()
+        assert run("vectorize", "in/a.png", "in/b.png", *more) == 2
+        said = capsys.readouterr().err
+        assert words in said
+        assert said.count("\n") == 1
+    assert run("vectorize", "in/a.png", "in/broken.png", *SMALL) == 5
+    assert Path("a.svg").exists()
+
+
+def test_what_another_process_has_in_work_is_waited_for(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is done elsewhere in the end, or, if that process dies, here; other images need not wait."""
+    asked: list[str] = []
+    claim = Manifest.claim
+
+    def reluctant(notes: Manifest, output: Path, key: str) -> bool:
+        asked.append(output.name)
+        return claim(notes, output, key) if asked.count(output.name) > 2 or output.name == "b.svg" else False
+
+    monkeypatch.setattr(Manifest, "claim", reluctant)
+    assert run("batch", folder / "in" / "a.png", folder / "in" / "b.png", *SMALL, "--json") == 0
+    images, _ = answers(capsys.readouterr().out)
+    assert [(Path(image["output"]).name, image["status"]) for image in images] == [
+        ("b.svg", "made"),
+        ("a.svg", "made"),
+    ]
+    assert asked == ["a.svg", "b.svg", "a.svg", "a.svg"]
+
+
+def test_an_image_is_not_made_where_another_process_just_has(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ("batch", folder / "in" / "a.png", "-o", folder / "out", *SMALL, "--json")
+    assert run(*arguments) == 0
+    kept = {path: path.read_bytes() for path in (folder / "out").iterdir()}
+    for path in kept:
+        path.unlink()
+    claim = Manifest.claim
+
+    def late(notes: Manifest, output: Path, key: str) -> bool:
+        for path, data in kept.items():
+            with path.open("ab") as file:  # the same file, or the claim would be another one's
+                file.write(data)
+        return claim(notes, output, key)
+
+    monkeypatch.setattr(Manifest, "claim", late)
+    capsys.readouterr()
+    assert run(*arguments) == 0
+    assert [image["status"] for image in answers(capsys.readouterr().out)[0]] == ["skipped"]
+
+
+@pytest.mark.slow
+@pytest.mark.usual_seed
+def test_processes_make_the_same_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    images = [str(folder / "in" / name) for name in ("a.png", "b.png", "broken.png", "b.jpg")]
+    for workers in ("1", "2"):
+        assert run("batch", *images, "-o", folder / workers, *SMALL, "--workers", workers, "--json") == 5
+        images_said, totals = answers(capsys.readouterr().out)
+        assert (totals["made"], totals["failed"], totals["workers"]) == (3, 1, int(workers))
+        assert len({image["image"] for image in images_said}) == 4
+    first, second = ({p.name: p.read_bytes() for p in (folder / w).glob("*.svg")} for w in ("1", "2"))
+    assert first == second
+
+
+def test_workers_that_do_not_see_files(folder: Path) -> None:
+    """Images go out, and results and figures come back, as bytes."""
+    path = write(folder, "jobs: [{images: in/a.png, output: out, curves: 30, iterations: 3, device: cpu}]")
+    jobs = load_jobs(path)
+    seen: list[Task] = []
+
+    class Far(Serial):
+        def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
+            for task in tasks:
+                seen.append(task)
+                yield do(replace(task, output="/nowhere/a.svg"))
+
+    def reports(executor: Executor, carry: bool, name: str) -> list[Report]:
+        found: list[Report] = []
+        notes = Manifest(folder / name)
+        notes.open()
+        batch = Batch(jobs, notes, hear=found.append, carry=carry)
+        batch.run(executor, lambda: False, lambda number, part: None)
+        notes.close()
+        return found
+
+    (made,) = reports(Far(), True, "far.jsonl")
+    svg = jobs[0].output.read_bytes()
+    assert made.status == "made"
+    (found,) = reports(Far(), True, "other.jsonl")
+    assert (found.status, found.figures["psnr"]) == ("skipped", made.figures["psnr"])
+    assert [(task.measure, task.bring) for task in seen] == [(False, True), (True, True)]
+    jobs[0].output.unlink()
+    (near,) = reports(Serial(), False, "near.jsonl")
+    assert near.status == "made"
+    assert jobs[0].output.read_bytes() == svg

@@ -1,0 +1,209 @@
+"""Defaults, presets, jobs, matrices and the command line: which is stronger, and what results are called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.batch.helpers import load_jobs, write
+from tests.cli.helpers import run
+from warpsplat.batch.layers import assigned, command_layer
+from warpsplat.batch.plan import Job, home_of, in_shard, plan_jobs
+from warpsplat.cli.batch import flags_of
+from warpsplat.errors import UsageError
+from warpsplat.scene import Kind
+
+
+def names(jobs: list[Job], folder: Path) -> list[str]:
+    return [job.output.relative_to(folder).as_posix() for job in jobs]
+
+
+LAYERS = """
+defaults: {curves: 1, seed: 1, iterations: 1, precision: 1, open: true, rates: {points: 0.1, colors: 0.1}}
+presets:
+  fine: {curves: 2, seed: 2, iterations: 2, rates: {points: 0.2}}
+jobs:
+  - images: in/a.png
+    preset: fine
+    curves: 3
+    seed: 3
+  - images: in/b.png
+"""
+
+
+def test_the_command_line_is_stronger_than_the_job_than_the_preset_than_the_defaults(folder: Path) -> None:
+    command = command_layer({"curves": 4, "closed": True, "seed": None}, ["rates.colors=0.4"])
+    first, second = (job.settings for job in load_jobs(write(folder, LAYERS), command))
+    assert (first.curves, first.seed, first.iterations, first.precision) == (4, 3, 2, 1)
+    assert (second.curves, second.seed, second.iterations, second.precision) == (4, 1, 1, 1)
+    assert first.kind == second.kind == Kind.FILL
+    assert [(s.rates["points"], s.rates["colors"]) for s in (first, second)] == [(0.2, 0.4), (0.1, 0.4)]
+
+
+def test_flags_that_are_not_given_say_nothing(folder: Path) -> None:
+    given: dict[str, Any] = {"kind": Kind.STROKE, "target_psnr": None, "max_bytes": "9KB", "minify": True}
+    assert flags_of(given) == {"open": True, "target-psnr": None, "max-bytes": "9KB", "minify": True}
+    assert command_layer({"curves": None}, ()) == {}
+
+
+def test_a_matrix_is_a_product(folder: Path) -> None:
+    text = """
+jobs:
+  - images: in/[ab].png
+    seed: 5
+    matrix: {curves: [2, 3], quality: [draft, high]}
+    output: out/{quality}/{stem}-{curves}-{seed}.svg
+"""
+    jobs = load_jobs(write(folder, text))
+    assert len(jobs) == 8
+    assert names(jobs, folder)[:3] == ["out/draft/a-2-5.svg", "out/draft/b-2-5.svg", "out/high/a-2-5.svg"]
+    assert {(j.settings.curves, j.settings.iterations) for j in jobs} == {
+        (2, 200),
+        (2, 4000),
+        (3, 200),
+        (3, 4000),
+    }
+    assert home_of(jobs, ["jobs.yaml"]) == folder / "out"
+    jobs = load_jobs(folder / "jobs.yaml", command_layer({"curves": 9}, ()))
+    assert len(jobs) == 4, "what the command line says is no axis"
+    assert {job.settings.curves for job in jobs} == {9}
+
+
+def test_a_job_is_stronger_than_a_matrix_of_the_defaults(folder: Path) -> None:
+    text = """
+defaults: {matrix: {curves: [2, 3]}, output: "{stem}-{curves}.svgz"}
+jobs: [{images: in/a.png}, {images: in/b.png, curves: 7}]
+"""
+    assert names(load_jobs(write(folder, text)), folder) == ["a-2.svgz", "a-3.svgz", "b-7.svgz"]
+
+
+@pytest.mark.parametrize(
+    ("output", "made"),
+    [
+        ("out", "out/c.svg"),
+        ("x.svg", "x.svg"),
+        ("{folder}/{name}.svg", "deep/c.png.svg"),
+        ("{preset}-{kind}-{renderer}.svg", "p-closed-exact.svg"),
+        ("{title}-{{x}}.SVG", "a_b-{x}.SVG"),
+        ("{spline-points}-{level-weight}.svg", "12-0.3.svg"),
+    ],
+)
+def test_names_of_results(folder: Path, output: str, made: str) -> None:
+    text = f"presets: {{p: {{title: a/b}}}}\njobs: [{{images: in/**/c.png, preset: p, output: '{output}'}}]"
+    assert names(load_jobs(write(folder, text)), folder) == [made]
+
+
+WRONG = [
+    ("jobs:\n  - {images: in/a.png, preset: fine}\n", 2, "there is no 'fine'; known are: none"),
+    ("presets: [fine]\njobs: [{images: in/a.png}]\n", 1, "presets: must be a mapping"),
+    ("presets:\n  fine: {curvs: 3}\njobs: [{images: in/a.png}]\n", 2, "unknown key 'curvs' in preset 'fine'"),
+    ("presets:\n  fine:\n    curves: 0\njobs: [{images: in/a.png}]\n", 3, "curves"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: 3}\n", 3, "must be a list"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: []}\n", 3, "must be a list"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, x]}\n", 3, "curves"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {rates: [3]}\n", 3, "unknown key 'rates' in matrix"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, 4]}\n", 2, "2 results would be"),
+    ("jobs:\n  - images: in/a.png\n    output: '{curvs}.svg'\n", 3, "'{curvs}' is no field"),
+    ("jobs:\n  - images: in/a.png\n    output: '{.svg'\n", 3, "'{' is no field"),
+    ("jobs:\n  - images: in/a.png\n    output: '{stem}'\n", 3, "names of results end with .svg"),
+    (f"jobs:\n  - images: in/a.png\n    matrix: {{curves: {[*range(1, 1002)]}}}\n", 3, "combinations"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "words"), WRONG)
+def test_errors_name_their_line(folder: Path, text: str, line: int, words: str) -> None:
+    path = write(folder, text)
+    with pytest.raises(UsageError) as caught:
+        load_jobs(path)
+    assert str(caught.value).startswith(f"{path}:{line}: ")
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("curves", "must be KEY=VALUE"),
+        ("curvs=3", "unknown key 'curvs'"),
+        ("rates=3", "unknown key 'rates'"),
+        ("rates.pints=3", "unknown key 'rates.pints'"),
+        ("curves.x=3", "unknown key 'curves.x'"),
+        ("curves=0", "--set curves=0: "),
+        ("curves=[", "no plain value"),
+        ("curves=", "has no value"),
+        ("rates.points=x", "rates"),
+        ("open=false", "must be true"),
+        ("curves=!!python/object:os.system x", "no plain value"),
+    ],
+)
+def test_what_cannot_be_set(text: str, words: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        command_layer({}, [text])
+    assert words in str(caught.value)
+    assert text in str(caught.value)
+
+
+def test_what_can_be_set() -> None:
+    assert assigned("curves=12") == ("curves", 12)
+    assert assigned("output=007") == ("output", "007")
+    assert assigned("density.interval=9") == ("density", {"interval": 9})
+    layer = command_layer({}, ["rates.points=1", "rates.colors=2"])
+    assert layer["rates"].value == {"points": 1, "colors": 2}
+    for flags, sets in (({"curves": 3}, ["curves=4"]), ({}, ["rates.points=1", "rates.points=2"])):
+        with pytest.raises(UsageError, match="given twice"):
+            command_layer(flags, sets)
+    with pytest.raises(UsageError, match="closed is there as well"):
+        command_layer({"closed": True}, ["open=true"])
+
+
+def test_inputs_of_the_command_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(folder, "jobs: [{images: in/deep/c.png, output: out}]")
+    monkeypatch.chdir(folder)
+    jobs = plan_jobs(["in", "in/*.png", "jobs.yaml", "in/none.png"], command_layer({"curves": 3}, ()))
+    assert [(str(job.image), str(job.output)) for job in jobs] == [
+        ("in/deep/c.png", "out/c.svg"),
+        ("in/a.png", "in/a.svg"),
+        ("in/b.jpg", "in/b.jpg.svg"),
+        ("in/b.png", "in/b.png.svg"),
+        ("in/broken.png", "in/broken.svg"),
+        ("in/none.png", "in/none.svg"),
+    ]
+    assert {job.settings.curves for job in jobs} == {3}
+    (folder / "empty").mkdir()
+    for name, words in (("empty", "no images"), ("in/*.gif", "nothing matches")):
+        with pytest.raises(UsageError, match=words):
+            plan_jobs([name])
+
+
+def test_where_the_manifest_is(folder: Path) -> None:
+    """With the results; of several folders of them, in the one that holds all, or with the batch file."""
+    path = str(folder / "jobs.yaml")
+    for outputs, home in (
+        (("out", "out"), folder / "out"),
+        (("out", "out/{curves}/{stem}.svg"), folder / "out"),
+        (("out/x", "out/y"), folder),
+        (("out/x", "/elsewhere/{stem}.svg"), folder),
+    ):
+        jobs = [f"{{images: in/{n}.png, output: '{out}'}}" for n, out in zip("ab", outputs, strict=True)]
+        write(folder, f"jobs: [{', '.join(jobs)}]")
+        assert home_of(load_jobs(Path(path)), [path]) == home
+        assert home_of(load_jobs(Path(path)), [path, "x.png"]) == (Path() if home == folder else home)
+
+
+def test_shards_are_parts_whatever_the_list(folder: Path) -> None:
+    """Each image is in one, and in the same one where others are missing."""
+    jobs = load_jobs(write(folder, "jobs: [{images: in/**/*.*, output: out}]"))
+    parts = [{job.image for job in jobs if in_shard(job, folder / "out", i, 3)} for i in (1, 2, 3)]
+    assert sorted(path for part in parts for path in part) == sorted(job.image for job in jobs)
+    assert max(map(len, parts)) < len(jobs)
+    fewer = load_jobs(write(folder, "jobs: [{images: in/*.png, output: out}]"))
+    for job in fewer[:2]:
+        if job.output in {other.output for other in jobs}:
+            assert [in_shard(job, folder / "out", i, 3) for i in (1, 2, 3)] == [job.image in p for p in parts]
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/b", "-1/3"])
+def test_what_is_no_shard(folder: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
+    assert run("batch", folder / "in", "--shard", text) == 2
+    assert "is no I/N" in capsys.readouterr().err

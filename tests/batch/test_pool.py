@@ -1,0 +1,96 @@
+"""Worker processes: kept, replaced when they die, and gone when the batch is."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.batch import stub
+from warpsplat.batch.executors import pool
+from warpsplat.batch.executors.pool import Pool
+from warpsplat.batch.executors.tasks import Outcome, Task
+from warpsplat.errors import ResourceError
+from warpsplat.fit.settings import Settings
+
+
+@pytest.fixture(autouse=True)
+def stubbed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(pool, "main", stub.main)
+    yield
+    assert not multiprocessing.active_children(), "no process is left"
+
+
+def tasks(folder: Path, *names: str) -> list[Task]:
+    return [Task(i, b"", name, str(folder / f"{i}.svg"), Settings()) for i, name in enumerate(names)]
+
+
+def never() -> bool:
+    return False
+
+
+def ignored(number: int, part: float) -> None:
+    pass
+
+
+def outcomes(todo: list[Task], workers: int = 1, stop: Callable[[], bool] = never) -> list[Outcome]:
+    with Pool(workers) as used:
+        return sorted(used.run(todo, stop, ignored), key=lambda outcome: outcome.number)
+
+
+def test_workers_are_kept_and_their_notices_heard(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with Pool(1) as used, caplog.at_level("WARNING", logger="warpsplat"):
+        first = list(used.run(tasks(tmp_path, "a", "notice"), never, ignored))
+        second = list(used.run(tasks(tmp_path, "c"), never, ignored))
+    assert [outcome.status for outcome in first + second] == ["made"] * 3
+    assert len({outcome.figures["process"] for outcome in first + second}) == 1
+    assert "a notice" in caplog.text
+
+
+def test_a_death_costs_a_second_try_and_a_second_one_the_image(tmp_path: Path) -> None:
+    found = outcomes(tasks(tmp_path, "die once", "die", "a"))
+    assert [outcome.status for outcome in found] == ["made", "failed", "made"]
+    assert found[1].error.startswith("die: its worker process was killed (SIGKILL")
+    assert not list(tmp_path.glob(".warpsplat*"))
+
+
+def test_workers_that_never_begin_end_the_batch(tmp_path: Path) -> None:
+    with pytest.raises(ResourceError, match="end as soon as they begin"):
+        outcomes(tasks(tmp_path, *["stillborn"] * 4))
+
+
+def test_no_more_is_taken_than_there_are_workers_and_nothing_after_a_stop(tmp_path: Path) -> None:
+    """What has begun ends by itself."""
+    taken: list[int] = []
+    begun: list[int] = []
+
+    def drawn() -> Iterator[Task]:
+        for task in tasks(tmp_path, "wait", "wait", "wait"):
+            taken.append(task.number)
+            yield task
+
+    def advance(number: int, part: float) -> None:
+        begun.append(number)
+
+    with Pool(2) as used:
+        found = list(used.run(drawn(), lambda: len(begun) == 2, advance))
+    assert taken == [0, 1]
+    assert sorted((outcome.number, outcome.status) for outcome in found) == [(0, "stopped"), (1, "stopped")]
+
+
+def test_what_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "GRACE", 0.1)
+    begun: list[int] = []
+    with Pool(1) as used:
+        run = used.run(tasks(tmp_path, "hang"), lambda: bool(begun), lambda n, part: begun.append(n))
+        assert [(o.status, o.digest) for o in run] == [("stopped", "")]
+
+
+def test_an_error_in_the_middle_leaves_no_process(tmp_path: Path) -> None:
+    def fail(number: int, part: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), Pool(2) as used:
+        list(used.run(tasks(tmp_path, "hang", "hang"), never, fail))

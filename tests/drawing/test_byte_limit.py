@@ -1,0 +1,150 @@
+"""Drawings within a size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+
+from warpsplat.drawing.byte_limit import DEAREST, FEWER_ROUNDS, PRICE_STEP, PRICES, Sketch, Tries, best_within
+from warpsplat.drawing.subjects import decided
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.fit.constraints import Drawing
+from warpsplat.fit.loop import Fit
+from warpsplat.fit.settings import make_settings
+from warpsplat.fit.work import Progress
+from warpsplat.rendering.backend import Backend
+from warpsplat.run.vectorize import vectorize
+from warpsplat.scene import FloatArray
+
+COLORS = ("e00", "0a0", "00e", "ea0", "0ae", "a0e", "555", "000")
+
+
+def squares() -> FloatArray:
+    """Eight squares of different colours and sizes on white."""
+    image = np.ones((48, 96, 3), np.float32)
+    for i, color in enumerate(COLORS):
+        x, y, side = 24 * (i % 4) + 3, 24 * (i // 4) + 3, 10 + i
+        image[y : y + side, x : x + side] = [int(c, 16) / 15 for c in color]
+    return image
+
+
+@pytest.mark.slow
+def test_a_drawing_has_as_many_regions_as_fit(device: str) -> None:
+    """Squares have no node to spare: some of them have to go."""
+    whole = vectorize(squares(), make_settings(subject="drawing"), Backend.on(device))
+    assert whole.score
+    assert len(whole.scene) >= len(COLORS)
+    limit = round(0.75 * whole.score.bytes)
+    made = vectorize(squares(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
+    assert made.score
+    assert made.score.bytes <= limit and not made.missed
+    assert len(COLORS) // 2 <= len(made.scene) < len(whole.scene)
+
+
+def wavy() -> FloatArray:
+    """Two discs whose outlines are wavy, so that their files are mostly nodes."""
+    y, x = np.mgrid[:64, :96].astype(np.float32) + 0.5
+    image = np.ones((64, 96, 3), np.float32)
+    for centre, color in ((26, (0.8, 0.1, 0.1)), (70, (0.1, 0.2, 0.8))):
+        dx, dy = x - centre, y - 32
+        edge = 18 + 1.2 * np.sin(14 * np.arctan2(dy, dx))
+        cover = np.clip(edge - np.hypot(dx, dy) + 0.5, 0, 1)[..., None]
+        image = image * (1 - cover) + cover * np.float32(color)
+    return np.asarray(image, np.float32)
+
+
+@pytest.mark.slow
+def test_outlines_get_simpler_before_regions_go(device: str) -> None:
+    whole = vectorize(wavy(), make_settings(subject="drawing"), Backend.on(device))
+    assert whole.score and len(whole.scene) == 2
+    limit = round(0.75 * whole.score.bytes)
+    made = vectorize(wavy(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
+    assert made.score and made.score.bytes <= limit and not made.missed
+    assert len(made.scene) == 2
+    assert made.score.nodes < whole.score.nodes
+    assert made.score.psnr > 25, "without one of the discs it is 12"
+
+
+def sketch(regions: int, size: int, psnr: float) -> Sketch:
+    """A drawing of so many regions, as far as its size is concerned."""
+    scene = trace(squares()).scene.take(np.arange(regions))
+    nothing = np.zeros(len(scene.points), np.int32)
+    return Sketch(Fit(scene, 1.0, psnr, psnr, 0, False), size, Drawing(scene, nothing, nothing - 1))
+
+
+def test_what_shows_more_is_taken() -> None:
+    """Of fewer nodes and of fewer regions."""
+    asked: list[tuple[int, float]] = []
+
+    def priced(worth: float) -> Callable[[Drawing, float], Sketch]:
+        def again(drawing: Drawing, price: float) -> Sketch:
+            count = len(drawing.scene)
+            asked.append((count, price))
+            return sketch(count, round(1000 - 150 * np.log2(price)), worth)
+
+        return again
+
+    def drawn(count: int) -> Sketch:
+        return sketch(count, 125 * count, 20.0 + count)
+
+    for worth, regions in ((30.0, 8), (21.0, 4)):
+        asked.clear()
+        made = best_within(drawn(8), 600, drawn, priced(worth), lambda: False, None)
+        assert len(made.scene) == regions
+        assert made.render_psnr == (30.0 if regions == 8 else 24.0)
+        prices = [price for count, price in asked if count == 8]
+        assert prices[:2] == [PRICE_STEP, PRICE_STEP**0.5], "what has room left is made less simple"
+        assert len(prices) <= PRICES
+
+
+def test_where_nothing_fits_the_smallest_is_taken() -> None:
+    """Every price is tried once for each of two drawings."""
+    asked: list[float] = []
+
+    def again(drawing: Drawing, price: float) -> Sketch:
+        asked.append(price)
+        return sketch(len(drawing.scene), 900, 30.0)
+
+    made = best_within(
+        sketch(2, 1000, 40.0), 10, lambda count: sketch(count, 500, 10.0), again, lambda: False, None
+    )
+    assert len(made.scene) == 1
+    assert asked == 2 * [8.0, 64.0, 512.0, DEAREST]
+
+
+def test_a_size_leaves_drawings_what_they_are() -> None:
+    image = np.ones((160, 200, 3), np.float32)
+    for i in range(8):
+        cv2.circle(
+            image, (25 + 45 * (i % 4), 40 + 80 * (i // 4)), 15 + i, (0.1 * i, 0.5, 0.9), -1, cv2.LINE_AA
+        )
+    settings, why = decided(image, make_settings(max_bytes="1KB"))
+    assert settings.subject == "drawing" and why
+    settings, why = decided(image, make_settings(target_psnr=30.0))
+    assert settings.subject == "photo" and "target-psnr" in why
+
+
+def test_tries_of_a_size_are_one_progress() -> None:
+    """Each is expected to go on from where the one before it ended, not to begin anew."""
+    traced, told = trace(squares()).scene, list[Progress]()
+
+    def half_way(tries: Tries, shapes: int) -> float:
+        report = tries.begun(traced.take(np.arange(shapes)))
+        assert report
+        report(Progress(1, 2, 20.0, 0.0, 0.5, fine=True))
+        return told[-1].work
+
+    assert half_way(Tries(told.append, 10**6), 8) == pytest.approx(0.5), "it fits"
+    tries = Tries(told.append, 100)
+    first = half_way(tries, 8)
+    assert 0 < tries.left < FEWER_ROUNDS, "with 8 regions there is not much to choose"
+    assert 0 < first < 0.25
+    tries.left = 1.0
+    second = half_way(tries, 4)
+    assert second > first
+    tries.left = 0.0
+    assert half_way(tries, 4) > second
+    assert Tries(None, 100).begun(traced) is None

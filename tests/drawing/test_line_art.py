@@ -1,0 +1,167 @@
+"""Line art in, strokes out."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.drawing.trace.line_art import CROSS, TEE, drawn, grown, shown
+from warpsplat.drawing.line_art import tour_cost
+from warpsplat.drawing.strokes.tour import FEW, MANY
+from warpsplat.drawing.subjects import decided
+from warpsplat.errors import ImageError
+from warpsplat.fit.settings import make_settings
+from warpsplat.rendering.backend import Backend
+from warpsplat.run.result import Result
+from warpsplat.run.vectorize import vectorize, vectorize_image
+from warpsplat.scene import Kind
+
+
+def lines_of(image: np.ndarray, device: str) -> Result:
+    return vectorize(image, make_settings(subject="line"), Backend.on(device))
+
+
+def on_clear(image: np.ndarray) -> np.ndarray:
+    """Black ink of a picture on nothing, premultiplied."""
+    cover = 1 - image[..., :1]
+    return np.concatenate([np.zeros_like(image), cover], axis=2)
+
+
+@pytest.mark.parametrize("paths", [CROSS, TEE, '<circle cx="48" cy="36" r="20"/>'])
+def test_the_strokes_are_the_ink(paths: str, device: str) -> None:
+    image = drawn(paths)
+    ink = 1 - image[..., 0]
+    result = lines_of(on_clear(image), device)
+    painted = shown(result.svg)
+    assert "<rect" not in result.svg
+    assert 'fill="#' not in result.svg
+    assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
+    assert np.clip(painted - ink, 0, None).sum() < 0.05 * painted.sum()
+    assert result.score
+    assert result.score.psnr > 26
+
+
+def test_jpeg_and_grey_paper(device: str) -> None:
+    image = drawn(TEE, ground="#ccc")
+    ok, data = cv2.imencode(".jpg", (255 * image).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 60])
+    assert ok
+    noisy = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.float32) / 255
+    result = lines_of(noisy, device)
+    assert len(result.scene) == 2
+    assert re.search(r'<rect [^>]*fill="#(c[a-f0-9])\1\1"|<rect [^>]*fill="#ccc"', result.svg)
+
+
+def test_pens_are_groups_that_say_their_colour(device: str) -> None:
+    image = drawn('<path d="M10 20H86"/><path d="M10 36H86"/><path d="M10 52H60" stroke="#cc0000"/>')
+    result = lines_of(image, device)
+    assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
+    assert result.scene.layer.tolist() == [0, 0, 1]
+    assert result.svg.count("<path") == 3
+
+
+def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> None:
+    image = (255 * drawn(CROSS)[..., ::-1]).astype(np.uint8)
+    ok, data = cv2.imencode(".png", image)
+    assert ok
+    for minify in (False, True):
+        results = [
+            vectorize_image(
+                data.tobytes(),
+                make_settings(subject="line", page=page, minify=minify),
+                Backend.on(device),
+                output=tmp_path / f"{len(page)}.svg",
+                name="a.png",
+            )
+            for page in ("", "a4")
+        ]
+        text = (tmp_path / "2.svg").read_text()
+        assert text == results[1].svg
+        assert 'width="297mm" height="210mm"' in text
+        assert results[0].score
+        assert results[1].score
+        assert results[0].score.psnr == results[1].score.psnr
+
+
+def test_paper_without_ink_is_refused(device: str) -> None:
+    with pytest.raises(ImageError, match="no lines"):
+        lines_of(np.ones((40, 50, 3), np.float32), device)
+
+
+BLOB = (
+    '<circle cx="30" cy="36" r="16" fill="#000"/><path d="M30 36H88"/><path d="M70 8V64" stroke="#cc0000"/>'
+)
+
+
+def test_mixed_line_art_keeps_its_areas(device: str) -> None:
+    image = drawn(BLOB)
+    result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
+    assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
+    assert np.bincount(result.scene.kind).tolist() == [1, 2]
+    assert result.scene.point_counts()[0] <= 24  # a circle, cut where its line leaves it
+    assert result.score
+    assert result.score.psnr > 34
+    without = lines_of(image, device)
+    assert without.score
+    assert (without.scene.kind == Kind.STROKE).all()
+    assert result.score.psnr > without.score.psnr + 6
+
+
+def test_areas_alone_are_fills(device: str) -> None:
+    image = drawn('<circle cx="30" cy="36" r="20" fill="#000"/>')
+    result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
+    assert result.scene.kind.tolist() == [Kind.FILL]
+    assert result.score
+    assert result.score.psnr > 34
+
+
+def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
+    line = drawn("".join(f'<path d="M{x} 8L{90 - x} 64"/>' for x in (8, 20, 50, 70)))
+    settings = make_settings(mixed=True)
+    assert decided(line, settings)[0].subject == "line"
+    noise = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
+    chosen, why = decided(noise, settings)
+    assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
+
+
+def test_a_line_thinner_than_a_pixel_is_one_thin_stroke(device: str) -> None:
+    image = drawn('<path d="M8 10L88 31" stroke-width=".4"/><path d="M8 50H88"/><path d="M8 60H88"/>')
+    result = lines_of(image, device)
+    assert len(result.scene) == 3
+    assert sorted(result.scene.widths.round(1).tolist())[0] < 0.7
+
+
+@pytest.mark.parametrize("radius", [1.5, 4, 8])
+def test_dots_are_strokes_of_no_length(radius: float, device: str) -> None:
+    image = drawn(
+        f'<circle cx="30.3" cy="30.4" r="{radius}" fill="#000" stroke="none"/><path d="M8 60H88M60 10V50"/>'
+    )
+    result = lines_of(image, device)
+    assert (result.scene.kind == Kind.STROKE).all()
+    assert len(result.scene) == 3
+    assert result.score
+    assert result.score.psnr > 30
+
+
+def test_dots_alone(device: str) -> None:
+    result = lines_of(drawn('<circle cx="30" cy="30" r="6" fill="#000" stroke="none"/>'), device)
+    assert result.score
+    assert result.score.psnr > 26
+
+
+def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
+    image = drawn('<path d="M8 36H70"/><path d="M66 28L82 36L66 44Z" fill="#000" stroke="none"/>')
+    painted = shown(lines_of(on_clear(image), device).svg)
+    ink = 1 - image[..., 0]
+    assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
+    assert np.clip(painted - ink, 0, None).sum() < 0.03 * painted.sum()
+
+
+def test_tours_cost_by_how_thoroughly_they_are_sought() -> None:
+    costs = [tour_cost(count) for count in (0, 20, FEW, MANY)]
+    assert costs == sorted(costs) and costs[0] == 0 < costs[1]
+    assert tour_cost(FEW) > 2 * tour_cost(FEW + 1), "from several places"
+    assert tour_cost(MANY) > 5 * tour_cost(MANY + 1), "until nothing shortens it"

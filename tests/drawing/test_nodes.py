@@ -1,0 +1,264 @@
+"""Candidates for simpler outlines, and which of them are taken."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon, seam
+from tests.drawing.test_fit_outlines import assert_clean, psnr
+from tests.drawing.test_merge import halves
+from warpsplat.drawing import tidy
+from warpsplat.drawing.cells import (
+    SPAN,
+    ZERO,
+    Cells,
+    by_cell,
+    cells_around,
+    columns_and_rows,
+    joined,
+    sum_within,
+)
+from warpsplat.drawing.costs import Costs, RoundsWatch
+from warpsplat.drawing.fit_outlines import Refinement, start
+from warpsplat.drawing.nodes import Edit, Outlines, applied, turned
+from warpsplat.drawing.tidy import Judge, apart, finish_drawing, rounds_for, tidied
+from warpsplat.fit.constraints import Drawing, Joint
+from warpsplat.fit.settings import make_settings
+from warpsplat.fit.work import Meter
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.renderer import Capacity, Renderer, render
+from warpsplat.rendering.tiles import to_tiles
+from warpsplat.scene import Canvas
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.write import rounded, write_svg
+
+
+def cells_at(places: Sequence[tuple[int, int]]) -> Cells:
+    """Those in columns and rows."""
+    columns, rows = np.array(places).T
+    return np.unique((columns + ZERO) * SPAN + rows + ZERO)
+
+
+def split(made: Drawing) -> Drawing:
+    """Each piece in two, of points that shapes share both in the same way."""
+    scene, on, following = made.scene, *made.links()
+    points, joints, same = [], [], []
+    numbers = iter(range(10_000, 90_000))
+    known: dict[tuple[float, ...], tuple[int, int, int]] = {}
+    for a, b, is_line in zip(on.tolist(), following.tolist(), made.lines().tolist(), strict=True):
+        first, second = halves(scene.points[[a, a + 1, a + 2, b]].astype(float), 0.5)
+        points += [*first[:3], *second[:3]]
+        inner = Joint.LINE_HANDLE if is_line else Joint.FREE
+        joints += [made.joints[a], inner, inner, Joint.CORNER if is_line else Joint.SMOOTH, inner, inner]
+        key = tuple(np.round(second[0], 3).tolist())
+        if made.same[a] >= 0 and made.same[b] >= 0:
+            again = key in known
+            middle = known.setdefault(key, (next(numbers), next(numbers), next(numbers)))
+            before, here, after = middle[::-1] if again else middle
+        else:
+            before = here = after = -1
+        same += [made.same[a], made.same[a + 1], before, here, after, made.same[a + 2]]
+    scene = replace(
+        scene, points=np.array(points, np.float32), starts=2 * scene.starts, first=2 * scene.first
+    )
+    return Drawing(scene, np.array(joints, np.int32), np.array(same, np.int32))
+
+
+def nodes(made: Drawing) -> int:
+    return len(made.joints) // 3
+
+
+def edits_of(made: Drawing, kind: str) -> list[Edit]:
+    return [edit for edit in Outlines(made).edits() if edit.kind == kind]
+
+
+CANVAS = Canvas(64, 48, WHITE)
+
+
+def test_needless_nodes_are_named() -> None:
+    """Of a square all but its corners, of a disc every other; no corner."""
+    square, ring = polygon((8, 8), (40, 8), (40, 40), (8, 40)), disc(30, 24, 15)
+    assert not edits_of(drawing(CANVAS, (RED, [square])), "without")
+    for outline, saved, count in ((square, 7, 4), (ring, 19, 7)):  # of a ring all but the first
+        made = split(drawing(CANVAS, (RED, [outline])))
+        edits = [edit for edit in edits_of(made, "without") if edit.off < 0.05]
+        assert len(edits) == count
+        assert {edit.saved for edit in edits} == {saved}
+        for edit in edits:
+            left = applied(made, [edit])
+            assert nodes(left) == nodes(made) - 1
+            assert left.lines().sum() == (7 if saved == 7 else 0)
+
+
+def test_nodes_of_a_seam_go_in_all_shapes_at_once() -> None:
+    """The place where the third region meets the others stays, and the corners of the canvas."""
+    made = split(seam())
+    edits = [edit for edit in edits_of(made, "without") if edit.off < 0.05]
+    sides = [edit for edit in edits if len(edit.removed) == 3]
+    shared = [edit for edit in edits if len(edit.removed) == 6]
+    assert len(edits) == len(sides) + len(shared)
+    assert len(shared) == 3, "of the two halves of the seam, and the line that meets it"
+    left = applied(made, shared)
+    for number in np.unique(left.same[left.same >= 0]):
+        assert len(np.unique(left.scene.points[left.same == number], axis=0)) == 1
+
+
+def test_almost_straight_cubics_are_named() -> None:
+    outline, joints = polygon((8, 8), (40, 8), (40, 40), (8, 40))
+    bent = outline.copy()
+    bent[1:3, 1] += (0.4, 0.4)
+    bent[4:6, 0] += (8, 8)
+    made = drawing(CANVAS, (RED, [(bent, [Joint.CORNER, Joint.FREE, Joint.FREE] * 2 + joints[6:])]))
+    (edit,) = edits_of(made, "straight")
+    assert edit.off == pytest.approx(0.3, abs=0.05)
+    assert applied(made, [edit]).lines().tolist() == [True, False, True, True]
+
+
+def test_almost_level_lines_and_tangents_are_named() -> None:
+    made = drawing(CANVAS, (RED, [polygon((8, 8), (40, 8.3), (38, 40), (8, 40))]))
+    (edit,) = edits_of(made, "level")
+    left = applied(made, [edit])
+    assert left.scene.points[0, 1] == left.scene.points[3, 1]
+    assert not edits_of(left, "level")
+    slanted = drawing(CANVAS, (RED, [disc(30, 24, 15, 0.02)]))
+    edits = edits_of(slanted, "tangent")
+    assert len(edits) == 4
+    assert not edits_of(applied(slanted, edits), "tangent")
+    assert not edits_of(drawing(CANVAS, (RED, [disc(30, 24, 15, 0.3)])), "tangent")
+
+
+def test_chosen_candidates_have_no_cell_in_common() -> None:
+    edits = Outlines(split(logo())).edits()
+    chosen = apart(edits)
+    assert 1 < len(chosen) < len(edits)
+    assert sum(len(edit.cells) for edit in chosen) == len(joined([edit.cells for edit in chosen]))
+    assert all(np.intersect1d(edit.cells, joined([e.cells for e in chosen])).size for edit in edits)
+
+
+def test_what_was_refused_is_not_measured_again() -> None:
+    outlines = Outlines(split(logo()))
+    edits = outlines.edits()
+    refused = {edit.key for edit in edits[::2]}
+    assert [e.key for e in outlines.edits(refused)] == [e.key for e in edits if e.key not in refused]
+    again = Outlines(split(logo()))
+    assert not again.edits({edit.key for edit in edits})
+    assert not again._cells, "what it would change"
+
+
+def test_cells_around_cubics() -> None:
+    """Those of its points and their neighbours, each by itself; also beyond the border."""
+    level = np.array([(1, 1), (3, 1), (5, 1), (7, 1)], float)
+    dot = np.full((4, 2), -0.5)
+    first, second = cells_around(np.stack([level, dot]))
+    columns, rows = columns_and_rows(first)
+    assert sorted(zip(columns.tolist(), rows.tolist(), strict=True)) == [
+        (x, y) for x in range(-1, 5) for y in range(-1, 2)
+    ]
+    assert second.tolist() == cells_at([(x, y) for x in (-2, -1, 0) for y in (-2, -1, 0)]).tolist()
+
+
+def test_errors_within_an_edit() -> None:
+    """Those of its cells, whole or cut by the border, none beyond."""
+    errors = np.random.default_rng(0).random((7, 9))
+    sums = by_cell(to_tiles(errors[..., None].astype(np.float32))[:, 0], Viewport(9, 7))
+    for cells, want in (
+        ([(0, 0), (4, 3)], errors[:2, :2].sum() + errors[6, 8]),
+        ([(-1, 0), (-2, -2), (5, 1), (1, 4), (9, 9)], 0),
+        ([(2, 1)], errors[2:4, 4:6].sum()),
+    ):
+        assert sum_within(sums, cells_at(cells)) == pytest.approx(want)
+
+
+def test_a_drawing_like_the_last_one_needs_no_second_renderer(
+    device: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    backend, made, target = Backend.on(device, 1), split(logo()), np.ones((64, 64, 3), np.float32)
+    judge = Judge(target, backend)
+    built: list[Capacity] = []
+    build = Renderer._build
+
+    def counted(self: Renderer, capacity: Capacity) -> None:
+        built.append(capacity)
+        build(self, capacity)
+
+    monkeypatch.setattr(Renderer, "_build", counted)
+    first = judge.errors(made)
+    before = len(built)
+    np.testing.assert_array_equal(judge.errors(made), first)
+    step = start(target, made, backend, Refinement(), capacity=judge.capacity)
+    step.render()
+    assert len(built) == before + 2
+
+
+def test_large_pictures_have_fewer_rounds(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert [rounds_for(side * side) for side in (64, 1250, 2048, 10_000)] == [16, 16, 6, 4]
+    backend, made = Backend.on(device, 1), split(logo())
+    asked: list[int] = []
+    target = render(logo().scene, backend=backend)
+    watch = RoundsWatch(Meter(None), Costs(target, made, backend), Refinement(), 0.0, 0.0)
+
+    def found(candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> None:
+        asked.append(most)
+
+    monkeypatch.setattr(watch, "found", found)
+    for pixels in (64 * 64 * 5, 1):
+        asked.clear()
+        monkeypatch.setattr(tidy, "ROUND_PIXELS", pixels)
+        monkeypatch.setattr(tidy, "ROUNDS", 2)
+        monkeypatch.setattr(tidy, "FEWEST_ROUNDS", 1)
+        tidied(target, made, backend, watch)
+        assert asked == ([2, 1] if pixels > 1 else [1])
+
+
+def test_turned_outlines_are_the_same() -> None:
+    made = split(seam())
+    again = turned(made)
+    assert (again.scene.points != made.scene.points).any()
+    for shape in range(len(made.scene)):
+        rows = [sorted(map(tuple, d.scene.points_of(shape).tolist())) for d in (made, again)]
+        assert rows[0] == rows[1]
+    assert again.lines().sum() == made.lines().sum()
+
+
+def test_a_logo_has_its_nodes_again(device: str) -> None:
+    """Half of its nodes are needless; at the end it is as good, clean, and written and read as it is."""
+    backend = Backend.on(device, 1)
+    exact = logo(None)
+    target = render(exact.scene, backend=backend)
+    made = split(logo(None, spread=0.15))
+    finished = finish_drawing(target, made, backend)
+    drawn = finished.drawing
+    assert nodes(drawn) <= nodes(exact) + 4 < nodes(made) - 20
+    assert psnr(drawn.scene, target, backend) > 45
+    np.testing.assert_array_equal(rounded(drawn.scene, finished.per_pixel).points, drawn.scene.points)
+    text = write_svg(drawn.scene, per_pixel=finished.per_pixel)
+    back, _ = load_scene(text, 64, 64, "a.svg")
+    assert write_svg(replace(back, canvas=drawn.scene.canvas), per_pixel=finished.per_pixel) == text
+
+
+def test_a_draft_keeps_its_nodes(device: str) -> None:
+    """What takes most of the time is left out: outlines are fitted and rounded all the same."""
+    backend = Backend.on(device, 1)
+    exact = logo(None)
+    target = render(exact.scene, backend=backend)
+    made = split(logo(None, spread=0.15))
+    assert not make_settings("draft").tidy and make_settings().tidy
+    finished = finish_drawing(target, made, backend, tidy=False)
+    assert nodes(finished.drawing) == nodes(made)
+    assert psnr(finished.drawing.scene, target, backend) > max(45, psnr(made.scene, target, backend) + 3)
+
+
+def test_what_is_seen_stays(device: str) -> None:
+    """Small notches of strong contrast are no needless nodes; and the result is clean."""
+    backend = Backend.on(device, 1)
+    notched = polygon((6, 6), (30, 6), (31, 9), (32, 6), (58, 6), (58, 40), (6, 40))
+    exact = drawing(CANVAS, (BLUE, [notched]), (GOLD, [disc(30, 25, 9, 0.4)]))
+    target = render(exact.scene, backend=backend)
+    made = tidied(target, exact, backend)
+    assert nodes(made) == nodes(exact)
+    assert psnr(made.scene, target, backend) > 50
+    assert_clean(made, made.scene)

@@ -1,0 +1,93 @@
+"""What is done with an image for what it shows."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.drawing.trace.drawings import draw
+from tests.drawing.trace.line_art import drawn
+from warpsplat.drawing.subjects import LEAST_SIDE, enlargement
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.fit.settings import make_settings
+from warpsplat.metrics import score_svg
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
+from warpsplat.run.vectorize import vectorize, vectorize_image
+from warpsplat.scene import FloatArray
+from warpsplat.svg.viewer import render_svg
+
+DRAWING = (
+    '<circle cx="50" cy="50" r="31" fill="#06c" stroke="none"/>'
+    '<path d="M4 92L40 60L90 96z" fill="#fc0" stroke="none"/>'
+)
+
+
+def repeated(image: FloatArray, times: int) -> FloatArray:
+    return np.repeat(np.repeat(image, times, axis=0), times, axis=1)
+
+
+def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> None:
+    """The large file shows what the small one does, without the steps of the pixels."""
+    small = drawn(DRAWING, 100, 100)
+    settings = make_settings(subject="drawing")
+    large = vectorize(repeated(small, 3), settings, Backend.on(device))
+    assert {'width="300"', 'height="300"'} <= set(large.svg.partition(">")[0].split())
+    assert (large.scene.canvas.width, large.scene.canvas.height) == (300, 300)
+    plain = vectorize(small, settings, Backend.on(device))
+    assert plain.score
+    assert score_svg(large.svg, small, eyes=False).psnr > plain.score.psnr - 0.5
+    assert large.scene.points.shape == plain.scene.points.shape
+
+
+@pytest.mark.parametrize(
+    ("side", "times", "found"),
+    [(LEAST_SIDE, 2, 2), (LEAST_SIDE - 1, 2, 1), (LEAST_SIDE // 2, 6, 3), (20, 1, 1)],
+)
+def test_enlargement_leaves_a_picture_to_trace(side: int, times: int, found: int) -> None:
+    noise = np.random.default_rng(0).random((side, side + 1, 3)).astype(np.float32)
+    assert enlargement(repeated(noise, times)) == found
+
+
+@pytest.mark.parametrize("given", [{"colors": 2}, {"palette": "#06c,#fc0"}])
+def test_what_is_translucent_leaves_no_opaque_paint_in_few_colours(
+    device: str, given: dict[str, object]
+) -> None:
+    """A soft shadow, as regions and as a ramp: what is less than half there is left out."""
+    shadow = (
+        '<linearGradient id="s"><stop stop-opacity=".5"/><stop offset="1" stop-opacity="0"/></linearGradient>'
+    )
+    body = f'{shadow}<rect x="30" y="6" width="26" height="50" fill="url(#s)"/>'
+    body += '<rect x="8" y="48" width="22" height="10" fill-opacity=".3"/>'
+    body += (
+        '<rect x="6" y="6" width="26" height="42" fill="#06c"/><circle cx="18" cy="24" r="8" fill="#fc0"/>'
+    )
+    result = vectorize(draw(body, 64, 64), make_settings(subject="drawing", **given), Backend.on(device))
+    shown = np.asarray(render_svg(result.svg))
+    assert shown[8:46, 8:30, 3].min() == 255, "what is opaque is there"
+    assert shown[:, 36:, 3].max() == shown[51:, :, 3].max() == 0
+    assert "opacity" not in result.svg
+
+
+def test_a_gradient_has_the_opacity_of_its_stops_alone() -> None:
+    body = '<linearGradient id="s"><stop stop-color="#c00"/><stop offset="1" stop-color="#c00" '
+    body += 'stop-opacity=".2"/></linearGradient><rect x="6" y="6" width="52" height="52" fill="url(#s)"/>'
+    image = draw(body, 64, 64)
+    assert np.abs(render(trace(image).scene)[8:56, 8:56] - image[8:56, 8:56]).max() < 0.02
+
+
+@pytest.mark.parametrize("placing", [{"size": "50x40mm"}, {"page": "a4"}, {"units": "in"}, {}])
+def test_figures_are_of_the_file_that_is_delivered(
+    tmp_path: Path, device: str, placing: dict[str, str]
+) -> None:
+    output = tmp_path / "out.svg"
+    image = drawn('<circle cx="16" cy="16" r="9" fill="#06c" stroke="none"/>', 32, 32)
+    settings = make_settings(subject="drawing", **placing)
+    result = vectorize_image((255 * image).astype(np.uint8), settings, Backend.on(device), output=output)
+    data = output.read_bytes()
+    assert result.score
+    assert (result.svg.encode(), result.score.bytes) == (data, len(data))
+    assert result.score.gzip_bytes == len(gzip.compress(data, 9, mtime=0))

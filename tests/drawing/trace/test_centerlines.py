@@ -1,0 +1,130 @@
+"""Skeletons and the lines in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.drawing.trace.line_art import CROSS, TEE, drawn, shown
+from warpsplat.drawing.strokes.centerlines import Line, find_lines
+from warpsplat.drawing.strokes.ink import find_ink
+from warpsplat.drawing.strokes.lines import rejoined, trace_lines
+from warpsplat.drawing.strokes.pens import find_pens, width_steps
+from warpsplat.drawing.strokes.skeleton import find_graph
+from warpsplat.scene import Canvas, Kind, Scene
+from warpsplat.svg.write import write_svg
+
+
+def lines_of(paths: str) -> list[Line]:
+    return find_lines(find_ink(drawn(paths))).lines
+
+
+def away(line: Line, start: tuple[float, float], end: tuple[float, float]) -> float:
+    """Largest distance of a line's points from a straight one."""
+    way = np.subtract(end, start) / np.hypot(*np.subtract(end, start))
+    off = line.points - start
+    return float(np.abs(off[:, 0] * way[1] - off[:, 1] * way[0]).max())
+
+
+def test_a_skeleton_has_nodes_where_lines_meet_and_end() -> None:
+    graph, radii = find_graph(drawn(CROSS)[..., 0] < 0.5)
+    assert sorted(len(edges) for edges in graph.at if edges) == [1, 1, 1, 1, 4]
+    assert len(graph.edges) == 4
+    assert radii.max() == pytest.approx(1.5, abs=1)
+
+
+def test_burrs_are_no_lines() -> None:
+    graph, _ = find_graph(
+        drawn('<path d="M15 36H80" stroke-width="14" stroke-linecap="butt"/>')[..., 0] < 0.5
+    )
+    assert len(graph.edges) == 1
+
+
+def test_lines_go_straight_on_through_a_crossing() -> None:
+    lines = lines_of(CROSS)
+    assert len(lines) == 2
+    ends = [((20, 12), (76, 60)), ((22, 58), (78, 16))]
+    for start, end in ends:
+        assert min(away(line, start, end) for line in lines) < 0.5
+
+
+def test_a_line_that_ends_at_another_reaches_it() -> None:
+    lines = sorted(lines_of(TEE), key=lambda line: float(np.ptp(line.points[:, 0])))
+    assert len(lines) == 2
+    stem = lines[0].points
+    assert np.abs(stem[:, 0] - 48).max() < 0.35
+    assert stem[:, 1].min() == pytest.approx(20, abs=1.2)
+
+
+def test_a_ring_is_closed_and_its_width_known() -> None:
+    (line,) = lines_of('<circle cx="48" cy="36" r="22"/>')
+    assert line.closed
+    assert np.hypot(*(line.points - (48, 36)).T) == pytest.approx(22, abs=0.3)
+    assert line.widths == pytest.approx(3, abs=0.35)
+
+
+@pytest.mark.parametrize("width", [1.5, 2, 4, 6])
+def test_widths_are_measured(width: float) -> None:
+    (line,) = lines_of(f'<path d="M15 20Q50 5 80 55" stroke-width="{width}"/>')
+    assert np.median(line.widths) == pytest.approx(width, abs=0.3)
+
+
+def test_a_width_changes_in_steps() -> None:
+    widths = np.concatenate([np.full(40, 2.0), np.full(60, 5.0)])
+    rng = np.random.default_rng(0)
+    steps = width_steps(widths + rng.normal(0, 0.1, 100), 1.0)
+    assert [(low, high) for low, high, _ in steps] == [(0, 40), (40, 99)]
+    assert [width for _, _, width in steps] == pytest.approx([2, 5], abs=0.15)
+    assert len(width_steps(np.full(50, 3.0) + rng.normal(0, 0.2, 50), 1.0)) == 1
+
+
+def test_pens_are_told_apart_by_colour() -> None:
+    colors = np.array([[0.1, 0.1, 0.1], [0.8, 0.1, 0.1], [0.16, 0.14, 0.1], [0.75, 0.15, 0.1]], np.float32)
+    pens, owner = find_pens(colors, np.array([10.0, 30.0, 9.0, 20.0]))
+    assert owner.tolist() == [1, 0, 1, 0]
+    assert pens == pytest.approx(np.array([[0.8, 0.1, 0.1], [0.1, 0.1, 0.1]]), abs=0.06)
+
+
+def test_each_pen_is_a_layer_of_opaque_strokes() -> None:
+    scene = trace_lines(drawn('<path d="M10 20H86"/><path d="M10 50H60" stroke="#c00"/>'))
+    assert (scene.kind == Kind.STROKE).all()
+    assert (scene.opacities == 1).all()
+    assert scene.layer.tolist() == [0, 1]
+    assert scene.colors == pytest.approx(np.array([[0, 0, 0], [0.8, 0, 0]]), abs=0.02)
+
+
+def test_corners_are_kept() -> None:
+    """A square of four lines: four cubics."""
+    scene = trace_lines(drawn('<rect x="20" y="12" width="50" height="44" stroke-linejoin="round"/>'))
+    assert scene.closed.tolist() == [1]
+    corners = scene.points[::3]
+    for place in ((20, 12), (70, 12), (70, 56), (20, 56)):
+        assert np.hypot(*(corners - place).T).min() < 1.2
+    assert len(corners) <= 6
+
+
+def test_an_area_is_filled_by_rings_of_the_pen() -> None:
+    lines = '<path d="M4 5H92"/><path d="M4 67H92"/><path d="M60 12V62"/>'
+    image = drawn(lines + '<circle cx="28" cy="36" r="20" fill="#000" stroke="none"/>')
+    scene = trace_lines(image)
+    assert scene.widths.max() < 5
+    painted = shown(write_svg(replace(scene, canvas=replace(scene.canvas, background=None)))) > 0.5
+    assert painted[image[..., 0] < 0.5].mean() > 0.95
+    assert (image[..., 0] < 0.5)[painted].mean() > 0.95
+
+
+def test_ends_that_met_stay_where_they_met() -> None:
+    """The parts of a line whose width changes."""
+    points = np.array([[[8, 30], [20, 30], [35, 34], [48, 36]], [[48, 36], [60, 38], [75, 40], [88, 40]]])
+    before = Scene.uniform(Kind.STROKE, Canvas(96, 72, None), points.astype(np.float32))
+    moved = before.points + np.random.default_rng(0).normal(0, 0.5, (8, 2)).astype(np.float32)
+    after = rejoined(before, replace(before, points=moved))
+    kept = [False, False, True, True, True, True, False, False]
+    assert (after.points == before.points).all(axis=1).tolist() == kept
+    assert (after.points == moved).all(axis=1).tolist() == [not was for was in kept]
+
+
+def test_no_ink_no_strokes() -> None:
+    assert len(trace_lines(np.ones((40, 50, 3), np.float32))) == 0

@@ -1,0 +1,123 @@
+"""Lines, cubics, corners."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpsplat.drawing.trace.corners import find_corners
+from warpsplat.drawing.trace.curves import Pieces, Run, fit_ellipse, fit_runs
+from warpsplat.drawing.trace.grids import Floats
+
+
+def noise(*shape: int) -> Floats:
+    """Standard deviation 0.02 px, whatever was drawn before."""
+    return np.random.default_rng(0).normal(0, 0.02, shape)
+
+
+def ring(radius: float, count: int = 200, squeeze: float = 1.0, turn: float = 0.0) -> Floats:
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    points = radius * np.stack([np.cos(angle), squeeze * np.sin(angle)], axis=1)
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return np.asarray(points @ rotation.T + 50)
+
+
+def polygon(corners: Floats, step: float = 1.0) -> Floats:
+    """Points along a closed polygon, none at its corners."""
+    parts = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        count = int(np.hypot(*(b - a)) / step)
+        parts.append(a + (b - a) * ((np.arange(count) + 0.5) / count)[:, None])
+    return np.concatenate(parts)
+
+
+def sampled(pieces: Pieces, count: int = 40) -> Floats:
+    t = np.linspace(0, 1, count)[:, None]
+    weights = np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
+    return np.concatenate([weights @ cubic for cubic in pieces.cubics])
+
+
+def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:
+    (pieces,) = fit_runs([Run(points, closed=True)], tolerance)
+    assert np.allclose(pieces.cubics[:, 3], np.roll(pieces.cubics[:, 0], -1, axis=0), atol=1e-6), "no gaps"
+    return pieces
+
+
+@pytest.mark.parametrize("radius", [3.0, 12.0, 40.0])
+def test_a_circle_is_four_cubics(radius: float) -> None:
+    points = ring(radius) + noise(200, 2)
+    pieces = fitted(points)
+    assert len(pieces.cubics) == 4 and not pieces.lines.any()
+    assert np.abs(np.hypot(*(sampled(pieces) - 50).T) - radius).max() < 0.03
+    ends = pieces.cubics[:, 0] - pieces.cubics[:, 0].mean(axis=0)
+    assert (np.abs(ends) < 1e-6).any(axis=1).all(), "its nodes are where it is upright or level"
+
+
+def test_an_ellipse_is_four_cubics_the_way_round_that_it_was() -> None:
+    points = ring(30, squeeze=0.5, turn=0.4)
+    for way in (points, points[::-1]):
+        pieces = fit_ellipse(way, 0.2)
+        assert pieces is not None
+        shown = sampled(pieces)
+        nearest = np.hypot(*(shown[:, None] - points[None]).transpose(2, 0, 1)).min(axis=1)
+        assert nearest.max() < 0.5  # half of the points' distance
+        area = np.sum(shown[:-1, 0] * shown[1:, 1] - shown[1:, 0] * shown[:-1, 1])
+        wanted = np.sum(way[:-1, 0] * way[1:, 1] - way[1:, 0] * way[:-1, 1])
+        assert np.sign(area) == np.sign(wanted)
+
+
+def test_a_square_is_no_ellipse() -> None:
+    assert fit_ellipse(polygon(np.array([(0, 0), (20, 0), (20, 20), (0, 20)], float)), 0.2) is None
+
+
+def test_a_polygon_is_lines_between_its_corners() -> None:
+    corners = np.array([(10, 10), (60, 14), (40, 30), (70, 60), (12, 50)], float)
+    pieces = fitted(polygon(corners) + noise(len(polygon(corners)), 2))
+    assert pieces.lines.all() and len(pieces.cubics) == 5
+    found = pieces.cubics[:, 0]
+    off = np.hypot(*(found[:, None] - corners[None]).transpose(2, 0, 1)).min(axis=1)
+    assert off.max() < 0.3, "0.05 as a rule, 0.13 at most, of sixty such noises"
+    thirds = pieces.cubics[:, 0] + (pieces.cubics[:, 3] - pieces.cubics[:, 0]) / 3
+    assert np.allclose(pieces.cubics[:, 1], thirds)
+
+
+def test_nearly_level_lines_are_level() -> None:
+    corners = np.array([(10, 10.05), (60, 10), (60.04, 40), (10, 40)], float)
+    pieces = fitted(polygon(corners))
+    ways = pieces.cubics[:, 3] - pieces.cubics[:, 0]
+    assert len(ways) == 4
+    assert (np.abs(ways).min(axis=1) == 0).all()
+
+
+def test_a_rounded_square_is_lines_and_arcs() -> None:
+    side, radius = 60.0, 15.0
+    angle = np.linspace(0, np.pi / 2, 24)
+    parts = []
+    for k, center in enumerate([(45, 45), (15, 45), (15, 15), (45, 15)]):
+        turned = angle + k * np.pi / 2
+        parts.append(np.array(center) + radius * np.stack([np.cos(turned), np.sin(turned)], axis=1))
+        start = parts[-1][-1]
+        way = np.array([(-1, 0), (0, -1), (1, 0), (0, 1)][k])
+        parts.append(start + way * np.arange(1, side - 2 * radius)[:, None])
+    pieces = fitted(np.concatenate(parts))
+    assert pieces.lines.sum() == 4
+    assert len(pieces.cubics) <= 10
+    assert find_corners(np.concatenate(parts), closed=True) == []
+
+
+def test_stairs_and_small_circles() -> None:
+    """A circle of 3 px radius turns everywhere and has no corner; each step of a stair has one."""
+    assert find_corners(ring(3.0, 20), closed=True) == []
+    stair = np.array([(0, 0), (8, 0), (8, 8), (16, 8), (16, 16), (0, 16)], float)
+    assert len(find_corners(polygon(stair), closed=True)) == 6
+
+
+def test_open_runs_end_where_they_are_told_to() -> None:
+    x = np.arange(1.0, 40)
+    points = np.stack([x, 10 * np.sin(x / 12)], axis=1)
+    start, end = np.array([0.0, 0.0]), np.array([40.0, 10 * np.sin(40 / 12)])
+    (pieces,) = fit_runs([Run(points, False, start, end)], 0.2)
+    assert np.allclose(pieces.cubics[0, 0], start) and np.allclose(pieces.cubics[-1, 3], end)
+    assert len(pieces.cubics) <= 3
+    shown = sampled(pieces, 200)
+    assert np.hypot(*(points[:, None] - shown[None]).transpose(2, 0, 1)).min(axis=1).max() < 0.25

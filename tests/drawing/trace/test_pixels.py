@@ -1,0 +1,125 @@
+"""Pixel art: the file shows the very image, by as few corners as its cells have."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpsplat.drawing.trace import pixels
+from warpsplat.drawing.trace.pixels import find_cells, outlines, polygons, trace_pixels
+from warpsplat.errors import ImageError
+from warpsplat.metrics import score_svg
+from warpsplat.scene import FloatArray
+from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import render_svg
+from warpsplat.svg.write import write_svg
+
+
+def noise(side: int, colors: int, seed: int = 0) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    palette = rng.integers(0, 256, (colors, 3)) / 255
+    return palette[rng.integers(0, colors, (side, side))].astype(np.float32)
+
+
+def enlarged(image: FloatArray, size: int) -> FloatArray:
+    return np.kron(image, np.ones((size, size, 1), np.float32))
+
+
+@pytest.mark.parametrize("size", [1, 3, 10])
+def test_nothing_is_lost(size: int) -> None:
+    image = enlarged(noise(16, 5), size)
+    scene, per_pixel = trace_pixels(image)
+    assert find_cells(image).size == size
+    assert per_pixel == 1 / size
+    score = score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False)
+    assert score.psnr == np.inf
+    assert score.paths == 4, "and the ground"
+
+
+def test_colours_are_those_of_eight_bits() -> None:
+    """An image of 16 bits may have many more."""
+    image = noise(16, 3)
+    finer = image + np.random.default_rng(2).uniform(-0.4, 0.4, image.shape).astype(np.float32) / 255
+    scene, _ = trace_pixels(np.clip(finer, 0, 1).astype(np.float32))
+    assert len(scene) == 2
+
+
+def test_what_is_empty_stays_empty() -> None:
+    image = np.concatenate([noise(16, 4), np.ones((16, 16, 1), np.float32)], axis=2)
+    image[np.random.default_rng(1).random((16, 16)) < 0.3] = 0
+    scene, per_pixel = trace_pixels(image)
+    assert scene.canvas.background is None
+    assert len(scene) == 4
+    assert score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False).psnr == np.inf
+
+
+def test_a_background_of_its_own_needs_no_path() -> None:
+    image = noise(8, 3)
+    scene, _ = trace_pixels(image, np.asarray(image[0, 0]))
+    assert len(scene) == 2
+    scene, _ = trace_pixels(image, np.array([0.1, 0.2, 0.3], np.float32))
+    assert len(scene) == 3
+
+
+def test_only_corners_are_kept() -> None:
+    """A ring: four corners outside, four inside, the other way round."""
+    ring = np.ones((5, 6), np.bool_)
+    ring[2, 2:4] = False
+    outer, inner = sorted(outlines(ring), key=min)
+    assert set(outer) == {(0, 0), (6, 0), (6, 5), (0, 5)}
+    assert set(inner) == {(2, 2), (4, 2), (4, 3), (2, 3)}
+    assert _area(outer) == 30
+    assert _area(inner) == -2
+
+
+def _area(points: list[tuple[int, int]]) -> float:
+    x, y = np.array(points, float).T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+
+
+def test_cells_that_touch_by_a_corner_are_apart() -> None:
+    found = outlines(np.eye(3, dtype=np.bool_))
+    assert len(found) == 3
+    assert all(len(points) == 4 for points in found)
+
+
+def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pixels, "MOST_CELLS", 100)
+    with pytest.raises(ImageError, match="16x16 cells of 2 px, more than pixel art may have"):
+        trace_pixels(enlarged(noise(16, 3), 2))
+
+
+@pytest.mark.parametrize("most", [4, 12, 60])
+def test_a_colour_of_many_corners_has_several_shapes(most: int) -> None:
+    image = np.random.default_rng(4).integers(0, 2, (12, 15, 1)).repeat(3, axis=2).astype(np.float32)
+    whole, _ = trace_pixels(image)
+    scene, per_pixel = trace_pixels(image, most=most)
+    assert len(whole) == 1
+    assert len(scene) > 1
+    assert (scene.point_counts() <= 3 * most).all()
+    shown = np.asarray(render_svg(write_svg(scene, per_pixel=per_pixel)).convert("RGB"))
+    assert (shown == np.round(255 * image)).all()
+
+
+def test_ever_smaller_parts_end_with_cells() -> None:
+    inside = np.ones((3, 2), np.bool_)
+    assert sorted(polygons(inside, 1)) == sorted(
+        [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]] for x in range(2) for y in range(3)
+    )
+
+
+def test_no_hairlines_at_a_zoom_that_ends_cells_within_pixels() -> None:
+    image = np.concatenate([noise(12, 3), np.ones((12, 12, 1), np.float32)], axis=2)
+    scene, per_pixel = trace_pixels(image)
+    text = write_svg(scene, per_pixel=per_pixel)
+    # What begins in the last row and column is not whole.
+    shown = np.asarray(render_svg(text, zoom=1.37).convert("RGBA"))[:-1, :-1]
+    known = np.round(image[..., :3].reshape(-1, 3) * 255).astype(np.uint8)
+    assert (shown[..., 3] == 255).all()
+    assert set(map(tuple, shown[..., :3].reshape(-1, 3))) <= set(map(tuple, known))
+    assert len(load_scene(text, 12, 12, "cells.svg")[0]) == len(scene), "and the file can be read again"
+
+
+def test_one_colour_on_a_ground_abuts_nothing() -> None:
+    text = write_svg(trace_pixels(noise(12, 2))[0])
+    assert "shape-rendering" not in text

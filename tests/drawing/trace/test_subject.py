@@ -1,0 +1,65 @@
+"""What a picture is taken for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
+from warpsplat.drawing.trace.subject import guess_subject
+from warpsplat.scene import FloatArray
+
+LINES = ground("#fff") + (
+    '<g stroke="#111" fill="none"><path d="M8 20L88 60"/>'
+    '<path d="M8 60C40 0 60 100 90 20" stroke-width="2"/></g>'
+)
+LARGE = f'<g transform="scale(2)">{LOGO}</g>'
+BARS = (
+    ground("#264653", 192, 192) + '<rect x="20" y="20" width="60" height="150" fill="#2a9d8f"/>'
+    '<circle cx="130" cy="90" r="40" fill="#e9c46a"/>'
+)
+RAMP = (
+    '<defs><linearGradient id="a"><stop stop-color="#f80"/><stop offset="1" stop-color="#80f"/>'
+    '</linearGradient></defs><rect x="8" y="8" width="80" height="60" fill="url(#a)"/>'
+)
+
+
+def cells(side: int, size: int, colors: int) -> FloatArray:
+    rng = np.random.default_rng(0)
+    image = (rng.integers(0, 256, (colors, 3)) / 255)[rng.integers(0, colors, (side, side))]
+    return np.kron(image, np.ones((size, size, 1))).astype(np.float32)
+
+
+def dithered(side: int = 96) -> FloatArray:
+    rng = np.random.default_rng(0)
+    dots = rng.random((side, side, 1)) < np.linspace(0, 1, side)[:, None]
+    return np.repeat(dots, 3, axis=2).astype(np.float32)
+
+
+def grainy(image: FloatArray, levels: float = 13.0) -> FloatArray:
+    """With noise of so many levels in each pixel and channel."""
+    noise = np.random.default_rng(0).normal(0, levels, image.shape)
+    return (np.clip(np.round(255 * image + noise), 0, 255) / 255).astype(np.float32)
+
+
+PICTURES = {
+    "logo": (draw(LOGO), "drawing"),
+    "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
+    "jpeg": (draw(BARS, 192, 192, jpeg=60), "drawing"),
+    "ramp": (draw(ground("#eee") + RAMP), "drawing"),
+    "one colour": (np.ones((64, 64, 3), np.float32), "drawing"),
+    "lines": (draw(LINES), "line"),
+    "photograph": (photograph(96), "photo"),
+    "grainy logo": (grainy(draw(BARS, 192, 192)), "drawing"),
+    "grainy photograph": (grainy(0.2 + 0.6 * photograph(192)), "photo"),
+    "dithered": (dithered(160), "photo"),
+    "code": (cells(25, 4, 2), "pixel"),
+    "sprite": (cells(32, 1, 6), "pixel"),
+}
+
+
+@pytest.mark.parametrize(("image", "subject"), PICTURES.values(), ids=PICTURES.keys())
+def test_guesses(image: FloatArray, subject: str) -> None:
+    guess = guess_subject(image)
+    assert guess.subject == subject, guess.why
+    assert guess.why

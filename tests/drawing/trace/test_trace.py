@@ -1,0 +1,188 @@
+"""Drawings traced, and what the file shows of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
+from warpsplat.drawing.trace import joints
+from warpsplat.drawing.trace.regions import Coloring, Regions, components
+from warpsplat.drawing.trace.trace import Traced, trace, trace_regions
+from warpsplat.metrics import score_svg
+from warpsplat.scene import FloatArray, Paint
+from warpsplat.svg.write import write_svg
+
+
+def decibels(traced: Traced, image: FloatArray) -> float:
+    return score_svg(write_svg(traced.scene), image, eyes=False).psnr
+
+
+def hex_colors(traced: Traced) -> list[str]:
+    return ["".join(f"{round(255 * float(v)):02x}" for v in color) for color in traced.scene.colors]
+
+
+def on_outline(traced: Traced) -> np.ndarray:
+    return np.isin(traced.joints, (joints.CORNER, joints.SMOOTH))
+
+
+def test_a_logo() -> None:
+    image = draw(LOGO)
+    traced = trace(image)
+    assert sorted(hex_colors(traced)) == ["2457a8", "ee4266", "ffd23f", "ffffff"]
+    assert traced.scene.canvas.background is None
+    assert (traced.scene.opacities == 1).all()
+    assert decibels(traced, image) > 39
+    star = hex_colors(traced).index("ffd23f")
+    kinds = traced.joints[traced.scene.first[star] : traced.scene.first[star + 1]]
+    assert (kinds == joints.CORNER).sum() == 10
+    assert (kinds == joints.LINE_HANDLE).sum() == 20
+    disc = hex_colors(traced).index("ee4266")
+    assert traced.scene.point_counts()[disc] == 12
+    assert on_outline(traced).sum() * 3 == len(traced.scene.points)
+
+
+DRAWINGS = {
+    "rings": (
+        ground("#f4f1de") + '<circle cx="30" cy="48" r="20" fill="none" stroke="#e07a5f" stroke-width="7"/>'
+        '<circle cx="70" cy="44" r="18.3" fill="#3d405b"/><circle cx="70" cy="44" r="7.7" fill="#81b29a"/>',
+        40,
+        5,
+    ),
+    "overlaps": (
+        '<circle cx="40" cy="40" r="30" fill="#06d6a0"/><rect x="44" y="44" width="44" height="44" rx="8" '
+        'fill="#118ab2"/><path d="M10 90L30 60L50 90Z" fill="#ef476f"/>',
+        36,
+        3,
+    ),
+    "letters": (
+        ground("#1d3557") + '<path d="M10 80V16H44V28H24V42H40V54H24V80Z" fill="#f1faee"/><path '
+        'fill-rule="evenodd" d="M50 80L66 16H76L92 80H80L77 66H65L62 80ZM67 54H75L71 36Z" fill="#a8dadc"/>',
+        36,
+        2,
+    ),
+    "gradient": (
+        '<defs><radialGradient id="b"><stop stop-color="#fff"/><stop offset="1" stop-color="#0a7"/>'
+        f'</radialGradient></defs>{ground("#eee")}<circle cx="48" cy="48" r="40" fill="url(#b)"/>',
+        41,
+        1,
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "least", "paths"), DRAWINGS.values(), ids=DRAWINGS.keys())
+def test_drawings(body: str, least: float, paths: int) -> None:
+    image = draw(body)
+    traced = trace(image)
+    assert decibels(traced, image) > least
+    assert len(traced.scene) <= paths
+
+
+def test_a_gradient_is_kept() -> None:
+    image = draw(DRAWINGS["gradient"][0])
+    assert trace(image).scene.paint.tolist() == [Paint.RADIAL]
+
+
+def test_pixels_that_are_exact_stay_exact() -> None:
+    body = (
+        ground("#fff") + '<rect width="96" height="31" fill="#c8102e"/><rect y="60" width="96" height="36" '
+    )
+    body += 'fill="#003da5"/><rect x="40" y="20" width="20" height="50" fill="#ffcd00"/>'
+    image = draw(body, hard=True)
+    traced = trace(image)
+    assert decibels(traced, image) == np.inf
+    assert len(traced.scene) == 3
+    assert on_outline(traced).sum() <= 20
+    assert (traced.joints != joints.SMOOTH).all() and (traced.joints != joints.FREE).all()
+
+
+def test_what_lies_below_goes_on_below() -> None:
+    """The square is four corners, the disc on its edge cuts nothing out of it."""
+    body = ground("#fff") + '<rect x="10" y="20" width="50" height="50" fill="#357"/>'
+    traced = trace(draw(body + '<circle cx="60" cy="45" r="18" fill="#e94"/>'))
+    square = hex_colors(traced).index("335577")
+    assert 4 <= traced.scene.point_counts()[square] / 3 <= 7
+    disc = hex_colors(traced).index("ee9944")
+    assert disc > square
+    assert traced.scene.point_counts()[disc] == 12
+
+
+def test_holes_of_a_ring_stay_open() -> None:
+    """Whatever lies in the ring: the middle is transparent."""
+    body = '<circle cx="48" cy="48" r="38" fill="none" stroke="#333" stroke-width="14"/>'
+    image = draw(body + '<circle cx="48" cy="48" r="38" fill="none" stroke="#fb0" stroke-width="5"/>')
+    traced = trace(image)
+    assert traced.scene.canvas.background is None
+    assert decibels(traced, image) > 35
+
+
+def test_ground_seen_through_layers_is_painted() -> None:
+    """Letters of the ground's colour on a band on a disc."""
+    body = ground("#0a3") + '<circle cx="48" cy="48" r="44" fill="#fd0"/><rect x="14" y="30" width="68" '
+    image = draw(body + 'height="36" fill="#fff"/><rect x="40" y="40" width="16" height="16" fill="#0a3"/>')
+    traced = trace(image)
+    assert decibels(traced, image) > 40
+
+
+def test_translucent_regions_keep_their_opacity() -> None:
+    image = draw('<rect x="10" y="10" width="60" height="60" fill="#804020" fill-opacity="0.5"/>')
+    traced = trace(image)
+    assert len(traced.scene) == 1
+    assert traced.scene.opacities[0] == pytest.approx(0.5, abs=0.01)
+    assert decibels(traced, image) > 45
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_a_limit_of_paths(most: int) -> None:
+    traced = trace(draw(LOGO), most=most)
+    assert 1 <= len(traced.scene) <= most
+
+
+@pytest.mark.parametrize("shape", [(2, 2, 3), (2, 9, 4), (3, 3, 4)])
+def test_the_smallest_pictures(shape: tuple[int, ...]) -> None:
+    image = np.random.default_rng(0).random(shape).astype(np.float32)
+    image[..., :3] *= image[..., 3:] if shape[2] == 4 else 1
+    traced = trace(image)
+    assert len(traced.joints) == len(traced.same) == len(traced.scene.points)
+    assert np.isfinite(traced.scene.points).all()
+
+
+def test_one_colour_and_nothing() -> None:
+    white = trace(np.ones((8, 8, 3), np.float32))
+    assert len(white.scene) == 0 and white.scene.canvas.background is not None
+    empty = trace(np.zeros((8, 8, 4), np.float32))
+    assert len(empty.scene) == 0 and empty.scene.canvas.background is None
+
+
+def test_photographs_are_traced_too() -> None:
+    """By mistake, but to an end."""
+    image = photograph()
+    traced = trace(image, most=40)
+    assert len(traced.scene) <= 40
+    assert decibels(traced, image) > 12
+
+
+def test_regions_of_single_pixels_are_traced() -> None:
+    """Around one pixel an outline has no direction."""
+    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 200, 255]], np.float32)
+    painted = np.random.default_rng(0).integers(0, 3, (4, 4)).astype(np.int32)
+    image = palette[painted]
+    labels = components(painted, image)
+    paint = np.zeros(labels.max() + 1, np.int32)
+    paint[labels] = painted
+    regions = Regions(labels, image, paint, [Coloring(color) for color in palette], 0.0)
+    with np.errstate(all="raise"):
+        traced = trace_regions(image, regions)
+    assert np.isfinite(traced.scene.points).all()
+
+
+def test_a_ground_is_the_canvas_although_a_seed_was_given_up() -> None:
+    """A colouring that no region has says nothing of opacity."""
+    painted = np.zeros((12, 12), np.int32)
+    painted[3:9, 3:9] = 1
+    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 0, 0]], np.float32)
+    image = palette[painted]
+    regions = Regions(painted, image, np.arange(2, dtype=np.int32), [Coloring(c) for c in palette], 0.0)
+    scene = trace_regions(image, regions).scene
+    assert scene.canvas.background is not None
+    assert len(scene) == 1

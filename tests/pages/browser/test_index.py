@@ -1,0 +1,94 @@
+"""The list of a batch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import QUICK, run
+from tests.pages.browser.conftest import fits_a_phone
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+
+def make_index(folder: Path) -> Path:
+    """Of three images, one of which is none."""
+    grain = np.random.default_rng(0).integers(0, 80, (32, 32, 3)).astype(np.uint8)
+    Image.fromarray(grain).save(folder / "b#?.png")
+    Image.fromarray(grain // 3 + 150).save(folder / "a.png")
+    (folder / "c<b>.png").write_bytes(b"no image")
+    found = run(
+        "batch", folder, "-o", folder / "out", "--report", folder / "pages", "-q", *QUICK, "--workers", 1
+    )
+    assert found == 5
+    return folder / "pages" / "index.html"
+
+
+@pytest.fixture(scope="session")
+def index_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_index(tmp_path_factory.mktemp("index"))
+
+
+@pytest.fixture
+def index(tab: Page, index_file: Path) -> Page:
+    tab.goto(index_file.as_uri())
+    tab.locator("tbody tr").first.wait_for()
+    return tab
+
+
+def names(index: Page) -> list[str]:
+    return index.locator(".called").all_text_contents()
+
+
+def test_sorting_and_filtering(index: Page) -> None:
+    assert names(index) == ["a.png", "b#?.png", "c<b>.png"]
+    index.locator("th[data-key=psnr] button").click()
+    figures = [float(text) for text in index.locator("td.number:nth-child(3)").all_text_contents() if text]
+    assert len(figures) == 2 and figures == sorted(figures, reverse=True)
+    assert names(index)[-1] == "c<b>.png"  # what has no figure
+    assert index.locator("th[data-key=psnr]").get_attribute("aria-sort") == "descending"
+    index.select_option("#sort", "name")
+    index.locator("#direction").press("Enter")
+    assert names(index) == ["c<b>.png", "b#?.png", "a.png"]
+    index.fill("#filter", "no image")
+    assert "not an image" in (index.locator(".message").text_content() or "")
+    index.fill("#filter", "")
+    index.select_option("#status", "made")
+    assert sorted(names(index)) == ["a.png", "b#?.png"]
+
+
+def test_links_lead_to_reports_and_back(index: Page) -> None:
+    assert (
+        index.locator(".pair img").first.evaluate("image => image.decode().then(() => image.naturalWidth)")
+        > 50
+    )
+    index.locator(".called a", has_text="b#?.png").click()
+    index.locator(".option").first.wait_for()
+    assert index.locator("h1").text_content() == "b#?.png"
+    index.locator(".back a").click()
+    index.locator("tbody tr").first.wait_for()
+    assert fits_a_phone(index)
+    with index.expect_navigation():
+        index.locator("tbody tr:nth-child(2) .small a").click()
+    assert index.url.endswith("out/b%23%3F.svg")
+
+
+def test_a_second_run_lists_what_was_made_before(tmp_path: Path, tab: Page) -> None:
+    make_index(tmp_path)
+    folder = tmp_path
+    page = folder / "pages" / "index-pages" / "a.svg.html"
+    made = page.read_bytes()
+    manifest = (folder / "out" / "warpsplat-manifest.jsonl").read_bytes()
+    page.unlink()
+    arguments = ("-o", folder / "out", "--report", folder / "pages", "-q", *QUICK, "--workers", 1)
+    assert run("batch", folder / "a.png", *arguments) == 0
+    assert (folder / "out" / "warpsplat-manifest.jsonl").read_bytes() == manifest
+    assert abs(len(page.read_bytes()) - len(made)) < 9000  # all but the course of the run
+    tab.goto((folder / "pages" / "index.html").as_uri())
+    assert names(tab) == ["a.png"]
+    assert (tab.locator("td.number").first.text_content() or "").strip()

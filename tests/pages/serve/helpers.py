@@ -1,0 +1,92 @@
+"""A page's requests to a server, and pictures to send."""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+import time
+from typing import Any
+
+import httpx
+import numpy as np
+from PIL import Image
+
+from warpsplat.pages.serve.limits import Limits
+from warpsplat.pages.serve.server import WarpsplatServer
+from warpsplat.pages.serve.worker import Machine
+
+CPU = Machine("cpu", 1)
+LONGEST = 60.0
+"""For anything that is waited for [s]."""
+
+
+def picture(width: int = 40, height: int = 32, kind: str = "PNG") -> bytes:
+    """With grain, so that it is taken for a photograph."""
+    y, x = np.mgrid[:height, :width]
+    smooth = np.stack([4 * x, 5 * y, 0 * x + 90], axis=2)
+    grain = np.random.default_rng(0).normal(0, 4, smooth.shape)
+    buffer = io.BytesIO()
+    Image.fromarray(np.clip(smooth + grain, 0, 255).astype(np.uint8)).save(buffer, kind)
+    return buffer.getvalue()
+
+
+def until(condition: Any) -> Any:
+    """What ``condition`` returns, once it is true."""
+    ends = time.monotonic() + LONGEST
+    while not (found := condition()):
+        assert time.monotonic() < ends
+        time.sleep(0.02)
+    return found
+
+
+class Visitor:
+    """What a page does; ``with`` it there is a server."""
+
+    def __init__(self, limits: Limits | None = None, max_memory: str | None = None) -> None:
+        self.server = WarpsplatServer("127.0.0.1", 0, machine=CPU, limits=limits, max_memory=max_memory)
+        self.store = self.server.store
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.server.port}", timeout=LONGEST)
+        self._ends, begun = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self.server.run, args=(self._ends.is_set, begun.set))
+        self._thread.start()
+        assert begun.wait(LONGEST)
+
+    def __enter__(self) -> Visitor:
+        answer = self.client.get(self.server.address(), follow_redirects=True)
+        assert answer.text.startswith("<!doctype html>")
+        self.session = self.client.post("/sessions").json()["session"]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.client.close()
+        self._ends.set()
+        self._thread.join(LONGEST)
+        assert not self._thread.is_alive()
+
+    def at(self, *parts: str) -> str:
+        return "/".join(["/sessions", self.session, *parts])
+
+    def upload(self, data: bytes, name: str = "photo.png") -> str:
+        answer = self.client.post(self.at("images"), params={"name": name}, content=data)
+        assert answer.status_code == 201, answer.text
+        return str(answer.json()["image"])
+
+    def start(self, image: str, **settings: Any) -> Any:
+        return self.client.post(self.at("runs"), content=json.dumps({"image": image, "settings": settings}))
+
+    def begin(self, image: str, **settings: Any) -> str:
+        answer = self.start(image, **settings)
+        assert answer.status_code == 201, answer.text
+        return str(answer.json()["run"])
+
+    def told(self) -> dict[str, Any]:
+        return self.store.told(self.session)
+
+    def run(self, run: str) -> dict[str, Any]:
+        return next(each for each in self.told()["runs"] if each["id"] == run)
+
+    def over(self, run: str) -> dict[str, Any]:
+        """What is told of a run once it is over."""
+        until(lambda: self.run(run)["state"] not in {"waiting", "running"})
+        return self.run(run)

@@ -1,0 +1,91 @@
+"""What there is to see of a run, and what it costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpsplat
+from tests.pages.serve.helpers import picture
+from warpsplat.fit.work import Progress, Snapshot
+from warpsplat.pages.serve.form import settings_of
+from warpsplat.pages.serve.live import LEAST_PAUSE, SHARE, Live
+
+
+@dataclass
+class Slow:
+    """A clock, and shapes that take half a second to be had."""
+
+    now: float = 0.0
+    cost: float = 0.5
+
+    def __call__(self) -> float:
+        return self.now
+
+    def scene(self) -> Any:
+        self.now += self.cost
+        return warpsplat.starting_scene(np.zeros((16, 16, 3), np.float32), 2)
+
+
+def reports(live: Live, slow: Slow, count: int = 400, step: float = 0.1) -> None:
+    snapshot = Snapshot(slow.scene, lambda: np.zeros((16, 16, 3), np.float32))
+    for number in range(1, count + 1):
+        slow.now += step
+        live(Progress(number, count, 20.0, slow.now, number / count, True, 2, snapshot))
+
+
+def test_pictures_take_a_small_share_of_the_time() -> None:
+    slow = Slow()
+    live = Live(clock=slow)
+    reports(live, slow)
+    spent = live.number * slow.cost
+    assert live.number > 3 and live.picture.startswith(b"<svg")
+    assert spent <= SHARE * slow.now + slow.cost  # the first one comes at once
+    assert spent > 0.8 * SHARE * slow.now
+
+
+def test_quick_pictures_do_not_come_too_often() -> None:
+    slow = Slow(cost=0.0)
+    live = Live(clock=slow)
+    reports(live, slow, count=100)
+    assert live.number == pytest.approx(10 / (LEAST_PAUSE + 0.1), rel=0.2)
+
+
+def test_nobody_looks() -> None:
+    slow, changes = Slow(), []
+    live = Live(lambda: False, lambda: changes.append(1), slow)
+    reports(live, slow, count=10)
+    assert live.number == 0 and len(changes) == 10
+
+
+def test_the_time_that_is_left() -> None:
+    slow = Slow(cost=0.0)
+    live = Live(clock=slow)
+    slow.now = 30.0  # kernels were compiled
+    live.begin()
+    live.say("compiling kernels: 3 s")
+    assert live.as_dict() == {"work": 0.0, "note": "compiling kernels: 3 s", "seconds": 0.0}
+    report = Progress(1, 10, math.inf, 1.0, 0.1, False, 5)
+    live(report)
+    told = live.as_dict()
+    assert (told["left"], told["psnr"], told["shapes"], told["note"]) == (None, None, 5, "")
+    slow.now += 2
+    live(replace(report, psnr=21.234, work=0.3))
+    assert live.left == pytest.approx(7.0) and live.as_dict()["psnr"] == 21.23
+
+
+def test_a_real_run_has_pictures_of_its_shapes() -> None:
+    live = Live()
+    warpsplat.vectorize(picture(), 4, subject="photo", iterations=10, device="cpu", threads=1, callback=live)
+    assert live.number >= 1 and 1 <= len(warpsplat.load_svg(live.picture)) <= 6
+
+
+def test_settings_of_the_form() -> None:
+    given = {"colors": 6, "open": False, "curves": 64, "mixed": True, "quality": "high"}
+    values, settings = settings_of(given, "2GB")
+    assert list(values) == ["curves", "mixed", "quality", "colors"]
+    assert (settings.curves, settings.mixed, settings.colors, settings.max_memory) == (64, True, 6, 2 * 10**9)

@@ -1,0 +1,131 @@
+"""The server as a program: its events, its address, its end, and what can go wrong at its beginning."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import sys
+import threading
+import webbrowser
+from typing import Any
+
+import pytest
+
+import warpsplat.pages.serve.server as server_module
+from tests.cli.helpers import one_line, run
+from tests.pages.serve.helpers import Visitor, picture, until
+from warpsplat.pages.serve.server import WarpsplatServer, is_loopback
+
+
+def states(visitor: Visitor) -> Any:
+    """The states that a page is told, one after the other."""
+    with visitor.client.stream("GET", visitor.at("events")) as answer:
+        assert answer.headers["content-type"].startswith("text/event-stream")
+        for line in answer.iter_lines():
+            if line.startswith("data: "):
+                yield json.loads(line.removeprefix("data: "))
+
+
+def test_a_page_is_told_what_happens(visitor: Visitor) -> None:
+    image = visitor.upload(picture())
+    visitor.begin(image, curves=4, subject="photo", quality="high")
+    seen: list[dict[str, Any]] = []
+    for state in states(visitor):
+        (told,) = state["runs"]
+        seen.append(told)
+        live = told.get("live", {})
+        if live.get("pictures", 0) > 1 and live["work"] > 0:  # the share of a million steps is rounded
+            svg = visitor.client.get(visitor.at("runs", told["id"], "live.svg"))
+            assert svg.headers["content-type"] == "image/svg+xml" and svg.text.startswith("<svg")
+            break
+    until(lambda: not visitor.store.is_attended(visitor.session))
+    (told,) = next(states(visitor))["runs"]  # a page that comes back
+    assert told["live"]["work"] >= seen[-1]["live"]["work"] > 0 and told["live"]["shapes"] > 0
+    assert visitor.client.get("/sessions/none/events").status_code == 404
+
+
+def test_streams_end_with_the_server(visitor: Visitor) -> None:
+    page = states(visitor)
+    next(page)
+    visitor.store.close()
+    assert list(page) == []
+
+
+def test_ctrl_c_ends_it_and_its_runs(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    made: list[WarpsplatServer] = []
+    begin = WarpsplatServer.__init__
+
+    def noted(self: WarpsplatServer, *given: Any, **named: Any) -> None:
+        made.append(self)
+        begin(self, *given, **named)
+
+    monkeypatch.setattr(WarpsplatServer, "__init__", noted)
+
+    def visit() -> None:
+        until(lambda: opened)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    visiting = threading.Thread(target=visit)
+    visiting.start()
+    assert run("serve", "--port", 0, "--device", "cpu", "--open") == 128 + signal.SIGINT
+    visiting.join()
+    shown = capsys.readouterr()
+    address = shown.out.split()[1]
+    assert shown.out == f"warpsplat: {made[0].address()} (Ctrl-C ends it)\n" and shown.err == ""
+    assert address.startswith("http://127.0.0.1:")
+    assert opened[0].partition("=")[0] == address.partition("=")[0] and opened[0] != address
+    assert made[0].store.closed and not [t for t in threading.enumerate() if t.name == "runs"]
+
+
+def test_a_port_that_is_in_use(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert run("serve", "--port", port, "--device", "cpu") == 2
+    said = one_line(capsys.readouterr().err)
+    assert said == f"warpsplat: port {port} of 127.0.0.1: Address already in use; --port 0 finds a free one"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--host", "no.such.host.invalid"], "--host no.such.host.invalid: "),
+        (["--max-upload", "much"], "not a size: 'much'"),
+        (["--max-memory", "much"], "not a size: 'much'"),
+        (["--device", "cuda:77"], "unknown device 'cuda:77'"),
+    ],
+)
+def test_what_cannot_be_used(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("serve", "--port", 0, *arguments) == 2
+    assert one_line(capsys.readouterr().err).startswith(f"warpsplat: {said}")
+
+
+def test_without_its_packages(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "warpsplat.pages.serve.server")
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    assert run("serve") == 2
+    assert one_line(capsys.readouterr().err).endswith('; pip install "warpsplat[serve]" installs it')
+
+
+def test_other_machines_are_let_in_with_a_warning_only(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server_module.WarpsplatServer, "run", lambda *_: None)
+    assert run("serve", "--port", 0, "--host", "0.0.0.0", "--device", "cpu") == 0
+    assert one_line(capsys.readouterr().err).startswith("warpsplat: --host 0.0.0.0: others can reach it")
+    for host in ("127.0.0.1", "127.1.2.3", "::1", "localhost"):
+        assert is_loopback(host)
+    for host in ("0.0.0.0", "::", "192.168.1.2", "example.org"):
+        assert not is_loopback(host)
+
+
+def test_addresses() -> None:
+    server = WarpsplatServer("::1", 0)
+    assert server.address().startswith(f"http://[::1]:{server.port}/?token=")
+    assert server.ticket() != server.address()
+    server.close()

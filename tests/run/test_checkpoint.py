@@ -1,0 +1,281 @@
+"""Runs that are ended and go on: to the same bytes, from their own checkpoints only."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpsplat
+from tests.fit.pictures import picture
+from tests.scenes import random_scene
+from warpsplat.errors import CheckpointError, OutputError, UsageError, WarpsplatError
+from warpsplat.files.packed import is_packed, pack, unpack
+from warpsplat.fit import stages
+from warpsplat.run import checkpoint as module
+from warpsplat.scene import Kind
+from warpsplat.svg.write import read_metadata, write_svg
+
+PICTURE = picture(48, 36)
+CLEAR = np.concatenate([PICTURE, np.ones_like(PICTURE[..., :1])], axis=2)
+CLEAR[:12, :20] = 0
+MASK = np.ascontiguousarray(PICTURE[..., 0])
+
+
+def after(count: int) -> Callable[[], bool]:
+    """A wish to stop after so many steps."""
+    steps = itertools.count(1)
+    return lambda: next(steps) >= count
+
+
+def fitted(**given: Any) -> warpsplat.Result:
+    common = {"image": PICTURE, "curves": 10, "iterations": 56, "seed": 1, "subject": "photo"}
+    return warpsplat.vectorize(**{**common, "device": "cpu", "threads": 1, **given})
+
+
+def refined(**given: Any) -> warpsplat.Result:
+    height, width = PICTURE.shape[:2]
+    text = write_svg(random_scene(Kind.FILL, count=6, width=width, height=height, seed=3))
+    return warpsplat.refine(text, PICTURE, iterations=56, device="cpu", threads=1, **given)
+
+
+RUNS: dict[str, Callable[..., warpsplat.Result]] = {
+    "closed": fitted,
+    "open": lambda **given: fitted(open=True, **given),
+    "splat": lambda **given: fitted(renderer="splat", **given),
+    "gaussian": lambda **given: fitted(renderer="gaussian", open=True, **given),
+    "layered": lambda **given: fitted(curves=None, levels=(4, 12), iterations=28, **given),
+    "mixed": lambda **given: fitted(mixed=True, **given),
+    "paint": lambda **given: fitted(paint="auto", **given),
+    "palette": lambda **given: fitted(colors=4, **given),
+    "transparent": lambda **given: fitted(**{"image": CLEAR} | given),
+    "importance": lambda **given: fitted(importance=MASK, **given),
+    "size": lambda **given: fitted(max_bytes=1200, curves=34, iterations=16, **given),
+    "target": lambda **given: fitted(target_psnr=20.0, curves=10, iterations=12, **given),
+    "refine": refined,
+}
+
+
+@pytest.mark.parametrize("kind", RUNS)
+def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path, kind: str) -> None:
+    """Stopped at some step; exact ones twice, then behind a look at the file as well."""
+    run, path = RUNS[kind], tmp_path / "run.checkpoint"
+    whole = run()
+    first = run(checkpoint=path, stop=after(3 + sum(map(ord, kind)) % 24))
+    assert first.stopped and first.iterations < whole.iterations and is_packed(path)
+    if kind in {"closed", "transparent", "size"}:
+        second = run(checkpoint=path, resume=True, stop=after(30))
+        assert second.stopped and first.iterations < second.iterations < whole.iterations
+    result = run(checkpoint=path, resume=True)
+    assert result.svg == whole.svg
+    assert result.as_dict() | {"seconds": 0} == whole.as_dict() | {"seconds": 0}
+    assert not path.exists(), "of a run that is done nothing is left"
+
+
+def test_a_run_that_was_killed_goes_on_from_the_last_save(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "SPARE", 0.0)
+    path = tmp_path / "run.checkpoint"
+
+    def killed() -> bool:
+        if next(steps) == 31:
+            raise KeyboardInterrupt
+        return False
+
+    steps = itertools.count(1)
+    with pytest.raises(KeyboardInterrupt):
+        fitted(checkpoint=path, checkpoint_every=0, stop=killed)
+    header, _ = unpack(path)
+    assert [state["step"] for state in header["fits"]] == [30]
+    assert fitted(checkpoint=path, resume=True).svg == fitted().svg
+
+
+def test_saving_costs_a_hundredth(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr("warpsplat.fit.stages.time.monotonic", lambda: now[0])
+    written: list[stages.Content] = []
+
+    def write(content: stages.Content) -> None:
+        written.append(content)
+        now[0] += 2.0
+
+    kept = stages.Stages("f", write, 30.0)
+    stage = kept.begin()
+    for second in range(500):
+        now[0] += 1.0
+        stage.keep(lambda second=second: stages.Content({"step": second}, {}), now=False)  # type: ignore[misc]
+    assert [content.numbers["fits"][0]["step"] for content in written] == [29, 229, 429]
+
+
+def test_a_stopped_file_says_so_and_a_goal_is_stopped_between_its_fits(tmp_path: Path) -> None:
+    """In the last step of a fit: it is done, and the next one is begun by the run that goes on."""
+    path = tmp_path / "run.checkpoint"
+    run = RUNS["layered"]
+    stopped = run(checkpoint=path, stop=after(21))
+    header, _ = unpack(path)
+    assert not header["under way"] and len(header["fits"]) == 1
+    assert "stopped" in read_metadata(stopped.svg)
+    assert run(checkpoint=path, resume=True).svg == run().svg
+
+
+FLAT = np.repeat(np.repeat(np.float32([[[1, 0, 0], [0, 0, 1]]]), 12, axis=0), 8, axis=1)
+
+
+@pytest.mark.parametrize("given", [{"subject": "drawing", "image": FLAT}, {"time_budget": 30}])
+def test_what_has_no_state_begins_again(
+    tmp_path: Path, given: dict[str, Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "run.checkpoint"
+    assert fitted(checkpoint=path, stop=lambda: True, **given).stopped
+    assert not fitted(checkpoint=path, resume=True, stop=lambda: "time_budget" in given, **given).missed
+    assert "starts anew" in caplog.text
+
+
+def test_where_no_checkpoint_is_a_run_begins(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    fitted(iterations=2, checkpoint=tmp_path / "none", resume=True)
+    assert "no checkpoint is there yet" in caplog.text
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("saved") / "run.checkpoint"
+    fitted(checkpoint=path, stop=after(12))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("given", "cause"),
+    [
+        ({"image": PICTURE[::-1]}, "image differs"),
+        ({"image": PICTURE[:-1]}, "image differs"),
+        ({"importance": MASK}, "mask differs"),
+        ({"curves": 11}, r"curves differs \(10, now 11\)"),
+        ({"settings": warpsplat.make_settings(curves=10, rates={"points": 2.0})}, "differs"),
+    ],
+)
+def test_another_run_is_refused(saved: Path, given: dict[str, Any], cause: str) -> None:
+    if "settings" in given:
+        given |= dict.fromkeys(("curves", "iterations", "seed", "subject"))
+    with pytest.raises(UsageError, match=rf"run\.checkpoint: .*{cause}"):
+        fitted(checkpoint=saved, resume=True, **given)
+    with pytest.raises(UsageError, match="command differs"):
+        refined(checkpoint=saved, resume=True)
+    assert is_packed(saved)
+
+
+def changed(saved: Path, path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], None]) -> Path:
+    """A checkpoint with other content, well packed."""
+    header, arrays = unpack(saved)
+    change(header, arrays)
+    path.write_bytes(pack(header, arrays))
+    return path
+
+
+def at(*keys: Any, value: Any) -> Callable[[dict[str, Any], dict[str, np.ndarray]], None]:
+    """A change of one entry."""
+
+    def change(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        place: Any = arrays if "/" in str(keys[0]) else header
+        for key in keys[:-1]:
+            place = place[key]
+        place[keys[-1]] = value(place[keys[-1]]) if callable(value) else value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (at("format", value=2), "format 2, this program reads 1"),
+        (at("version", value="9.9"), "made by warpsplat 9.9"),
+        (at("fits", value=3), "no list"),
+        (at("under way", value=None), "neither true nor false"),
+        (at("fits", 0, "step", value=56), "step is no whole number"),
+        (at("fits", 0, "step", value=True), "step is no whole number"),
+        (at("fits", 0, "curves", value=11), "curves"),
+        (at("fits", 0, "generator", value={}), "damaged"),
+        (at("fits", 0, "generator", "state", "state", value=-1), "damaged"),
+        (at("fits", 0, "room", value=[]), "room"),
+        (at("fits", 0, "room", 0, "slots", value=10**6), "slots"),
+        (at("fits", 0, "per_pixel", value=float("nan")), "per_pixel"),
+        (at("0/points", value=lambda a: np.where(a == a.max(), np.float32(np.nan), a)), "points has numbers"),
+        (at("0/points", value=lambda a: a[:-1]), "points"),
+        (at("0/points", value=lambda a: a.view(np.int32)), "points has elements of another type"),
+        (at("0/moment2.points", value=lambda a: -1 - a), "moment2.points has numbers"),
+        (at("0/held.colors", value=lambda a: a + 2), "held.colors"),
+        (at("0/kind", value=lambda a: a + 7), "kind has numbers"),
+        (at("0/first", value=lambda a: a[::-1].copy()), "first does not ascend"),
+        (at("0/starts", value=lambda a: a[:1]), "starts does not ascend"),
+        (at("0/paint", value=lambda a: a + 1), "gradient has no stops"),
+        (at("0/picture", value=lambda a: a + 1), "picture has numbers"),
+        (at("0/twin", value=lambda a: a[None]), "dimensions"),
+        (at("0/ages", value=lambda a: a[1:]), "ages has shape"),
+    ],
+)  # fmt: skip
+def test_damage_is_one_line(saved: Path, tmp_path: Path, change: Any, cause: str) -> None:
+    path = changed(saved, tmp_path / "run.checkpoint", change)
+    with pytest.raises(WarpsplatError, match=cause) as caught:
+        fitted(checkpoint=path, resume=True)
+    assert int(caught.value.exit_code) in (2, 3)
+    assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+
+
+def test_another_device_is_said(saved: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = changed(saved, tmp_path / "run.checkpoint", at("device", value="another"))
+    fitted(checkpoint=path, resume=True, stop=lambda: True)
+    assert "not to the same bytes" in caplog.text
+
+
+def test_no_file_is_replaced_unasked(saved: Path, tmp_path: Path) -> None:
+    path, other = tmp_path / "run.checkpoint", tmp_path / "notes.txt"
+    shutil.copy(saved, path)
+    other.write_text("hours of work")
+    for file, how, cause in (
+        (path, {}, "a checkpoint is there; --resume goes on"),
+        (other, {}, "is no checkpoint; --overwrite"),
+        (other, {"resume": True}, "no checkpoint of warpsplat"),
+        (tmp_path, {}, "is a folder"),
+        (tmp_path / "none" / "a", {}, "does not exist"),
+        (Path("-"), {}, "not the standard output"),
+    ):
+        with pytest.raises(UsageError, match=cause):
+            fitted(checkpoint=file, **how)
+    with pytest.raises(UsageError, match="needs a checkpoint"):
+        fitted(resume=True)
+    with pytest.raises(UsageError, match="another name"):
+        fitted(checkpoint=tmp_path / "a.svg", output=tmp_path / "a.svg")
+    with pytest.raises(UsageError, match="not a time"):
+        fitted(checkpoint=path, checkpoint_every="soon")
+    assert other.read_text() == "hours of work" and path.read_bytes() == saved.read_bytes()
+    fitted(checkpoint=other, overwrite=True, stop=after(2))
+    assert is_packed(other)
+
+
+def test_a_full_disk_does_not_end_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(path: Path, data: bytes) -> None:
+        raise OutputError(f"{path}: could not be written: No space left on device")
+
+    monkeypatch.setattr(module, "write_atomically", full)
+    result = fitted(checkpoint=tmp_path / "run.checkpoint", stop=after(3))
+    assert result.iterations == 3
+    assert "No space left on device: goes on without" in caplog.text
+
+
+def test_a_header_says_what_the_run_is(saved: Path) -> None:
+    header, _ = unpack(saved)
+    assert json.loads(json.dumps(header)) == header
+    assert header["run"]["settings"]["curves"] == 10
+    assert header["version"] == warpsplat.__version__
+
+
+def test_errors_have_their_codes() -> None:
+    assert CheckpointError.exit_code == 3

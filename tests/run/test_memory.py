@@ -1,0 +1,278 @@
+"""Memory: what a run needs, and runs on smaller images than those that were asked for."""
+
+from __future__ import annotations
+
+import gc
+import io
+import weakref
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+import warpsplat
+from tests.cli.helpers import one_line, run
+from tests.fit.pictures import picture
+from warpsplat.errors import ExitCode, ResourceError
+from warpsplat.files.image import Facts, boxed, image_facts, load_image
+from warpsplat.files.importance import load_importance
+from warpsplat.files.whole import load_whole
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.native import container_limits
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import Renderer
+from warpsplat.run import memory
+from warpsplat.run.memory import factor_for, mask_factor, memory_limit, need
+from warpsplat.scene import Kind
+
+HUGE = Facts(12_000, 9_000, 3, 4, drafts=True)
+QUICK = {"iterations": 2, "curves": 4, "subject": "photo", "device": "cpu"}
+WIDTH, HEIGHT = 65, 49
+
+
+def pixels(mode: str = "RGB") -> Image.Image:
+    """Odd sides, so that the last pixels of a smaller image stand for a part of a square."""
+    levels = np.round(255 * cv2.resize(picture(), (WIDTH, HEIGHT))).astype(np.uint8)
+    image = Image.fromarray(levels)
+    if mode == "RGBA":
+        opacity = np.full((HEIGHT, WIDTH), 255, np.uint8)
+        opacity[:30, :20] = 0
+        image.putalpha(Image.fromarray(opacity))
+    return image.convert("L").convert("I;16") if mode == "I;16" else image
+
+
+def encoded(image: Image.Image, kind: str = "PNG", **options: object) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, kind, **options)
+    return buffer.getvalue()
+
+
+@pytest.fixture
+def bare(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only what grows with the image counts, so that a small image can be too large."""
+    for name in ("PROGRAM", "STRIPS", "SHAPE"):
+        monkeypatch.setattr(memory, name, 0)
+    monkeypatch.setattr(memory, "LEAST_SIDE", 4)
+
+
+def test_a_need_grows_with_all_that_takes_memory() -> None:
+    base = need(HUGE, Settings()).most
+    assert 2 << 30 < base < 4e9
+    assert need(HUGE, Settings(), 2).most < base / 1.5
+    small = Facts(1200, 900, 3, 4, drafts=False)
+    plain = need(small, Settings()).working
+    for more in (
+        {"curves": 8000},
+        {"kind": Kind.STROKE},
+        {"paint": "auto"},
+        {"levels": "8,64,512"},
+        {"subject": "line"},
+    ):
+        assert need(small, make_settings(**more)).working > plain, more
+    progressive = replace(small, kept=6)
+    assert need(progressive, Settings()).reading > need(small, Settings()).reading
+
+
+def test_the_size_is_the_largest_within_the_limit() -> None:
+    for limit in ("4GB", "1GB", "600MB"):
+        settings = make_settings(max_memory=limit)
+        factor = factor_for(HUGE, settings, "huge.jpg")
+        most = settings.max_memory
+        assert most and memory_limit(settings) == most and need(HUGE, settings, factor).most <= most
+        assert factor == 1 or need(HUGE, settings, factor // 2).most > most
+    with pytest.raises(ResourceError, match=r"^huge\.jpg: at least \d+ MB are needed, max-memory is 1 MB$"):
+        factor_for(HUGE, make_settings(max_memory="1MB"), "huge.jpg")
+
+
+def test_without_a_limit_it_is_the_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "machine_memory", lambda: 10**9)
+    assert memory_limit(Settings()) == 9 * 10**8
+    assert factor_for(HUGE, Settings(), "huge.jpg") > 1
+    monkeypatch.setattr(memory._Process, "sharers", 1)
+    memory.share_machine(3)
+    assert memory_limit(Settings()) == 3 * 10**8
+    monkeypatch.setattr(memory, "machine_memory", lambda: None)
+    assert memory_limit(Settings()) is None
+    assert factor_for(HUGE, Settings(), "huge.jpg") == 1
+
+
+def test_the_limits_of_containers_are_seen(tmp_path: Path) -> None:
+    def write(name: str, text: str) -> None:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+
+    assert container_limits(tmp_path) == []
+    write("proc/self/cgroup", "0::/user/app\n")
+    write("sys/fs/cgroup/user/app/memory.max", "max\n")
+    write("sys/fs/cgroup/user/memory.max", "5000000\n")
+    assert container_limits(tmp_path) == [5_000_000]
+    write("proc/self/cgroup", "7:cpu,cpuacct:/\n6:memory:/box\n")
+    write("sys/fs/cgroup/memory/box/memory.limit_in_bytes", "700\n")
+    write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9000\n")
+    assert container_limits(tmp_path) == [700, 9000]
+
+
+@pytest.mark.parametrize(
+    ("mode", "kind", "options"),
+    [
+        ("RGB", "PNG", {}),
+        ("RGB", "JPEG", {"quality": 95}),
+        ("RGB", "JPEG", {"quality": 95, "progressive": True}),
+        ("RGBA", "PNG", {}),
+        ("I;16", "PNG", {}),
+        ("RGB", "WEBP", {"lossless": True}),
+    ],
+)
+@pytest.mark.parametrize("factor", [2, 4])
+def test_an_image_is_read_smaller(mode: str, kind: str, options: dict[str, object], factor: int) -> None:
+    """A pixel is the mean of its square; what a JPEG's decoder makes of it is nearly that."""
+    data = encoded(pixels(mode), kind, **options)
+    whole = load_image(data, paper=None)
+    small = load_image(data, paper=None, factor=factor)
+    assert small.shape == (-(-HEIGHT // factor), -(-WIDTH // factor), 4 if mode == "RGBA" else 3)
+    apart = np.abs(small - boxed(whole, factor))
+    assert apart.mean() < (0.02 if kind == "JPEG" else 1e-6)
+    if kind != "JPEG" and factor == 2:
+        np.testing.assert_allclose(small[3, 5], whole[6:8, 10:12].mean(axis=(0, 1)), atol=1e-5)
+    facts = image_facts(data)
+    assert facts and (facts.width, facts.height, facts.channels) == (WIDTH, HEIGHT, whole.shape[2])
+    assert (facts.kept > 0) == ("progressive" in options) and facts.deep == (mode == "I;16")
+
+
+def test_a_turned_image_is_read_smaller() -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    data = encoded(pixels(), "JPEG", exif=exif, quality=95)
+    assert load_image(data, factor=2).shape == (33, 25, 3)
+    facts = image_facts(data)
+    assert facts and (facts.width, facts.height) == (HEIGHT, WIDTH)
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA"])
+def test_strips_of_an_image_are_those_of_all_of_it(mode: str) -> None:
+    data = encoded(pixels(mode))
+    paper = None if mode == "RGBA" else 1.0
+    image = load_image(data, paper=paper)
+    whole = load_whole(data, paper, image.shape[2])
+    assert whole.shape == image.shape
+    for rows in (slice(0, 7), slice(30, 49), slice(30, 49), slice(0, 49)):
+        np.testing.assert_array_equal(whole[rows], image[rows])
+
+
+@pytest.mark.usefixtures("bare")
+@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "I;16"])
+def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
+    mode: str, whole: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = encoded(pixels(mode))
+    facts = image_facts(data)
+    assert facts
+    limit = need(facts, make_settings(curves=4)).most - 1
+    monkeypatch.setattr("warpsplat.run.reduction.whole_score", lambda *_: limit + (not whole))
+    output = tmp_path / "out.svg"
+    made = warpsplat.vectorize(data, **QUICK, max_memory=limit, output=output, name="big.png")
+    assert output.read_text() == made.svg
+    assert 'height="49" width="65"' in made.svg or 'width="65" height="49"' in made.svg
+    assert (made.scene.canvas.width, made.scene.canvas.height) == (WIDTH, HEIGHT)
+    assert f"{WIDTH}x{HEIGHT} pixels take about" in made.reduced and "max-memory is" in made.reduced
+    measured = "full" if whole and mode != "I;16" else "that"
+    assert made.reduced.endswith(f"worked on at 33x25, measured at {measured} size")
+    assert made.as_dict()["reduced"] == made.reduced
+    own = warpsplat.score(made.svg, data)
+    assert made.score and made.score.bytes == own.bytes and made.score.gzip_bytes == own.gzip_bytes
+    assert made.score.psnr == pytest.approx(own.psnr, abs=1e-6 if measured == "full" else 2)
+    # As good as a run at full size, but for the luck of two steps.
+    usual = warpsplat.vectorize(data, **QUICK)
+    assert usual.reduced == "" and usual.score and own.psnr > usual.score.psnr - 2
+
+
+@pytest.mark.usefixtures("bare")
+def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, mask = encoded(pixels()), encoded(pixels().convert("L"))
+    facts, of_mask = image_facts(data), image_facts(mask)
+    assert facts and of_mask
+    settings = make_settings(curves=4)
+    whole = need(facts, settings, mask=of_mask)
+    assert whole.most > need(facts, settings).most
+    assert whole.reading > 16 * WIDTH * HEIGHT
+    sizes: list[tuple[int, ...]] = []
+    usual = load_importance
+
+    def noted(*given: Any) -> Any:
+        found = usual(*given)
+        sizes.append(found.shape)
+        return found
+
+    monkeypatch.setattr("warpsplat.run.prepare.load_importance", noted)
+    made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most - 1, name="big.png")
+    assert sizes == [(25, 33)]
+    assert "worked on at 33x25" in made.reduced
+    warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most)
+    assert sizes[1:] == [(HEIGHT, WIDTH)]
+
+
+def test_a_small_mask_loses_nothing() -> None:
+    for width, factor in ((12_000, 4), (6000, 2), (5999, 1), (300, 1)):
+        assert mask_factor(HUGE, replace(HUGE, width=width), 4) == factor
+
+
+def test_opacity_takes_more_memory_to_refine() -> None:
+    wanted = [memory.need_refined(replace(HUGE, channels=channels), Settings()) for channels in (3, 4)]
+    assert wanted[0] < 0.6 * wanted[1]
+
+
+def test_refining_against_what_takes_too_much_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before its pixels are read."""
+    image, svg, output = tmp_path / "a.png", tmp_path / "a.svg", tmp_path / "b.svg"
+    image.write_bytes(encoded(pixels()))
+    svg.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}">'
+        '<path d="M9 9H40V30H9z" fill="#853"/></svg>'
+    )
+    arguments = ("refine", svg, image, "-o", output, "--iterations", 1, "--device", "cpu")
+    facts = image_facts(image.read_bytes())
+    assert facts
+    limit = memory.need_refined(facts, make_settings())
+    assert run(*arguments, "--max-memory", limit) == 0
+    monkeypatch.setattr("warpsplat.api.refine.load_target", None)
+    capsys.readouterr()
+    assert run(*arguments, "--max-memory", limit - 1) == ExitCode.RESOURCES
+    error = one_line(capsys.readouterr().err)
+    assert "a.png: 65x49 pixels take about" in error
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1000)
+    with pytest.raises(
+        ResourceError, match=r"^the image: .* memory for it is 0 MB; refine against a smaller"
+    ):
+        warpsplat.refine(svg, image.read_bytes(), device="cpu")
+
+
+def test_nothing_of_a_run_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays go with the last reference to them, before the collector of cycles runs."""
+    made: list[weakref.ref[object]] = []
+    for kind in (Renderer, Program, Parameters):
+        create = kind.__init__
+
+        def noted(self: object, *given: object, _create: Any = create, **named: object) -> None:
+            made.append(weakref.ref(self))
+            _create(self, *given, **named)
+
+        monkeypatch.setattr(kind, "__init__", noted)
+    gc.collect()
+    gc.disable()
+    try:
+        for paint in ("flat", "auto"):
+            warpsplat.vectorize(
+                picture(), iterations=30, curves=6, subject="photo", paint=paint, device="cpu"
+            )
+        left = [type(each()).__name__ for each in made if each() is not None]
+    finally:
+        gc.enable()
+    assert len(made) > 10 and left == []

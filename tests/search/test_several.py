@@ -1,0 +1,101 @@
+"""Fits of several numbers of shapes: where they begin, what they hand on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import picture
+from warpsplat.fit.loop import fit
+from warpsplat.fit.schedule import shapes_at
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.work import Progress
+from warpsplat.rendering.backend import Backend
+from warpsplat.search.several import Series, begin_of, growing
+
+
+@pytest.mark.parametrize(("few", "share"), [(10, 0.25), (128, 0.275), (180, 0.35), (250, 0.375)])
+def test_a_fit_begins_where_its_schedule_has_as_many_shapes(few: int, share: float) -> None:
+    settings = make_settings(curves=256)
+    begin = begin_of(settings, round(1.5 * few))
+    assert begin == pytest.approx(1000 * share, abs=25) and begin % 25 == 0
+    if few == 180:
+        assert shapes_at(settings, begin) == pytest.approx(1.5 * few, rel=0.1)
+
+
+def test_a_fit_begins_anew_where_too_few_turns_would_be_left() -> None:
+    assert begin_of(make_settings("draft", curves=100), 75) == 0
+    assert begin_of(make_settings(curves=100, density={"interval": 0}), 75) == 0
+
+
+@pytest.mark.parametrize(("few", "many"), [(50, 200), (200, 250), (10, 9000)])
+def test_the_schedule_goes_on_from_the_shapes_that_there_are(few: int, many: int) -> None:
+    settings, full = make_settings(curves=many), round(1.5 * few)
+    begin = begin_of(settings, full)
+    chosen = growing(settings, full, begin)
+    assert shapes_at(chosen, begin) == pytest.approx(full, rel=0.02) or chosen.density.start == 1e-3
+    counts = [shapes_at(chosen, step) for step in range(begin, 501, 25)]
+    assert counts == sorted(counts) and counts[-1] == round(1.5 * many)
+    assert all(shapes_at(chosen, step) == shapes_at(settings, step) for step in (700, 1000))
+
+
+def quick() -> Settings:
+    return make_settings(
+        subject="photo", iterations=60, curves=4, coarse_pixels=400, density={"interval": 3}, viewer=False
+    )
+
+
+def test_shapes_go_on_with_their_past() -> None:
+    """The first step of another fit is the next one of the first: the optimizer forgot nothing."""
+    image, backend = picture(), Backend.on("cpu", 1)
+    settings = quick()
+    series = Series(settings, (4, 8), image.shape[1], image.shape[0], backend)
+    seen: list[Progress] = []
+    first, none = series.next(4)
+    assert none is None
+    fit(image, first, backend, report=series.watch(4, seen.append))
+    assert [p.work for p in seen] == sorted(p.work for p in seen) and seen[-1].work < 0.7
+    second, start = series.next(8)
+    assert start is not None and start.past is not None
+    assert start.begin == begin_of(second, 6) > 0
+    assert len(start.scene) == round(1.5 * 4), "the surplus, before it is thinned"
+    assert start.past.ages.max() >= 0.6 * settings.iterations
+    moments = start.past.moments[1]["points"]
+    assert moments.shape == start.scene.points.shape and (moments > 0).any()
+    made = fit(
+        image,
+        second,
+        backend,
+        scene=start.scene,
+        past=start.past,
+        begin=start.begin,
+        report=series.watch(8, seen.append),
+    )
+    assert len(made.scene) == 8
+    assert made.iterations == settings.iterations - start.begin
+    assert seen[-1].work == pytest.approx(1, abs=0.35)
+
+
+def test_without_a_past_shapes_take_large_steps() -> None:
+    """What is handed on is what keeps the shapes in place."""
+    image, backend = picture(), Backend.on("cpu", 1)
+    settings = quick()
+    series = Series(settings, (4, 8), image.shape[1], image.shape[0], backend)
+    fit(image, series.next(4)[0], backend, report=series.watch(4, None))
+    _, start = series.next(8)
+    assert start is not None and start.past is not None
+
+    def moved(known: bool) -> float:
+        chosen = make_settings(curves=6, iterations=60, density={"interval": 0}, coarse_pixels=400)
+        made = fit(
+            image,
+            chosen,
+            backend,
+            scene=start.scene,
+            past=start.past if known else None,
+            begin=59,
+            finish=False,
+        )
+        return float(np.abs(made.scene.points - start.scene.points).mean())
+
+    assert moved(known=True) < 0.5 * moved(known=False)

@@ -1,0 +1,80 @@
+"""Quality by the number of shapes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.fit.pictures import picture
+from warpsplat.fit.schedule import Phase
+from warpsplat.fit.settings import make_settings
+from warpsplat.rendering.backend import Backend
+from warpsplat.search.survey import BEND, GAIN, STEEPEST, expected, expected_gain, lost_detail, survey
+
+
+def test_it_goes_through_what_was_measured() -> None:
+    """With the gain of a longer run, and what doublings gain in those."""
+    worth = expected(1024, (256, 30.0), (64, 25.0), 0.4, 30_000)
+    there = float(worth.psnr(256))
+    assert there == pytest.approx(30.4)
+    assert there - float(worth.psnr(64)) == pytest.approx(2 * 0.79 * 2.5)
+    gains = [float(worth.psnr(2 * n) - worth.psnr(n)) for n in (16, 32, 64, 128, 256, 512)]
+    assert np.diff(gains) == pytest.approx(2 * BEND)
+    assert float(worth.size(512)) == pytest.approx(2 * 0.93 * 30_000)
+
+
+@pytest.mark.parametrize("few", [10.0, 29.9, 31.0])
+def test_more_shapes_are_never_worse(few: float) -> None:
+    worth = expected(1024, (256, 30.0), (64, few), 0.0, 30_000)
+    decibels = worth.psnr(np.geomspace(16, 1024, 50))
+    assert (np.diff(decibels) >= -1e-9).all()
+    assert float(decibels[-1] - decibels[0]) < 6 * STEEPEST + 16 * BEND
+
+
+def test_one_measurement_is_a_level() -> None:
+    worth = expected(16, (16, 25.0), (16, 24.0), 0.0, 2000)
+    assert float(worth.psnr(16)) == pytest.approx(25)
+    assert float(worth.psnr(8)) == float(worth.psnr(16))
+
+
+def test_a_picture_without_error_has_a_ceiling() -> None:
+    worth = expected(32, (32, float("inf")), (16, float("inf")), 0.4, 2000)
+    assert 99 < float(worth.psnr(32)) <= 101
+
+
+def test_what_is_hard_to_draw_gains_little() -> None:
+    plan = [Phase(100, 100)]
+    assert expected_gain(20.0, plan) == 0
+    assert 0 < expected_gain(25.0, plan) < expected_gain(30.0, plan) == expected_gain(40.0, plan) == GAIN
+
+
+def test_what_is_much_larger_than_most_steps_see_gains_little() -> None:
+    gains = [expected_gain(30.0, [Phase(100, 100), Phase(side, 100)]) for side in (400, 800, 1600, 9000)]
+    assert gains == pytest.approx([GAIN, GAIN / 2, 0, 0])
+
+
+def test_detail_that_the_finest_size_lacks() -> None:
+    image = np.random.default_rng(0).random((32, 32, 3), dtype=np.float32)
+    assert lost_detail(image, make_settings()) == 0
+    lost = lost_detail(image, make_settings(fine_pixels=256, coarse_pixels=256))
+    assert lost > 0.03
+    worth = expected(1024, (256, 40.0), (64, 35.0), 0.0, 30_000)
+    assert float(worth.psnr(256)) == pytest.approx(40)
+    assert float(replace(worth, detail=lost).psnr(256)) < -10 * np.log10(lost)
+
+
+def test_survey(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More shapes are better and larger; what is asked to stop stops."""
+    monkeypatch.setattr("warpsplat.search.survey.STEPS", 60)
+    monkeypatch.setattr("warpsplat.search.survey.INTERVAL", 10)
+    image, backend = picture(), Backend.on("cpu", 1)
+    work: list[float] = []
+    worth = survey(image, make_settings(), backend, report=lambda now: work.append(now.work))
+    assert worth is not None
+    assert worth.most == 64 * 48 // 8
+    assert float(worth.psnr(200)) > float(worth.psnr(50))
+    assert float(worth.size(200)) > 2 * float(worth.size(50))
+    assert work == sorted(work) and work[-1] == pytest.approx(1, abs=0.05)
+    assert survey(image, make_settings(), backend, stop=lambda: True) is None

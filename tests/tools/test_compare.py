@@ -1,0 +1,159 @@
+"""Rows of a comparison: ours and another program's, measured alike."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.fit.pictures import picture
+from tests.tracers import SIZES, bands, stub
+from warpsplat.errors import Stopped
+from warpsplat.files.image import load_image
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.metrics import score_svg
+from warpsplat.rendering.backend import Backend
+from warpsplat.run.result import Result
+from warpsplat.run.vectorize import vectorize
+from warpsplat.scene import FloatArray
+from warpsplat.tools.compare import OURS, compare, warm_up
+from warpsplat.tools.tracer import VTRACER_SETTINGS, Options, vtracer
+
+
+def run(target: FloatArray, settings: Settings, write: Callable[[str], None]) -> Result:
+    return vectorize(target, settings, Backend.on("cpu"), write=write)
+
+
+def ours(*curves: int) -> list[Settings]:
+    return [make_settings(curves=n, iterations=12) for n in curves]
+
+
+def test_rows_of_both_programs_are_measured_alike() -> None:
+    target = picture()
+    rows = list(compare("a.png", target, ours(4, 8), stub(), run))
+    assert [(r.program, r.setting) for r in rows] == [
+        (OURS, "4"),
+        (OURS, "8"),
+        ("Bands", "one"),
+        ("Bands", "four"),
+    ]
+    for row in rows:
+        assert row.image == "a.png"
+        assert row.score == score_svg(row.svg, target)
+        assert row.seconds > 0
+        assert row.cpu_seconds > 0
+        assert row.as_dict().items() >= row.score.as_dict().items()
+    assert [row.score.paths for row in rows if row.score] == [4, 8, 1, 4]
+
+
+def test_the_tracer_sees_the_image_on_white(tmp_path: Path) -> None:
+    rgba = np.random.default_rng(0).integers(0, 256, (20, 30, 4), dtype=np.uint8)
+    rgba[:10, :, 3] = 0
+    Image.fromarray(rgba).save(tmp_path / "a.png")
+    target = load_image(tmp_path / "a.png")
+    seen: list[np.ndarray] = []
+
+    def trace(png: bytes, options: Options) -> str:
+        seen.append(np.asarray(Image.open(io.BytesIO(png))))
+        return bands(png, options)
+
+    list(compare("a.png", target, [], stub(trace), run))
+    assert len(seen) == len(SIZES)
+    for pixels in seen:
+        assert (pixels[:10] == 255).all()
+        assert pixels.shape == (20, 30, 3)
+        assert np.abs(pixels / 255 - target).max() <= 0.5 / 255 + 1e-6
+
+
+class PanicException(BaseException):
+    """As pyo3 raises it."""
+
+
+@pytest.mark.parametrize(
+    ("failure", "words"),
+    [
+        (ValueError("bad\x1b[31m\nand more"), "failed: ValueError: bad\\x1b[31m"),
+        (PanicException("index out of bounds"), "failed: PanicException: index out of bounds"),
+        (MemoryError(), "failed: MemoryError: no cause given"),
+    ],
+)
+def test_a_tracer_that_fails_at_one_setting(failure: BaseException, words: str) -> None:
+    def trace(png: bytes, options: Options) -> str:
+        if options["bands"] == 1:
+            raise failure
+        return bands(png, options)
+
+    failed, fine = compare("a.png", picture(), [], stub(trace), run)
+    assert (failed.svg, failed.score, failed.error) == ("", None, words)
+    assert failed.as_dict()["error"] == words
+    assert fine.score
+    assert not fine.error
+
+
+def test_a_file_that_no_viewer_shows() -> None:
+    rows = list(compare("a.png", picture(), [], stub(lambda png, options: "no SVG"), run))
+    assert all(row.svg == "no SVG" and row.score is None for row in rows)
+    assert all(row.error.startswith("its file: not ") or "well-formed" in row.error for row in rows)
+
+
+def test_an_interruption_is_no_failure_of_the_tracer() -> None:
+    def trace(png: bytes, options: Options) -> str:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        list(compare("a.png", picture(), [], stub(trace), run))
+
+
+def test_an_interrupted_run_has_no_row() -> None:
+    def stopped(target: FloatArray, settings: Settings, write: Callable[[str], None]) -> Result:
+        return vectorize(target, settings, Backend.on("cpu"), write=write, stop=lambda: True)
+
+    with pytest.raises(Stopped):
+        next(compare("a.png", picture(), ours(4), stub(), stopped))
+
+
+def test_warm_up_loads_what_a_run_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the kind and renderer of the settings, whatever else they say."""
+    made: list[Settings] = []
+
+    def note(target: FloatArray, settings: Settings, backend: Backend) -> None:
+        made.append(settings)
+
+    monkeypatch.setattr("warpsplat.tools.compare.vectorize", note)
+    asked = make_settings(curves=100_000, iterations=1_000_000, renderer="splat")
+    warm_up(asked, Backend.on("cpu"))
+    assert (made[0].kind, made[0].renderer) == (asked.kind, asked.renderer)
+    assert made[0].curves < 100
+    assert made[0].iterations < 100
+
+
+def test_vtracer_takes_all_of_its_settings() -> None:
+    """Flat areas come out as they are, and the options do what they are for."""
+    pixels = np.full((48, 64, 3), 255, np.uint8)
+    pixels[8:40, 8:30], pixels[12:30, 36:60] = (200, 30, 20), (10, 60, 220)
+    target = pixels.astype(np.float32) / 255
+    rows = {row.setting: row for row in compare("a.png", target, [], vtracer(), run)}
+    assert list(rows) == list(VTRACER_SETTINGS)
+    for row in rows.values():
+        assert row.program == "VTracer"
+        assert row.score
+        assert row.score.psnr > 20, row.setting
+    curved = {name: bool(re.search(r' d="[^"]*C', row.svg)) for name, row in rows.items()}
+    assert curved["default"]
+    assert not curved["polygon"]
+    assert len(rows["rounded"].svg) < len(rows["default"].svg)
+
+
+def test_a_panic_of_vtracer_is_a_row(capfd: pytest.CaptureFixture[str]) -> None:
+    """Rust would print a trace of its own."""
+    options: dict[str, Options] = {"none": {"color_precision": 0}, "one": {"color_precision": 1}}
+    panicked, fine = compare("a.png", picture(), [], replace(vtracer(), settings=options), run)
+    assert panicked.error.startswith("failed: PanicException: assertion failed")
+    assert fine.score
+    assert capfd.readouterr().err == ""

@@ -1,0 +1,51 @@
+"""One task after the other, in this process."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from types import TracebackType
+
+from warpsplat.batch.executors.tasks import Advance, Outcome, Stop, Task
+from warpsplat.batch.executors.work import do
+from warpsplat.fit.work import Progress
+
+
+class Serial:
+    """An ``Executor``, see there."""
+
+    workers = 1
+
+    def __init__(
+        self, around: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext
+    ) -> None:
+        """``around``: a block in which each task is done."""
+        self._around = around
+
+    def __enter__(self) -> Serial:
+        """There is nothing to begin."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """There is nothing to end."""
+
+    def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
+        """See ``Executor``."""
+        waiting = iter(tasks)
+        while not stop() and (task := next(waiting, None)):
+            yield self._done(task, stop, advance)
+
+    def _done(self, task: Task, stop: Stop, advance: Advance) -> Outcome:
+        def report(progress: Progress) -> None:
+            advance(task.number, progress.work)
+
+        try:
+            with self._around():
+                return do(task, stop, report)
+        except KeyboardInterrupt:
+            return Outcome(task.number, "stopped")

@@ -1,0 +1,115 @@
+"""The page that lists what became of a batch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from warpsplat.batch.manifest import Manifest
+from warpsplat.batch.plan import Job
+from warpsplat.batch.reports import Reports
+from warpsplat.batch.run import Report
+from warpsplat.errors import printable
+from warpsplat.files.output import write_result
+from warpsplat.files.remote import is_remote
+from warpsplat.pages import page
+from warpsplat.pages.environment import address
+
+ASSETS = ("index.css", "index.js")
+
+MOST_THUMBNAILS = 2000
+"""In a list of more images there are none: each is 3 kB."""
+
+FIGURES = ("psnr", "bytes", "shapes", "seconds")
+"""What images can be sorted by, besides their names."""
+
+
+class Index:
+    """Listens to a batch, and writes its list."""
+
+    def __init__(self, jobs: Sequence[Job], reports: Reports) -> None:
+        """``jobs``: all, also those that other processes do."""
+        self._jobs, self._reports = jobs, reports
+        self._heard: dict[Path, Report] = {}
+
+    def hear(self, report: Report) -> None:
+        """Take note of what became of a job."""
+        self._heard[report.job.output] = report
+
+    def write(self, manifest: Manifest) -> None:
+        """Write the list as things stand.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        with_thumbnails = len(self._jobs) <= MOST_THUMBNAILS
+        rows = [self._row(job, manifest, with_thumbnail=with_thumbnails) for job in self._jobs]
+        text = page("index.html.j2", assets=ASSETS, totals=totals(rows), data={"rows": rows})
+        write_result(self._reports.index, text.encode())
+
+    def _row(self, job: Job, manifest: Manifest, *, with_thumbnail: bool) -> dict[str, Any]:
+        """What the list says of a job."""
+        status, figures, error = self._state(job, manifest)
+        there = status == "made" or (status == "stopped" and bool(figures))
+        report = self._reports.report_of(job.output)
+        return {
+            "name": printable(str(job.image.name)),
+            "folder": printable(str(job.image.parent)),
+            "output": printable(job.output.name),
+            "svg": self._address(job.output) if there else "",
+            "report": self._address(report) if there and report.exists() else "",
+            "thumbnail": self._reports.thumbnail_of(job.output) if there and with_thumbnail else "",
+            "status": status,
+            "error": printable(error),
+            "exact": "psnr" in figures and figures["psnr"] is None and figures.get("ssim") == 1,
+            **_numbers(figures),
+        }
+
+    def _state(self, job: Job, manifest: Manifest) -> tuple[str, Mapping[str, Any], str]:
+        """What became of a job, its figures, and the cause if it failed: as was heard, else as noted."""
+        heard = self._heard.get(job.output)
+        if heard:
+            return "made" if heard.status == "skipped" else heard.status, heard.figures, heard.error
+        noted = [entry for entry in manifest.entries(job.output) if entry.event in ("made", "failed")]
+        if not noted:
+            return "open", {}, ""
+        return noted[-1].event, noted[-1].figures, noted[-1].error
+
+    def _address(self, path: Path) -> str:
+        """A link from the list to a file; empty where no relative one leads there."""
+        if is_remote(path):
+            return ""
+        try:
+            return address(Path(os.path.relpath(path, self._reports.index.parent)).as_posix())
+        except ValueError:  # on another drive
+            return ""
+
+
+def _numbers(figures: Mapping[str, Any]) -> dict[str, float | None]:
+    """Those that images are sorted by; a manifest may hold anything."""
+    found = {}
+    for name in FIGURES:
+        value = figures.get(name)
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        found[name] = value if is_number and value is not None and abs(value) < 1e15 else None
+    return found
+
+
+def totals(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Figures of all images: name, value, unit."""
+    counts = {name: sum(row["status"] == name for row in rows) for name in ("made", "failed")}
+    found = [("Images", str(len(rows)), ""), ("Made", str(counts["made"]), "")]
+    if counts["failed"]:
+        found.append(("Failed", str(counts["failed"]), ""))
+    for name, title, scale, form, unit in (
+        ("psnr", "Mean PSNR", 1, ".2f", "dB"),
+        ("bytes", "Size", 1000, ".1f", "kB"),
+        ("seconds", "Time", 1, ".1f", "s"),
+    ):
+        values = [row[name] / scale for row in rows if row[name] is not None]
+        if values:
+            value = sum(values) / (len(values) if name == "psnr" else 1)
+            found.append((title, format(value, form), unit))
+    return found

@@ -1,0 +1,225 @@
+"""Command line and batch files -> jobs, checked before anything starts.
+
+::
+
+    defaults:            # of every job; keys are the long flags of `warpsplat vectorize`, and jobs.research's
+      curves: 512
+      output: svg        # folder for the results, or their names; default: beside each image
+    presets:
+      icons: {subject: drawing, minify: true}
+    jobs:
+      - images: photos/*.jpg
+        matrix: {curves: [256, 512]}
+        output: svg/{stem}-{curves}.svg
+      - images: [logo.png, icons/**/*.png]
+        preset: icons
+
+Paths are relative to the YAML file. Later is stronger: defaults, preset, job, command line.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from warpsplat.batch.file import BatchFile
+from warpsplat.batch.images import Found, find_images
+from warpsplat.batch.layers import KEYS, MATRIX, Layer, Place, Value, combinations, layer_of
+from warpsplat.batch.names import Wanted, check_outputs, fields_of, name_results, root_of
+from warpsplat.errors import UsageError, shown
+from warpsplat.files.inputs import STANDARD
+from warpsplat.files.remote import is_remote, is_url, remote
+from warpsplat.fit.settings import Settings
+from warpsplat.run.options import KINDS, settings_from
+from warpsplat.run.research import NESTED
+
+BATCH_ENDINGS = (".yaml", ".yml")
+"""Of names of batch files."""
+
+PRESET = "preset"
+"""Key of a job: the name of the preset that it takes."""
+
+JOB_KEYS = ("images", PRESET, MATRIX, *KEYS)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One image to vectorize."""
+
+    image: Path
+    output: Path
+    settings: Settings
+    device: str
+    importance: Path | None = None
+    """Mask of how much the error of a pixel counts."""
+    root: Path = Path()
+    """Folder that the results of its kind lie in."""
+
+
+@dataclass(frozen=True)
+class _Planned:
+    wanted: Wanted
+    device: str
+    importance: Path | None
+
+
+def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Job]:
+    """The jobs that names on the command line mean: batch files, images, folders of them and patterns.
+
+    Args:
+        inputs: the names.
+        command: what the command line says of settings, see ``layers.command_layer``.
+
+    Raises:
+        UsageError: anything wrong with them; of a file the message names its line and key.
+    """
+    planned: list[_Planned] = []
+    named: dict[Path, Found] = {}
+    for name in inputs:
+        if name == str(STANDARD) or name.lower().endswith(BATCH_ENDINGS):
+            planned += _of_file(Path(name), command or {})
+        else:
+            for image in find_images(name, Path()):
+                named.setdefault(image.path, image)
+    planned += _expanded(list(named.values()), [command or {}], UsageError)
+    return _jobs(planned)
+
+
+def _of_file(path: Path, command: Layer) -> Iterator[_Planned]:
+    file = BatchFile(path)
+    top = file.mapping(file.root, "a batch file", ("defaults", "presets", "jobs"))
+    defaults: Layer = {}
+    if "defaults" in top:
+        defaults = layer_of(file, file.mapping(top["defaults"][1], "defaults", (MATRIX, *KEYS)))
+    presets = _presets(file, *top["presets"]) if "presets" in top else {}
+    if "jobs" not in top:
+        raise file.error(1, "key 'jobs' is missing")
+    line, node = top["jobs"]
+    if not isinstance(node, yaml.SequenceNode) or not node.value:
+        raise file.error(line, "jobs: must be a list with at least one job")
+    for item in node.value:
+        entries = file.mapping(item, "a job", JOB_KEYS)
+        start = item.start_mark.line + 1
+        if "images" not in entries:
+            raise file.error(start, "key 'images' is missing in a job")
+        layers = [defaults, _preset(file, entries, presets), layer_of(file, entries), command]
+        yield from _expanded(_images(file, *entries["images"]), layers, file.place(start))
+
+
+def _presets(file: BatchFile, line: int, node: yaml.Node) -> dict[str, Layer]:
+    if not isinstance(node, yaml.MappingNode):
+        raise file.error(line, "presets: must be a mapping of names to settings")
+    names = tuple(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+    return {
+        name: layer_of(file, file.mapping(inner, f"preset {shown(name)}", (MATRIX, *KEYS)))
+        for name, (_, inner) in file.mapping(node, "presets", names).items()
+    }
+
+
+def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets: dict[str, Layer]) -> Layer:
+    """The preset that a job names, with its name as a field of its results'."""
+    if PRESET not in entries:
+        return {}
+    line, node = entries[PRESET]
+    name = file.text(line, PRESET, file.value(node))
+    if name not in presets:
+        known = ", ".join(presets) or "none"
+        raise file.error(line, f"{PRESET}: there is no {shown(name)}; known are: {known}")
+    return {**presets[name], PRESET: Value(name, file.place(line), file.path.parent)}
+
+
+def _images(file: BatchFile, line: int, node: yaml.Node) -> list[Found]:
+    """Files that the patterns match, each once, in the order of the patterns and sorted within one."""
+    patterns = file.value(node)
+    if isinstance(patterns, str):
+        patterns = [patterns]
+    if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) and p for p in patterns):
+        raise file.error(line, "images: must be a path or pattern, or a list of them")
+    found: dict[Path, Found] = {}
+    for pattern in [file.text(line, "images", pattern) for pattern in patterns]:
+        try:
+            for image in find_images(pattern, file.path.parent):
+                found.setdefault(image.path, image)
+        except UsageError as error:
+            raise file.error(line, f"images: {error}") from error
+    return list(found.values())
+
+
+def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Iterator[_Planned]:
+    """The jobs that one description means: each combination of its settings for each image."""
+    for values in combinations(layers):
+        given: dict[str, Any] = {key: item.value for key, item in values.items()}
+        output, mask = (
+            _path(key, values[key]) if key in values else None for key in ("output", "importance")
+        )
+        options = {
+            key.replace("-", "_"): value
+            for key, value in given.items()
+            if key not in KINDS and key not in ("output", "importance", "device", PRESET)
+        }
+        for kind in given.keys() & KINDS.keys():
+            options["kind"] = KINDS[kind]
+        try:
+            settings = settings_from(options)
+        except UsageError as error:  # values that do not go together
+            raise start(str(error)) from error
+        place = values["output"].place if "output" in values else start
+        fields = fields_of(settings, {key: value for key, value in given.items() if key not in NESTED})
+        device = given.get("device", "auto")
+        for image in images:
+            yield _Planned(Wanted(image, output, settings, fields, place), device, mask)
+
+
+def _path(key: str, item: Value) -> Path:
+    """A path that a key gives, relative to where it was given."""
+    try:
+        return remote(item.value) if is_url(item.value) else item.base / Path(item.value).expanduser()
+    except RuntimeError as error:
+        raise item.place(f"{key}: {item.value!r}: {error}") from error
+
+
+def _jobs(planned: list[_Planned]) -> list[Job]:
+    wanted = [item.wanted for item in planned]
+    outputs = name_results(wanted, {item.importance for item in planned if item.importance})
+    check_outputs([item.place for item in wanted], outputs)
+    return [
+        Job(
+            item.wanted.image.path,
+            output,
+            item.wanted.settings,
+            item.device,
+            item.importance,
+            root_of(item.wanted.output) if item.wanted.output else item.wanted.image.root,
+        )
+        for item, output in zip(planned, outputs, strict=True)
+    ]
+
+
+def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
+    """Where a batch keeps its manifest: the folder of its results; of several that do not lie in one of them,
+    or lie behind URLs, the folder of the batch file, or, where there is not just one, the current folder.
+    """
+    away = any(is_remote(job.root) for job in jobs)
+    roots = set() if away else {os.path.abspath(job.root) for job in jobs}
+    with contextlib.suppress(ValueError):  # none, or on several drives
+        common = os.path.commonpath(roots)
+        if common in roots:
+            return Path(common)
+    is_file = len(inputs) == 1 and inputs[0].lower().endswith(BATCH_ENDINGS)
+    return Path(inputs[0]).parent if is_file else Path()
+
+
+def in_shard(job: Job, root: Path, index: int, count: int) -> bool:
+    """Whether ``job`` belongs to part ``index`` (from 1) of ``count``: by its result's name below ``root``,
+    whatever else is in the list, and whatever the image is changed to.
+    """
+    away = is_remote(job.output)
+    name = str(job.output) if away else Path(os.path.relpath(job.output, root)).as_posix()
+    return int.from_bytes(hashlib.sha256(os.fsencode(name)).digest()[:8], "big") % count == index - 1

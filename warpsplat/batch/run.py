@@ -1,0 +1,327 @@
+"""Doing the jobs of a batch: each once, whoever else is at the same list, whatever was interrupted before."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import stat
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, ReportWish, Source, Stop, Task
+from warpsplat.batch.executors.work import digest, failure
+from warpsplat.batch.manifest import Entry, Manifest
+from warpsplat.batch.plan import Job
+from warpsplat.batch.reports import Reports
+from warpsplat.errors import ImageError, OutputError
+from warpsplat.files.inputs import MAX_INPUT, read_input
+from warpsplat.files.marks import picture_key
+from warpsplat.files.output import GZIP, HEAD, make_folder, may_replace, write_result
+from warpsplat.files.remote import exists, is_remote, listed, read_remote
+from warpsplat.run.formats import is_picture
+from warpsplat.run.keys import STOPPED, job_key
+from warpsplat.svg.inspect import svg_text
+from warpsplat.svg.write import read_metadata
+
+log = logging.getLogger(__name__)
+
+Status = Literal["made", "skipped", "failed", "stopped", "planned"]
+
+PAUSE = 0.3
+"""Seconds between two looks at what other processes have in work."""
+
+TAIL = b"</svg>\n"
+"""How every SVG that was written here ends; one that was cut short does not."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What became of a job."""
+
+    job: Job
+    status: Status
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    """See ``vectorize.Result.as_dict``; of a skipped one those that are known."""
+    error: str = ""
+    """One line, of a job that failed."""
+    before: bool = False
+    """Whether it failed in an earlier run, and was not tried again."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        values: dict[str, Any] = {"image": str(self.job.image), "output": str(self.job.output)}
+        values |= {"status": self.status, **self.figures}
+        return values | ({"error": self.error, "before": self.before} if self.error else {})
+
+
+class Prepared(NamedTuple):
+    """What is known of a job before it is done."""
+
+    key: str
+    image: bytes
+    mask: bytes | None
+
+
+class Standing(NamedTuple):
+    """Whether a result is there."""
+
+    made: bool
+    entry: Entry | None
+    """What the manifest says of it: of a result that is there, how it was made; of one that is not, that it
+    failed."""
+
+
+def prepare(job: Job) -> Prepared:
+    """Read a job's inputs.
+
+    Raises:
+        ImageError: they cannot be read.
+    """
+    image = read_input(job.image)
+    mask = read_input(job.importance) if job.importance else None
+    return Prepared(job_key(job.settings, image, mask), image, mask)
+
+
+def standing(job: Job, key: str, manifest: Manifest) -> Standing:
+    """Whether the result of ``key`` is there, whole: its mark says so, or the manifest knows its bytes."""
+    entries = [entry for entry in manifest.entries(job.output) if entry.key == key]
+    if is_remote(job.output):
+        # The manifest is believed: fetching each result would take longer than many take to make.
+        latest = entries[-1] if entries else None
+        if latest and latest.event == "made" and exists(job.output):
+            return Standing(True, latest)
+    data = read_result(job.output)
+    if data is not None:
+        sum_ = digest(data)
+        # What was about to be written and is there, is made.
+        known = [e for e in entries if e.digest == sum_ and (e.event == "made" or e.figures)]
+        if known:
+            return Standing(True, known[-1])
+        if marked(data) == key or any(entry.digest == sum_ for entry in entries):
+            return Standing(True, None)
+    failed = entries[-1] if entries and entries[-1].event == "failed" else None
+    return Standing(False, failed)
+
+
+def read_result(path: Path) -> bytes | None:
+    """The bytes of a result; None if there is none, or no file."""
+    if is_remote(path):
+        return read_remote(path, MAX_INPUT) if listed(path) else None
+    with contextlib.suppress(OSError):
+        found = os.stat(path)
+        if (
+            stat.S_ISREG(found.st_mode) and found.st_size <= MAX_INPUT
+        ):  # a pipe would wait for whoever fills it
+            return path.read_bytes()
+    return None
+
+
+def marked(data: bytes) -> str:
+    """The key that a whole result bears; empty if it has none, or was cut short."""
+    if data[:2] == GZIP:
+        try:
+            data = svg_text(data, "").encode()
+        except ImageError:
+            return ""
+    if data.endswith(TAIL):
+        return read_metadata(data[:HEAD].decode("utf-8", "replace"))
+    return picture_key(data)
+
+
+def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
+    """The results that are there already and that warpsplat did not write."""
+    found = []
+    for job in jobs:
+        if is_remote(job.output) and (not listed(job.output) or manifest.entries(job.output)):
+            continue
+        try:
+            free = may_replace(job.output)
+        except OSError:
+            free = False
+        if not free:
+            data = read_result(job.output)
+            entries = manifest.entries(job.output) if data is not None else []
+            free = data is not None and any(entry.digest == digest(data) for entry in entries)
+        if not free:
+            found.append(job.output)
+    return found
+
+
+class Batch:
+    """Jobs, who does them, and what is known of them."""
+
+    def __init__(
+        self,
+        jobs: list[Job],
+        manifest: Manifest,
+        *,
+        hear: Callable[[Report], None],
+        retry: bool = False,
+        threads: int | None = None,
+        carry: bool = False,
+        reports: Reports | None = None,
+    ) -> None:
+        """Args:
+        jobs: what to do.
+        manifest: open.
+        hear: told what becomes of each job, as soon as that is known.
+        retry: whether what failed is tried again.
+        threads: of each task, on a CPU.
+        carry: whether workers do not see the files: images go out, and results come back, as bytes.
+        reports: where pages on results are kept; None: none are made.
+        """
+        self.jobs, self.manifest = jobs, manifest
+        self._hear, self._retry, self._threads, self._carry = hear, retry, threads, carry
+        self._reports = reports
+        self._made_before: dict[int, Entry] = {}
+        """What the manifest says of results in work that only lack a report."""
+        self._keys: dict[int, str] = {}
+        """Of the tasks in work."""
+
+    def run(self, executor: Executor, stop: Stop, advance: Advance) -> None:
+        """Do the jobs. What another process has in work is waited for, and done if that process dies.
+
+        Raises:
+            OutputError: the manifest cannot be written.
+            ResourceError: there are no workers.
+        """
+        todo, waiting = list(range(len(self.jobs))), False
+        while todo and not stop():
+            later: list[int] = []
+            for outcome in executor.run(self._tasks(todo, later, stop), stop, advance):
+                advance(outcome.number, 1.0)
+                self._settle(outcome)
+            if later and not waiting:
+                waiting = True
+                log.info("waiting for %d images that another process has in work", len(later))
+            if len(later) == len(todo):
+                time.sleep(PAUSE)
+            todo = later
+
+    def look(self, stop: Stop) -> None:
+        """Say what a run would do, and do nothing."""
+        for number, job in enumerate(self.jobs):
+            if stop():
+                return
+            if self._prepared(number) is not None:
+                self._hear(Report(job, "planned"))
+
+    def _tasks(self, todo: list[int], later: list[int], stop: Stop) -> Iterator[Task]:
+        """The tasks among the jobs ``todo``, each claimed; those that others have go to ``later``."""
+        for number in todo:
+            if stop():
+                return
+            job = self.jobs[number]
+            found = self._prepared(number)
+            if stop():
+                self._hear(Report(job, "stopped"))
+                return
+            if found is None:
+                continue
+            if not self.manifest.claim(job.output, found.key):
+                later.append(number)
+                continue
+            # Who had the claim until now may have made it.
+            self.manifest.refresh()
+            state = self._known(job, found.key)
+            if state is None:
+                self.manifest.release(job.output, found.key)
+                continue
+            self._keys[number] = found.key
+            if state.made and state.entry:
+                self._made_before[number] = state.entry
+            yield self._task(number, found, measure=state.made)
+
+    def _prepared(self, number: int) -> Prepared | None:
+        """A job's inputs; None if nothing is to be done, which was reported."""
+        job = self.jobs[number]
+        try:
+            found = prepare(job)
+        except Exception as error:
+            self._hear(Report(job, "failed", error=failure(error, str(job.image), str(job.output))))
+            return None
+        return found if self._known(job, found.key) else None
+
+    def _known(self, job: Job, key: str) -> Standing | None:
+        """How a result stands; None if nothing is to be done, which was reported."""
+        state = standing(job, key, self.manifest)
+        reported = not (self._reports and self._reports.lacks(job.output))
+        if state.made and (is_picture(job.output) or (state.entry and reported)):  # pictures are not measured
+            self._hear(Report(job, "skipped", state.entry.figures if state.entry else {}))
+            return None
+        if not state.made and state.entry and not self._retry:
+            self._hear(Report(job, "failed", error=state.entry.error, before=True))
+            return None
+        return state
+
+    def _task(self, number: int, found: Prepared, *, measure: bool) -> Task:
+        job = self.jobs[number]
+        away = is_remote(job.output)
+        return Task(
+            number,
+            found.image if self._carry or is_remote(job.image) else str(job.image),
+            str(job.image),
+            str(job.output),
+            job.settings,
+            job.device,
+            self._threads,
+            self._mask(job, found),
+            # What bears no mark is known by its digest, which must be noted before it is written; a picture
+            # is drawn once, for both.
+            bring=self._carry or away or job.settings.minify or is_picture(job.output),
+            measure=measure,
+            result=read_result(job.output) if measure and (away or self._carry) else None,
+            report=self._report_wish(number),
+        )
+
+    def _report_wish(self, number: int) -> ReportWish | None:
+        if self._reports is None:
+            return None
+        before = self._made_before.get(number)
+        back = self._reports.way_back(self.jobs[number].output)
+        return ReportWish(back, before.figures if before else {})
+
+    def _mask(self, job: Job, found: Prepared) -> Source | None:
+        if job.importance is None:
+            return None
+        return found.mask if self._carry or is_remote(job.importance) else str(job.importance)
+
+    def _settle(self, outcome: Outcome) -> None:
+        """Write what is to be written, note it, and report it."""
+        job, key = self.jobs[outcome.number], self._keys.pop(outcome.number)
+        before = self._made_before.pop(outcome.number, None)
+        status: Status = "skipped" if outcome.status == "measured" else outcome.status
+        error = outcome.error
+        try:
+            if outcome.data is not None:
+                self._note(job, outcome, "writing")
+                make_folder(job.output.parent)
+                write_result(job.output, outcome.data)
+            if outcome.status in ("made", "measured") and not before:
+                self._note(job, outcome, "made")
+        except OutputError as failed:
+            status, error = "failed", failure(failed, str(job.image), str(job.output))
+        if status == "failed" and outcome.key:
+            with contextlib.suppress(OutputError):  # said once is enough
+                self.manifest.append(
+                    Entry(
+                        self.manifest.name(job.output),
+                        outcome.key,
+                        "failed",
+                        image=str(job.image),
+                        error=error,
+                    )
+                )
+        if self._reports and status != "failed":
+            self._reports.keep(job.output, outcome)
+        self.manifest.release(job.output, key)
+        self._hear(Report(job, status, before.figures if before else outcome.figures, error))
+
+    def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
+        name, image = self.manifest.name(job.output), str(job.image)
+        key = STOPPED if outcome.status == "stopped" else outcome.key  # ours, and no result of the job
+        self.manifest.append(Entry(name, key, event, outcome.digest, image, figures=outcome.figures))

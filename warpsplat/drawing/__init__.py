@@ -1,0 +1,1 @@
+"""Drawings, line art and pixel art: traced, fitted and tidied."""

@@ -1,0 +1,96 @@
+"""Small squares of the canvas, by which is told what a change of an outline may change in the picture.
+
+A set of them is an array of whole numbers, ascending, one for each.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.drawing.merge import points_at
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.tiles import TILE
+
+Cells = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+CELL = 2
+"""Side of a cell [canvas units]; a tile has whole ones."""
+
+ZERO, SPAN = 1 << 20, 1 << 21
+"""A cell's number is (column + ZERO) SPAN + row + ZERO: outlines stay within ten canvases."""
+
+AROUND = np.array([i * SPAN + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
+"""Steps from a cell to those that an outline in it may change as well."""
+
+
+def columns_and_rows(cells: Cells) -> tuple[Cells, Cells]:
+    """Where cells are."""
+    return cells // SPAN - ZERO, cells % SPAN - ZERO
+
+
+def joined(sets: Sequence[Cells]) -> Cells:
+    """The cells of all of them."""
+    return sets[0] if len(sets) == 1 else np.unique(np.concatenate(sets))
+
+
+def cells_around(cubics: Floats) -> list[Cells]:
+    """The cells around each of some cubics, shape (cubic, 4, 2)."""
+    if not len(cubics):
+        return []
+    reach = np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1)
+    counts = 2 + np.ceil(1.5 * reach / CELL).astype(np.intp)
+    which = np.repeat(np.arange(len(cubics)), counts)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    t = np.minimum(number * (1 / (counts - 1))[which], 1)
+    points = points_at(cubics[which], t[:, None, None])[:, 0]
+    places = np.floor(points / CELL).astype(np.int64) + ZERO
+    every = SPAN * SPAN
+    passed = np.unique(which * every + places[:, 0] * SPAN + places[:, 1])
+    near = np.unique(passed[:, None] + AROUND)
+    return np.split(near % every, np.searchsorted(near, np.arange(1, len(cubics)) * every))
+
+
+def first_apart(sets: Iterable[Cells]) -> list[int]:
+    """Which of some sets have no cell in common with another one that was chosen before."""
+    known = list(sets)
+    if not known:
+        return []
+    unique, number = np.unique(np.concatenate(known), return_inverse=True)
+    taken = np.zeros(len(unique), np.bool_)
+    chosen = []
+    for i, own in enumerate(np.split(number, np.cumsum([len(cells) for cells in known])[:-1])):
+        if not taken[own].any():
+            chosen.append(i)
+            taken[own] = True
+    return chosen
+
+
+def by_cell(tiles: npt.NDArray[np.floating[Any]], viewport: Viewport) -> Floats:
+    """Sums over the cells, with one more beyond each border that is empty.
+
+    Args:
+        tiles: pixels, 0 beyond the picture, shape (tile, column, row).
+        viewport: the picture.
+
+    Returns:
+        shape (rows + 2, columns + 2).
+    """
+    side = TILE // CELL
+    tall = functools.reduce(np.add, [tiles[..., i::CELL].astype(np.float64) for i in range(CELL)])
+    small = functools.reduce(np.add, [tall[:, i::CELL] for i in range(CELL)])
+    blocks = small.reshape(viewport.tiles_y, viewport.tiles_x, side, side).transpose(0, 3, 1, 2)
+    sums = blocks.reshape(viewport.tiles_y * side, viewport.tiles_x * side)
+    return np.pad(sums[: -(-viewport.height // CELL), : -(-viewport.width // CELL)], 1)
+
+
+def sum_within(sums: Floats, cells: Cells) -> float:
+    """Of ``by_cell``, over some cells; what lies beyond the border is empty."""
+    columns, rows = columns_and_rows(cells)
+    height, width = sums.shape
+    return float(sums[np.clip(rows + 1, 0, height - 1), np.clip(columns + 1, 0, width - 1)].sum())

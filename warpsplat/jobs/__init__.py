@@ -1,1 +1,0 @@
-"""What commands do: between the command line and the optimisation."""

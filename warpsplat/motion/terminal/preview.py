@@ -1,0 +1,98 @@
+"""A run's picture on a terminal: drawn over while it trains, and at the end beside its source."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import secrets
+import time
+from collections.abc import Callable
+from typing import IO
+
+from warpsplat.fit.work import Progress
+from warpsplat.motion.terminal.detect import Terminal
+from warpsplat.motion.terminal.layout import Place, beside, drawing, joined, place, resized
+from warpsplat.scene import FloatArray
+
+SHARE = 0.05
+"""Of the time of a run that is spent on drawing it: the next drawing waits until the last one is no more."""
+
+SOONEST = 0.1
+"""Time between two drawings [s], at the least."""
+
+FIRST_WAIT = 1.0
+"""Time from the first drawing to the second one [s], at the most: the first one takes longer than others."""
+
+SAVE, RESTORE = "\x1b7", "\x1b8"
+"""The cursor's place, and back to it."""
+
+
+class Preview:
+    """Draws on a stream. While a run goes on the picture is above the line that the cursor is in, a progress
+    bar's, and stays there; what is written of a line is left as it is.
+    """
+
+    def __init__(
+        self,
+        stream: IO[str],
+        look: Callable[[], Terminal],
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        """``look``: what there is to draw on now."""
+        self._stream, self._look, self._clock = stream, look, clock
+        self._terminal: Terminal | None = None
+        self._place: Place | None = None
+        """Of the picture that is there; None: there is none."""
+        self._next, self._cost = 0.0, math.inf
+        self._name = 1 + secrets.randbelow(2**24 - 1)
+
+    def report(self, progress: Progress) -> None:
+        """Draw the picture of a run's report, unless the last one was just before it."""
+        begun = self._clock()
+        if progress.snapshot is None or begun < self._next:
+            return
+        terminal = self._look()
+        if terminal.live:
+            self._draw(progress.snapshot.image(), None, terminal, quick=True)
+        now = self._clock()
+        before, self._cost = self._cost, now - begun
+        wait = min(before, self._cost) * (1 / SHARE - 1)  # one that was held up says nothing of the next one
+        self._next = now + max(SOONEST, wait if before < math.inf else min(wait, FIRST_WAIT))
+
+    def move_on(self) -> None:
+        """Leave the picture that is there: lines were written below it, and the next one goes below them."""
+        self._place = None
+
+    def finish(self, image: FloatArray, source: FloatArray | None) -> None:
+        """Draw the finished picture in the place of the last one, and its source before it if there is room.
+
+        Pictures have values in [0, 1] and shapes (height, width, 3), or (height, width, 4) premultiplied.
+        """
+        self._draw(image, source, self._look())
+
+    def _draw(
+        self, image: FloatArray, source: FloatArray | None, terminal: Terminal, *, quick: bool = False
+    ) -> None:
+        if terminal != self._terminal:  # another size: where the picture was nobody knows
+            self._terminal, self._place = terminal, None
+        one = place(terminal, image.shape[1], image.shape[0])
+        if one is None:
+            return
+        pixels = resized(image, one.pixels)
+        if source is not None and beside(terminal, one):
+            pixels = joined(resized(source, one.pixels), pixels, one)
+        text = drawing(terminal, pixels, one, self._name, quick=quick)
+        if not terminal.live:
+            self._write(text + "\n")
+            return
+        begin = ""
+        if self._place is None or self._place.rows != one.rows:
+            begin = "\r\x1b[2K" + one.rows * "\n"
+            self._place = one
+        self._write(f"{begin}{SAVE}\r\x1b[{one.rows}A{text}{RESTORE}")
+
+    def _write(self, text: str) -> None:
+        """A stream that takes no more is no reason to fail."""
+        with contextlib.suppress(OSError, ValueError):
+            self._stream.write(text)
+            self._stream.flush()

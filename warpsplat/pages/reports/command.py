@@ -1,0 +1,127 @@
+"""Settings as the command line that gives them."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+from warpsplat.errors import UsageError
+from warpsplat.fit.settings import (
+    DEFAULT_QUALITY,
+    QUALITIES,
+    Quality,
+    Settings,
+    levels_of,
+    make_settings,
+)
+from warpsplat.run.options import OPTIONS
+from warpsplat.scene import Kind
+
+REFINE_ITERATIONS = 200
+"""Steps of ``warpsplat refine`` that are not given."""
+
+
+def vectorize_command(settings: Settings, image: str, output: str, *further: str) -> str:
+    """The line that makes ``output`` of ``image`` with ``settings``; ``further``: what it says besides.
+
+    Where no flags say the same, as of settings that only batch files have, a comment tells so.
+    """
+    quality, given = flags_of(settings)
+    line = shlex.join(
+        ["warpsplat", "vectorize", as_path(image), *_words(quality, given), *further, "-o", output]
+    )
+    return line if _settings(quality, given) == settings else f"{line}  # and settings that no flag says"
+
+
+def several_command(
+    settings: Settings, numbers: Sequence[int], image: str, output: os.PathLike[str] | None, *further: str
+) -> str:
+    """The line that makes the files of several ``numbers`` of shapes; without an ``output``, here."""
+    quality, given = flags_of(replace(settings, curves=max(numbers), simplify=False))
+    words = _words(quality, {**given, "curves": ",".join(map(str, numbers))})
+    where = () if output is None else ("-o", os.fspath(output))
+    return shlex.join(["warpsplat", "vectorize", as_path(image), *words, *further, *where])
+
+
+def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:
+    """The line that makes ``output`` of ``svg`` and ``image``."""
+    names = ("iterations", "time_budget", "precision", "title", "ids", "minify", "background")
+    default = make_settings(iterations=REFINE_ITERATIONS)
+    given = {
+        name: getattr(settings, name)
+        for name in names
+        if getattr(settings, name) != getattr(default, name) and getattr(settings, name) is not None
+    }
+    words = _words(DEFAULT_QUALITY, given)
+    return shlex.join(["warpsplat", "refine", as_path(svg), as_path(image), *words, *further, "-o", output])
+
+
+def as_path(name: str) -> str:
+    """A file's name that no command takes for a flag."""
+    return f"./{name}" if name.startswith("-") and name != "-" else name
+
+
+def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:
+    """The effort, and what else ``make_settings`` has to be given for ``settings``: as little as there is."""
+    choices = [(quality, _given(settings, quality)) for quality in QUALITIES]
+    exact = [one for one in choices if _settings(*one) == settings]
+    return min(exact or choices, key=lambda one: (len(one[1]), one[0] != DEFAULT_QUALITY))
+
+
+def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
+    given: dict[str, Any] = {"renderer": settings.renderer} if settings.renderer != "exact" else {}
+    default = _settings(quality, given) or Settings()
+    if not settings.simplify and not settings.levels:
+        given["curves"] = settings.curves
+    if settings.levels:
+        layered = settings.levels == levels_of(settings.curves)
+        given |= {"layered": True, "curves": settings.curves} if layered else {"levels": settings.levels}
+    if settings.kind == Kind.STROKE:
+        given["kind"] = Kind.STROKE
+    implied = ("curves", "levels", "kind", "opaque", "renderer")
+    known = {field.name for field in fields(Settings)}
+    for option in OPTIONS:
+        name = option.setting
+        if name in known and name not in implied and getattr(settings, name) != getattr(default, name):
+            given[name] = getattr(settings, name)
+    if settings.opaque and not settings.is_limited:
+        given["opaque"] = True
+    return given
+
+
+def _settings(quality: Quality, given: dict[str, Any]) -> Settings | None:
+    """What these make; None: they do not go together."""
+    values = dict(given)
+    if "palette" in values:
+        values["palette"] = ",".join(values["palette"])
+    try:
+        return make_settings(quality, **values)
+    except UsageError:
+        return None
+
+
+def _words(quality: Quality, given: dict[str, Any]) -> Iterator[str]:
+    if quality != DEFAULT_QUALITY:
+        yield from ("--quality", quality)
+    for option in OPTIONS:
+        value = given.get(option.setting)
+        if value is None or option.setting == "quality":
+            continue
+        if option.kind is not None:
+            if value == option.kind:
+                yield f"--{option.name}"
+        elif option.type is bool:
+            if value:
+                yield f"--{option.name}"
+        else:
+            text = _text(option.name, value)
+            yield from (f"--{option.name}={text}",) if text.startswith("-") else (f"--{option.name}", text)
+
+
+def _text(name: str, value: Any) -> str:
+    if isinstance(value, (tuple, list)):
+        return ",".join(map(str, value))
+    return f"{value:g}s" if name == "time-budget" else str(value)

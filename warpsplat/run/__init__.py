@@ -1,0 +1,1 @@
+"""Run one image: from a source to the file and its score."""

@@ -1,0 +1,105 @@
+"""What is measured of a run's file, and of its render."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from warpsplat.errors import Stopped
+from warpsplat.fit.export import export
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.step import model_for
+from warpsplat.metrics import Score, psnr, score_svg, ssim
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
+from warpsplat.run.memory import has_room_for_eyes
+from warpsplat.run.reduction import Reduction
+from warpsplat.run.result import LevelScore
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.scene import level_ends
+
+QUICK_PIXELS = 1_000_000
+"""Of an image up to this size, an interrupted run is still scored, and a score that has begun goes on: it
+takes about a second."""
+
+
+def pixels_of(target: FloatArray) -> int:
+    """Of an image, shape (height, width, channels)."""
+    return target.shape[0] * target.shape[1]
+
+
+def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
+    """Whether a run's report has SSIMULACRA2, where it is installed: up to ``QUICK_PIXELS`` it takes a
+    twentieth of a run of the default effort; within a time budget other things are worth more, and it takes
+    much memory.
+    """
+    pixels = pixels_of(target)
+    return pixels <= QUICK_PIXELS and settings.time_budget is None and has_room_for_eyes(settings, pixels)
+
+
+def scored(
+    svg: str,
+    target: FloatArray,
+    settings: Settings,
+    stop: Callable[[], bool] | None,
+    reduction: Reduction | None,
+    *,
+    interrupted: bool,
+) -> Score | None:
+    """The score of a file, or None where there is no time for it."""
+    quick = pixels_of(target) <= QUICK_PIXELS
+    eyes = has_time_for_eyes(settings, target) and not interrupted
+    if (interrupted and not quick) or (not interrupted and stop and stop()):
+        return None
+    try:
+        if reduction:
+            return reduction.score(svg, target, stop)
+        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
+    except Stopped:
+        return None
+
+
+def level_scores(
+    scene: Scene, settings: Settings, per_pixel: float, target: FloatArray, reduction: Reduction | None
+) -> tuple[LevelScore, ...]:
+    """Of the files that the first layers alone make."""
+    found = []
+    for end in (*level_ends(scene), len(scene)):
+        text = export(scene.take(np.arange(end)), settings, per_pixel)
+        if reduction:
+            score = reduction.score(text, target, None)
+        else:
+            score = score_svg(text, target, own=True, eyes=False)
+        found.append(LevelScore(end, score.as_dict()["psnr"]))
+    return tuple(found)
+
+
+def render_figures(
+    scene: Scene, target: FloatArray, settings: Settings, backend: Backend, *, scale: int = 1
+) -> tuple[float, float | None]:
+    """PSNR [dB] and SSIM of the settings' own render of ``scene`` against ``target``, both in 8 bits.
+
+    ``scale``: of the render, which is reduced by area to the image's size before it is compared.
+    """
+    shown = render(scene, scale=scale, model=model_for(settings, 0), backend=backend)
+    levels = np.round(255 * np.clip(shown, 0, 1))
+    if scale > 1:
+        height, width = target.shape[:2]
+        levels = levels.reshape(height, scale, width, scale, 3).mean(axis=(1, 3), dtype=np.float32)
+    wanted = np.round(255 * target)
+    return psnr(levels, wanted), ssim(levels, wanted)
+
+
+def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:
+    """The goals of ``settings`` that a run did not reach; without a score nobody knows."""
+    missed: list[str] = []
+    if score is None:
+        return ()
+    if settings.target_psnr and score.psnr < settings.target_psnr:
+        missed.append(f"target-psnr {settings.target_psnr:g} dB: reached {score.psnr:.2f} dB")
+    if settings.max_bytes and score.bytes > settings.max_bytes:
+        missed.append(f"max-bytes {settings.max_bytes}: reached {score.bytes}")
+    if settings.time_budget and seconds > settings.time_budget:
+        missed.append(f"time-budget {settings.time_budget:g} s: took {seconds:.1f} s")
+    return tuple(missed)
