@@ -1,6 +1,4 @@
-"""What the site shows of texts that have their home elsewhere: files of the repository's top, parts of the
-README, and the help of the commands.
-"""
+"""Pages of the site made from text that lives elsewhere: ARCHITECTURE.md and the like, and the commands' help."""
 
 from __future__ import annotations
 
@@ -15,7 +13,6 @@ import click
 import gallery_pages
 import gallery_reports
 from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 from warpsplat.cli.main import COMMANDS, cli
@@ -51,27 +48,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put parts of files where a page says ``<!-- FILE: NAME -->``."""
-    return re.sub(r"^<!-- (\S+): (\w+) -->$", lambda m: part(m[1], m[2]), markdown, flags=re.MULTILINE)
-
-
 def on_page_content(text: str, **_: Any) -> str:
     """Mark code that is short enough for one line: ``--curves N`` is not to break at its hyphens."""
     return re.sub(r"<code>(?=[^<]{1,24}</code>)", '<code class="short">', text)
-
-
-def part(file: str, name: str) -> str:
-    """What lies between ``<!-- name -->`` and ``<!-- /name -->``.
-
-    Raises:
-        PluginError: the file has no such part.
-    """
-    text = (ROOT / file).read_text(encoding="utf-8")
-    found = re.search(rf"<!-- {name} -->\n(.*?)<!-- /{name} -->", text, re.DOTALL)
-    if not found:
-        raise PluginError(f"{file} has no part {name!r}")
-    return linked(found[1])
 
 
 def linked(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The README's table of exit codes, held against the program: each kind of failure in each command."""
+"""The table of exit codes, held against the program: each kind of failure in each command."""
 
 from __future__ import annotations
 
@@ -214,9 +214,9 @@ def test_every_code_and_command_is_in_the_table() -> None:
     assert {line.split()[0] for _, _, line, _ in TABLE} == {*COMMANDS, "nonsense"}
 
 
-def test_the_readme_lists_the_codes() -> None:
-    readme = (ROOT / "README.md").read_text("utf-8")
-    section = readme.split("### Exit codes")[1].split("\n#")[0]
+def test_the_docs_list_the_codes() -> None:
+    page = (ROOT / "docs" / "settings.md").read_text("utf-8")
+    section = page.split("## Exit codes")[1].split("\n#")[0]
     listed = [int(number) for number in re.findall(r"^\| (\d+) \|", section, re.MULTILINE)]
     assert listed == sorted(set(ExitCode)), "each code once, in order"
 

@@ -1,4 +1,4 @@
-"""One home of options: flags, keys of batch files and the README's table say the same."""
+"""One home of options: flags, keys of batch files and the docs' table say the same."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.run import options
 from warpsplat.run.options import OPTIONS, Option, settings_from
 
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+TABLE = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
 ROWS = [
-    [cell.strip() for cell in line.strip("|").split("|")] for line in README.splitlines() if line[:3] == "| `"
+    [cell.strip() for cell in line.strip("|").split("|")] for line in TABLE.splitlines() if line[:3] == "| `"
 ]
 
 
@@ -30,7 +30,7 @@ def test_flags_keys_and_readme(option: Option) -> None:
     assert option.help.rstrip(".") in (flag.help or "")
     assert option.name in KEYS
     rows = [row for row in ROWS if re.search(rf"`--{option.name}[ `]", row[0])]
-    assert len(rows) == 1, "a row of the README's table"
+    assert len(rows) == 1, "a row of the table"
     if option.default and option.kind is None:
         assert rows[0][2].strip("`") == option.default
 
