@@ -1,4 +1,4 @@
-"""Pages of the site made from text that lives elsewhere: ARCHITECTURE.md and the like, and the commands' help."""
+"""Pages of the site whose text lives elsewhere: ARCHITECTURE.md and the like, and the commands' help."""
 
 from __future__ import annotations
 
