@@ -108,6 +108,13 @@ def cut(text: str, most: int = SHOWN) -> str:
     return text if len(text) <= most else f"{text[:most]} ..."
 
 
+def cause_of(error: BaseException) -> str:
+    """Return an error's cause in one line: what the system says, its message's first line, or its class."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return next(iter(str(error).strip().splitlines()), type(error).__name__)
+
+
 def printable(text: str) -> str:
     """``text`` as one line: control characters, line breaks and undecodable bytes of names are escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

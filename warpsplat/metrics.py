@@ -19,7 +19,7 @@ from PIL import Image
 
 from warpsplat.portable import elementary
 from warpsplat.svg.inspect import inspect_svg
-from warpsplat.svg.strips import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check, draw, rows_of
+from warpsplat.svg.strips import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
 
@@ -154,7 +154,7 @@ def _similarity(pair: Pair, stop: Stop | None) -> tuple[float, float]:
     width, height = pair.width, pair.height
     total = np.zeros(2)
     for rows in rows_of(width, height, SSIM_WINDOW - 1):
-        check(stop)
+        check_stop(stop)
         a, b = pair.rows(rows)
         total += _similarity_sums(a - MIDDLE, b - MIDDLE)
     total /= (height - SSIM_WINDOW + 1) * (width - SSIM_WINDOW + 1)
@@ -267,7 +267,7 @@ def score_svg(
     if len(papers) > 1:
         paper = min(papers, key=lambda level: decibels(_error(shown, target, level)))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
-    check(stop)
+    check_stop(stop)
     seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None
     facts = inspect_svg(text)
     return Score(
