@@ -14,8 +14,8 @@ from typing import Any, Literal, NamedTuple
 
 from warpsplat.errors import ImageError, OutputError
 from warpsplat.files.inputs import MAX_INPUT, read_input
-from warpsplat.files.marks import picture_key
-from warpsplat.files.output import GZIP, HEAD, make_folder, may_replace, write_result
+from warpsplat.files.marks import GZIP, HEAD, picture_key
+from warpsplat.files.output import make_folder, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.jobs.batch.manifest import Entry, Manifest
 from warpsplat.jobs.batch.plan import Job
