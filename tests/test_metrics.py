@@ -16,7 +16,7 @@ from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import ImageError, Stopped
-from warpsplat.metrics import EYES_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
+from warpsplat.metrics import SSIMULACRA2_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
 from warpsplat.scene import Kind
 from warpsplat.svg import strips
 from warpsplat.svg.inspect import inspect_svg
@@ -263,7 +263,7 @@ def test_ssimulacra2_has_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
         return -7.123
 
     monkeypatch.setitem(sys.modules, "ssimulacra2", SimpleNamespace(compute_ssimulacra2=compute))
-    wide = EYES_PIXELS // 8 + 1
+    wide = SSIMULACRA2_PIXELS // 8 + 1
     for shape in ((7, 20, 3), (20, 7, 3), (8, wide, 3)):
         assert ssimulacra2(np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)) is None
     assert not asked

@@ -1,4 +1,4 @@
-"""Pictures with opacity: sRGB premultiplied by it, and it, shape (..., 4); opaque ones are (..., 3)."""
+"""Images with opacity: premultiplied sRGB and opacity, shape (..., 4); opaque ones are (..., 3)."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.floating]
 
 CLEAR = 1 / 1024
-"""Opacity below which a colour is not known."""
+"""Opacity below which a colour is undefined."""
 
 
 def on(image: Floats, paper: float) -> Floats:
-    """The picture on grey ``paper``, shape (..., 3); an opaque one as it is."""
+    """Return the image on grey ``paper`` in [0, 1], shape (..., 3); an opaque one as it is."""
     if image.shape[-1] == 3:
         return image
     return np.asarray(image[..., :3] + np.float32(paper) * (1 - image[..., 3:]))
 
 
 def straight(image: Floats) -> Floats:
-    """Colours as they are where nothing shines through, shape (..., 3); black where nothing is."""
+    """Return the colours without premultiplication, shape (..., 3); black where transparent."""
     if image.shape[-1] == 3:
         return image
     opacity = image[..., 3:]
@@ -30,12 +30,13 @@ def straight(image: Floats) -> Floats:
 
 
 def squares(difference: npt.NDArray[Any], axis: int = -1) -> npt.NDArray[Any]:
-    """Squared error of each pixel, summed over the colours along ``axis``; with opacity the mean of those on
-    black and on white.
+    """Return the squared error of each pixel, summed over the colours along ``axis``.
+
+    With opacity it is the mean of those on black and on white.
     """
     parts = np.moveaxis(difference, axis, 0)
     red, green, blue = parts[:3]
-    # The same bits as a sum along the last axis, which takes many times as long.
+    # The same bits as a sum along the last axis, at a fraction of the time.
     on_black = red**2 + green**2 + blue**2
     if len(parts) == 3:
         return np.asarray(on_black)

@@ -1,4 +1,4 @@
-"""Errors that a user can cause or meet, and the one home of exit codes.
+"""Errors that users may meet, and all exit codes.
 
 Each message is one line that names the thing and the cause.
 """
@@ -10,11 +10,11 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """What the program ends with."""
+    """Exit codes of the program."""
 
     DONE = 0
     INTERNAL = 1
-    """A fault of warpsplat itself."""
+    """A bug in warpsplat."""
     USAGE = 2
     """An option, batch file, device or output that cannot be used as given."""
     INPUT = 3
@@ -34,19 +34,19 @@ class ExitCode(IntEnum):
 
 
 class WarpsplatError(Exception):
-    """Base of all errors raised on purpose; ``exit_code`` is what the command line ends with."""
+    """Base of all errors raised on purpose; ``exit_code`` is the program's."""
 
     exit_code = ExitCode.INTERNAL
 
 
 class UsageError(WarpsplatError):
-    """A setting, path or device that cannot be used as given."""
+    """A setting, path or device that cannot be used."""
 
     exit_code = ExitCode.USAGE
 
 
 class ImageError(WarpsplatError):
-    """An image (or SVG) that cannot be read or is not supported."""
+    """An image or SVG that cannot be read or is not supported."""
 
     exit_code = ExitCode.INPUT
 
@@ -58,13 +58,13 @@ class CheckpointError(WarpsplatError):
 
 
 class OutputError(WarpsplatError):
-    """A result that could not be written; nothing half-written is left."""
+    """A result that could not be written; no partial file is left."""
 
     exit_code = ExitCode.OUTPUT
 
 
 class ResourceError(WarpsplatError):
-    """Something that the machine cannot give: memory, threads, a place for compiled kernels."""
+    """A lack of memory, threads, or space for compiled kernels."""
 
     exit_code = ExitCode.RESOURCES
 
@@ -73,29 +73,27 @@ class CapacityError(ResourceError):
     """A device array would have to grow past what the machine can hold."""
 
 
-class Stopped(Exception):  # noqa: N818 - a wish that came true, no error
-    """Work was given up because its caller's ``stop`` said so. The caller catches it; no user sees it."""
+class Stopped(Exception):  # noqa: N818 - not an error
+    """Raised when the caller's ``stop`` returns true; the caller catches it."""
 
 
 LONGEST_MESSAGE = 1000
-"""Characters of an error's message: a hostile value in it must not fill the terminal."""
+"""Most characters of a message: a hostile value in it must not fill the terminal."""
 
 NO_MEMORY = (
-    "failed to allocate",
-    "out of memory",
-    "insufficient memory",
-    "bad_alloc",
+    *("failed to allocate", "out of memory", "insufficient memory", "bad_alloc"),
     "can't start new thread",
 )
-"""How Warp, CUDA, OpenCV, C++ and Python say that the machine has no more to give, in lower case."""
+"""Messages of Warp, CUDA, OpenCV, C++ and Python about a lack of resources, in lower case."""
 
+NO_RESOURCES = {errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE}
 
 SHOWN = 80
-"""Characters of a refused value that its message shows."""
+"""Most characters of a refused value in a message."""
 
 
 def shown(value: object) -> str:
-    """Return a refused value for a message: the first ``SHOWN`` characters of its ``repr``."""
+    """Return the ``repr`` of a refused value, shortened for a message."""
     try:
         words = repr(value)
     except ValueError:  # a number of thousands of digits
@@ -104,20 +102,27 @@ def shown(value: object) -> str:
 
 
 def cut(text: str, most: int = SHOWN) -> str:
-    """Return a text, shortened to ``most`` characters if it is longer."""
+    """Return a text, shortened to ``most`` characters."""
     return text if len(text) <= most else f"{text[:most]} ..."
 
 
+def cause_of(error: BaseException) -> str:
+    """Return an error's cause in one line: what the system says, its message's first line, or its class."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return next(iter(str(error).strip().splitlines()), type(error).__name__)
+
+
 def printable(text: str) -> str:
-    """``text`` as one line: control characters, line breaks and undecodable bytes of names are escaped."""
+    """Return ``text`` on one line, with control characters and undecodable bytes of names escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def explain(error: BaseException) -> tuple[str, ExitCode]:
-    """What to tell a user about anything that was raised: a message of one line, and the exit code.
+    """Return a message of one line about anything that was raised, and the exit code.
 
-    Errors raised on purpose say so themselves. What libraries raise is sorted by what it means: no memory, a
-    panic of the renderer's Rust code, a file that the system refuses; all else is a fault of warpsplat.
+    Errors of libraries may mean a lack of memory, a panic of resvg's Rust code, or a file that the system
+    refuses; any other is a bug in warpsplat.
     """
     cause = (str(error).strip().splitlines() or [""])[0]
     kind = type(error).__name__
@@ -125,14 +130,9 @@ def explain(error: BaseException) -> tuple[str, ExitCode]:
         message, code = str(error), error.exit_code
     elif isinstance(error, MemoryError) or any(sign in cause.lower() for sign in NO_MEMORY):
         message, code = f"not enough memory: {cause}" if cause else "not enough memory", ExitCode.RESOURCES
-    elif isinstance(error, OSError) and error.errno in {
-        errno.ENOMEM,
-        errno.EAGAIN,
-        errno.EMFILE,
-        errno.ENFILE,
-    }:
+    elif isinstance(error, OSError) and error.errno in NO_RESOURCES:
         message, code = f"{error.filename or 'system'}: {error.strerror}", ExitCode.RESOURCES
-    elif kind == "PanicException":  # of pyo3; derives from BaseException and is not importable
+    elif kind == "PanicException":  # pyo3's; it derives from BaseException and cannot be imported
         message, code = f"the SVG renderer gave up: {cause}", ExitCode.INPUT
     elif isinstance(error, OSError):
         message, code = f"{error.filename or 'output'}: {error.strerror or cause or kind}", ExitCode.OUTPUT

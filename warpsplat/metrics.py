@@ -1,7 +1,4 @@
-"""The file as a viewer shows it, and how far that is from the image.
-
-All figures are taken in 8-bit sRGB from a render by resvg, an independent renderer.
-"""
+"""Quality of a file: its rendering by resvg, an independent viewer, compared with the image in 8-bit sRGB."""
 
 from __future__ import annotations
 
@@ -19,73 +16,74 @@ from PIL import Image
 
 from warpsplat.portable import elementary
 from warpsplat.svg.inspect import inspect_svg
-from warpsplat.svg.strips import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check, draw, rows_of
+from warpsplat.svg.strips import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
 
 SSIM_WINDOW = 11
 
 MIDDLE = np.float32(128)
-"""Variances are taken about it, so that 32 bits are enough for them."""
+"""Subtracted before variances are computed, so that 32 bits suffice for them."""
 
 MS_SSIM_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
-"""Of the five scales (Wang et al. 2003, section 3.2)."""
+"""Weights of the five scales (Wang et al. 2003, section 3.2)."""
 
-EYES_LEAST = 8
+SSIMULACRA2_SIDE = 8
 """Smallest side of an image that SSIMULACRA2 is defined for [px]."""
 
-EYES_PIXELS = 4_000_000
+SSIMULACRA2_PIXELS = 4_000_000
 """Largest image that it is measured for [pixels]: its package takes 500 bytes and 3 microseconds a pixel."""
 
 
 class Rows(Protocol):
-    """An image of which rows can be had: an array, or what makes them when they are asked for."""
+    """An image by rows: an array, or an object that makes them on demand."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Height, width, channels."""
+        """Return height, width and channels."""
 
     def __getitem__(self, rows: slice, /) -> Floats:
-        """Shape (row, width, channels)."""
+        """Return rows, shape (row, width, channels)."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A channel of two images, 0..255."""
+    """A channel of two images, in [0, 255]."""
 
     width: int
     height: int
     rows: Callable[[slice], tuple[Floats, Floats]]
-    """Rows of both, each of shape (row, width)."""
+    """Returns rows of both, each of shape (row, width)."""
 
     @staticmethod
     def of(a: Floats, b: Floats) -> Pair:
-        """Of arrays."""
+        """Return a pair of arrays, shape (height, width)."""
         return Pair(a.shape[1], a.shape[0], lambda rows: (a[rows], b[rows]))
 
 
 def psnr(a: Floats, b: Floats) -> float:
-    """Peak signal-to-noise ratio [dB] of two arrays in 0..255; infinite where they are equal."""
+    """Return the peak signal-to-noise ratio [dB] of two arrays in [0, 255]; infinite if they are equal."""
     return decibels(float(np.mean((a - b) ** 2, dtype=np.float64)))
 
 
 def decibels(error: float) -> float:
-    """PSNR [dB] of a mean squared error in levels of 0..255; infinite where it is 0."""
+    """Return the PSNR [dB] of a mean squared error of levels in [0, 255]; infinite for 0."""
     return float("inf") if error == 0 else float(10 * elementary.log10(65025 / error))
 
 
 def ssim(a: Floats, b: Floats) -> float | None:
-    """Structural similarity (Wang et al. 2004), Gaussian window of 11x11, sigma 1.5, mean over channels.
+    """Return structural similarity (Wang et al. 2004): Gaussian window of 11x11, sigma 1.5, mean over
+    channels.
 
-    None for an image smaller than the window.
+    None: the image is smaller than the window.
     """
     return _figures(_planes(a, b))[1]
 
 
 def ms_ssim(a: Floats, b: Floats) -> float | None:
-    """Multi-scale structural similarity (Wang et al. 2003); scales are halved by area.
+    """Return multi-scale structural similarity (Wang et al. 2003); scales are halved by area.
 
-    None for an image of which the smallest scale has no room for the window.
+    None: the smallest scale is smaller than the window.
     """
     return _figures(_planes(a, b))[2]
 
@@ -96,11 +94,7 @@ def _planes(a: Floats, b: Floats) -> Iterator[Pair]:
 
 
 def _figures(pairs: Iterable[Pair], stop: Stop | None = None) -> tuple[float, float | None, float | None]:
-    """PSNR, SSIM and MS-SSIM, channel by channel. The maps of one strip are held at a time.
-
-    Raises:
-        Stopped: ``stop`` says so.
-    """
+    """Return PSNR, SSIM and MS-SSIM of channels, holding the maps of one strip at a time."""
     errors, scales = [], []
     for pair in pairs:
         errors.append(_squared_error(pair))
@@ -115,7 +109,7 @@ def _figures(pairs: Iterable[Pair], stop: Stop | None = None) -> tuple[float, fl
 
 
 def _squared_error(pair: Pair) -> float:
-    """Mean over the pixels."""
+    """Return the mean squared error."""
     total = 0.0
     for rows in rows_of(pair.width, pair.height):
         a, b = pair.rows(rows)
@@ -124,7 +118,7 @@ def _squared_error(pair: Pair) -> float:
 
 
 def _similarities(pair: Pair, stop: Stop | None) -> list[tuple[float, float]]:
-    """Mean SSIM and mean contrast-structure factor of each scale that has room for the window."""
+    """Return the mean SSIM and contrast-structure factor of each scale that is larger than the window."""
     values: list[tuple[float, float]] = []
     while min(pair.width, pair.height) >= (2 * SSIM_WINDOW if values else SSIM_WINDOW + 1):
         values.append(_similarity(pair, stop))
@@ -135,7 +129,7 @@ def _similarities(pair: Pair, stop: Stop | None) -> list[tuple[float, float]]:
 
 
 def _halved(pair: Pair) -> Pair:
-    """By area. Where both sides are even that is done strip by strip."""
+    """Return both images at half the size, by area; strip by strip if both sides are even."""
     width, height = pair.width // 2, pair.height // 2
     step = height
     if pair.width % 2 == pair.height % 2 == 0:
@@ -150,11 +144,11 @@ def _halved(pair: Pair) -> Pair:
 
 
 def _similarity(pair: Pair, stop: Stop | None) -> tuple[float, float]:
-    """Means of SSIM and of its contrast-structure factor, where the window fits."""
+    """Return the means of SSIM and of its contrast-structure factor, where the window fits."""
     width, height = pair.width, pair.height
     total = np.zeros(2)
     for rows in rows_of(width, height, SSIM_WINDOW - 1):
-        check(stop)
+        check_stop(stop)
         a, b = pair.rows(rows)
         total += _similarity_sums(a - MIDDLE, b - MIDDLE)
     total /= (height - SSIM_WINDOW + 1) * (width - SSIM_WINDOW + 1)
@@ -162,7 +156,7 @@ def _similarity(pair: Pair, stop: Stop | None) -> tuple[float, float]:
 
 
 def _similarity_sums(a: Floats, b: Floats) -> tuple[float, float]:
-    """Sums over a strip of values about ``MIDDLE``."""
+    """Return sums of both over a strip of values about ``MIDDLE``."""
     inner = SSIM_WINDOW // 2
 
     def blur(x: Floats) -> Floats:
@@ -179,14 +173,13 @@ def _similarity_sums(a: Floats, b: Floats) -> tuple[float, float]:
 
 
 def ssimulacra2(a: Bytes, b: Bytes) -> float | None:
-    """SSIMULACRA2 (Sneyers, Cloudinary 2022) of ``b`` against ``a``, 8-bit sRGB of shape (height, width, 3).
+    """Return SSIMULACRA2 (Sneyers, Cloudinary 2022) of ``b`` against ``a``, sRGB of shape (height, width, 3).
 
-    100 for equal images, 90 where no eye sees a difference, 50 for one that is plain to see, below 0 for a
-    caricature. None where its package (the extra ``eyes``) is not installed, or the image is too small or
-    large.
+    100: equal; 90: no visible difference; 50: an obvious one; below 0: a caricature. None: its package (the
+    extra ``eyes``) is not installed, or the image is too small or large.
     """
     height, width = a.shape[:2]
-    if min(height, width) < EYES_LEAST or height * width > EYES_PIXELS:
+    if min(height, width) < SSIMULACRA2_SIDE or height * width > SSIMULACRA2_PIXELS:
         return None
     try:
         from ssimulacra2 import compute_ssimulacra2  # takes half a second
@@ -196,7 +189,7 @@ def ssimulacra2(a: Bytes, b: Bytes) -> float | None:
 
 
 def _as_file(pixels: Bytes) -> io.BytesIO:
-    """8-bit sRGB as what Pillow opens."""
+    """Return 8-bit sRGB as a file for Pillow."""
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "PPM")
     file.seek(0)
@@ -205,28 +198,27 @@ def _as_file(pixels: Bytes) -> io.BytesIO:
 
 @dataclass(frozen=True)
 class Score:
-    """Figures of one file against its image."""
+    """Figures of a file compared with its image."""
 
     psnr: float
     """[dB]"""
     ssim: float | None
     ms_ssim: float | None
     ssimulacra2: float | None
-    """None where it was not measured."""
+    """None: it was not measured."""
     paths: int
-    """Elements that draw an outline, basic shapes too, each once however often ``use`` shows it; a background
-    that is a rectangle is none."""
+    """As ``SvgFacts.paths``."""
     nodes: int
-    """Points that these paths pass through, with those of basic shapes counted as one each."""
+    """As ``SvgFacts.nodes``."""
     bytes: int
     gzip_bytes: int
 
     def of_file(self, text: str) -> Score:
-        """The same figures of the file ``text``, which shows the same elsewhere or larger."""
+        """Return the figures for another file, ``text``, of the same picture."""
         return replace(self, **_sizes(text))
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; rounded to what the measurement is worth."""
+        """Return the figures for JSON, rounded to their accuracy."""
         values = asdict(self)
         values["psnr"] = round(self.psnr, 3) if np.isfinite(self.psnr) else None
         for name in ("ssim", "ms_ssim"):
@@ -245,20 +237,20 @@ def score_svg(
 ) -> Score:
     """Render ``text`` at the size of ``target`` and compare.
 
-    With opacity both lie on black and on white; the figures are those of where they are less alike. Besides
-    ``target`` this takes about 6 bytes a pixel (12, where a side is odd), with SSIMULACRA2 500.
+    With opacity they are compared on black and on white, and the figures are of where they differ more.
+    Besides ``target`` this takes about 6 bytes a pixel (12 if a side is odd), with SSIMULACRA2 500.
 
     Args:
-        text: the SVG.
-        target: the image, sRGB in [0, 1], shape (height, width, 3), which a file with opacity lies on white
-            for; or premultiplied with opacity, shape (height, width, 4).
-        own: this program wrote the text just now: it is drawn without precautions.
-        eyes: measure SSIMULACRA2 where that can be done.
-        stop: asked every few tenths of a second; once true, the work is given up.
+        text: The SVG.
+        target: The image, sRGB in [0, 1], shape (height, width, 3), for which transparent parts of the file
+            are white; or premultiplied with opacity, shape (height, width, 4).
+        own: Whether this program wrote the text just now, so that it is drawn without precautions.
+        eyes: Whether to measure SSIMULACRA2 if possible.
+        stop: Called every few tenths of a second; once true, the work is given up.
 
     Raises:
-        ImageError: not an SVG, one that cannot be drawn, or one of other proportions.
-        Stopped: ``stop`` said so; there are no figures.
+        ImageError: Not an SVG, one that cannot be drawn, or one of other proportions.
+        Stopped: ``stop`` returned true.
     """
     height, width = target.shape[:2]
     shown = draw(text, width, height, stop, own=own)
@@ -267,7 +259,7 @@ def score_svg(
     if len(papers) > 1:
         paper = min(papers, key=lambda level: decibels(_error(shown, target, level)))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
-    check(stop)
+    check_stop(stop)
     seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None
     facts = inspect_svg(text)
     return Score(
@@ -282,20 +274,20 @@ def score_svg(
 
 
 def _sizes(text: str) -> dict[str, int]:
-    """Fields of ``Score``."""
+    """Return the fields of ``Score`` about sizes."""
     data = text.encode()
     return {"bytes": len(data), "gzip_bytes": len(gzip.compress(data, 9, mtime=0))}
 
 
 def _error(shown: Bytes, target: Rows, paper: int) -> float:
-    """Mean squared error on grey of level ``paper``."""
+    """Return the mean squared error on grey of level ``paper``."""
     return float(np.mean([_squared_error(pair) for pair in _shown_and_wanted(shown, target, paper)]))
 
 
 def _shown_and_wanted(shown: Bytes, target: Rows, paper: int) -> Iterator[Pair]:
-    """Channels of ``shown``, and of ``target`` in the levels of 8 bits, on grey of level ``paper``.
+    """Yield the channels of ``shown`` and of ``target``, in 8-bit levels, on grey of level ``paper``.
 
-    Those of a large image are made anew strip by strip whenever they are asked for.
+    Those of large images are computed strip by strip on demand.
     """
     height, width, channels = target.shape
 
@@ -314,7 +306,7 @@ def _shown_and_wanted(shown: Bytes, target: Rows, paper: int) -> Iterator[Pair]:
 
 
 def _in_8_bits(shown: Bytes, target: Rows, paper: int) -> tuple[Bytes, Bytes]:
-    """``target`` and ``shown`` on grey of level ``paper``, of shape (height, width, 3)."""
+    """Return ``target`` and ``shown`` on grey of level ``paper``, shape (height, width, 3)."""
     height, width, _ = target.shape
     a, b = (np.empty((height, width, 3), np.uint8) for _ in range(2))
     for channel, pair in enumerate(_shown_and_wanted(shown, target, paper)):

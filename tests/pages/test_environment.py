@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from jinja2 import ChoiceLoader, DictLoader, UndefinedError
 
 from tests.pages.helpers import NASTY, Tags
-from warpsplat.files.output import PAGE_MARK
+from warpsplat.files.marks import PAGE_MARK
 from warpsplat.pages import MARK, environment, page
 from warpsplat.pages.embed import image_uri
 

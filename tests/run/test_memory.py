@@ -18,7 +18,7 @@ import warpsplat
 from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
 from warpsplat.errors import ExitCode, ResourceError
-from warpsplat.files.image import Facts, boxed, image_facts, load_image
+from warpsplat.files.image import ImageFacts, boxed, image_facts, load_image
 from warpsplat.files.importance import load_importance
 from warpsplat.files.whole import load_whole
 from warpsplat.fit.settings import Settings, make_settings
@@ -30,7 +30,7 @@ from warpsplat.run import memory
 from warpsplat.run.memory import factor_for, mask_factor, memory_limit, need
 from warpsplat.scene import Kind
 
-HUGE = Facts(12_000, 9_000, 3, 4, drafts=True)
+HUGE = ImageFacts(12_000, 9_000, 3, 4, drafts=True)
 QUICK = {"iterations": 2, "curves": 4, "subject": "photo", "device": "cpu"}
 WIDTH, HEIGHT = 65, 49
 
@@ -64,7 +64,7 @@ def test_a_need_grows_with_all_that_takes_memory() -> None:
     base = need(HUGE, Settings()).most
     assert 2 << 30 < base < 4e9
     assert need(HUGE, Settings(), 2).most < base / 1.5
-    small = Facts(1200, 900, 3, 4, drafts=False)
+    small = ImageFacts(1200, 900, 3, 4, drafts=False)
     plain = need(small, Settings()).working
     for more in (
         {"curves": 8000},

@@ -11,7 +11,7 @@ from tests.drawing.drawings import logo, seam
 from tests.scenes import random_scene
 from warpsplat.scene import Kind
 from warpsplat.svg import commands
-from warpsplat.svg.commands import Pair, Segment, _ways, row, shortest, shortest_ring
+from warpsplat.svg.commands import Pair, Segment, choices, row, segments_of, shortest, shortest_ring
 from warpsplat.svg.data import cubic_data
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
@@ -41,16 +41,16 @@ def segments(seed: int, count: int) -> list[Segment]:
 def every_text(pen: Pair | None, chain: list[Segment]) -> list[str]:
     """All ways to write a chain."""
     texts = []
-    choices = []
+    options = []
     mirrored = chain[0].start
     for segment in chain:
-        choices.append(_ways(segment, mirrored))
+        options.append(choices(segment, mirrored))
         mirrored = segment.mirrored()
     moves = (
         ("M", chain[0].start),
         ("m", (chain[0].start[0] - (pen or (0, 0))[0], chain[0].start[1] - (pen or (0, 0))[1])),
     )
-    for (move, numbers), ways in itertools.product(moves, itertools.product(*choices)):
+    for (move, numbers), ways in itertools.product(moves, itertools.product(*options)):
         text, last = move + row(numbers, False), {"M": "L", "m": "l"}[move]
         for letter, values in ways:
             text += row(values, True) if letter == last else letter + row(values, False)
@@ -109,13 +109,13 @@ def test_a_ring_is_the_shortest_of_its_starts() -> None:
 
 def test_work_for_a_ring_grows_with_its_segments(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Segment] = []
-    found = commands._ways
+    found = commands.choices
 
     def noted(one: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
         asked.append(one)
         return found(one, mirrored)
 
-    monkeypatch.setattr(commands, "_ways", noted)
+    monkeypatch.setattr(commands, "choices", noted)
     for count in (20, 80):
         asked.clear()
         shortest_ring(None, segments(5, count))
@@ -132,7 +132,7 @@ def test_a_line_that_closes_is_left_out() -> None:
     assert len(drawn.points) == 10
     assert tuple(drawn.points[-1]) == end
     grid = [(int(x), int(y)) for x, y in np.repeat(square, 3, axis=0)]
-    stroked, pen = cubic_data(grid, [True] * 4, True, is_stroked=True, keep_dots=True, pen=None)
+    stroked, pen = cubic_data(segments_of(grid, [True] * 4, True), grid[0], True, True, None)
     assert stroked.endswith("z")
     assert pen == (0, 0)
     (drawn,) = cubics(stroked, keep_dots=True)

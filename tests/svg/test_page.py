@@ -10,7 +10,7 @@ import pytest
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.svg.page import Sheet, in_units, on_sheet, parse_page, parse_size
+from warpsplat.svg.page import Sheet, on_sheet, parse_page, parse_size, placed
 from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 
@@ -54,7 +54,7 @@ def test_what_is_no_sheet_is_named(call: object, named: str) -> None:
 
 
 def test_a_picture_keeps_its_size_in_millimetres() -> None:
-    assert head(in_units(picture(), "mm")) == ("15.875mm", "10.583mm", "0 0 300 200")
+    assert head(placed(picture(), "", "", "mm")) == ("15.875mm", "10.583mm", "0 0 300 200")
 
 
 def test_a_picture_lies_in_the_middle_of_its_sheet() -> None:

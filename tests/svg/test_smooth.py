@@ -7,9 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from warpsplat.svg.commands import Pair, minus, row
+from warpsplat.svg.commands import Pair, minus, row, shortest_smooth
 from warpsplat.svg.paths import cubics
-from warpsplat.svg.smooth import shortest_smooth
 
 
 def outline(seed: int, count: int) -> tuple[list[Pair], Pair]:

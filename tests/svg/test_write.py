@@ -183,7 +183,7 @@ def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
     for start in range(len(half)):
         turned = half[start:] + half[:start]
         assert len(spline_data(turned, closed=True)) == len(data)
-        lengths.append(len(spline_data(turned, closed=True, turns=False)))
+        lengths.append(len(spline_data(turned, closed=True, may_rotate=False)))
     assert len(data) == min(lengths)
     assert len(set(lengths)) > 1, "it matters"
 

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from warpsplat.errors import UsageError
-from warpsplat.files.marks import is_result
-from warpsplat.files.output import HEAD
+from warpsplat.files.marks import HEAD, is_result
 from warpsplat.files.remote import WILD, find_remote, is_remote, is_url, remote
 
 ENDINGS = (

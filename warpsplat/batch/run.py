@@ -19,8 +19,8 @@ from warpsplat.batch.plan import Job
 from warpsplat.batch.reports import Reports
 from warpsplat.errors import ImageError, OutputError
 from warpsplat.files.inputs import MAX_INPUT, read_input
-from warpsplat.files.marks import picture_key
-from warpsplat.files.output import GZIP, HEAD, make_folder, may_replace, write_result
+from warpsplat.files.marks import GZIP, HEAD, picture_key
+from warpsplat.files.output import make_folder, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.run.formats import is_picture
 from warpsplat.run.keys import STOPPED, job_key

@@ -1,4 +1,4 @@
-"""Reading what a user names: a file, or ``-`` for the standard input."""
+"""Reading of a file, or of the standard input for ``-``."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import stat
 import sys
 from pathlib import Path
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.remote import is_remote, read_remote
 
 STANDARD = Path("-")
-"""Stands for the standard input, and for the standard output."""
+"""The standard input, or the standard output."""
 
 MAX_INPUT = 1 << 30
 """Largest input [bytes]: an endless pipe or device must not fill the memory."""
 
 
 def input_name(path: Path) -> str:
-    """How messages call an input."""
+    """Return what messages call an input."""
     return "standard input" if path == STANDARD else str(path)
 
 
 def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) -> bytes:
-    """All bytes of a file, or of the standard input for ``-``.
+    """Return all bytes of a file, or of the standard input for ``-``.
 
     Args:
-        path: the file.
-        what: what it should be, for messages: "an image", "an SVG".
-        limit: most bytes to read.
+        path: The file.
+        what: What it should be, for messages: "an image", "an SVG".
+        limit: Most bytes to read.
 
     Raises:
-        ImageError: missing, a folder, not permitted, a device, empty, or more than ``limit`` bytes.
+        ImageError: Missing, a folder, not permitted, a device, empty, or more than ``limit`` bytes.
     """
     name = input_name(path)
     try:
@@ -52,8 +52,7 @@ def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) ->
     except PermissionError:
         raise ImageError(f"{name}: no permission to read it") from None
     except (OSError, ValueError) as error:  # a loop of links, a name with a NUL, a name too long
-        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ImageError(f"{name}: cannot be read: {cause}") from error
+        raise ImageError(f"{name}: cannot be read: {cause_of(error)}") from error
     if len(data) > limit:
         raise ImageError(f"{name}: is larger than {limit // (1 << 20)} MiB")
     if not data:

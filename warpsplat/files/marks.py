@@ -1,7 +1,8 @@
-"""What a picture that was written here says of itself: that it was, and which job made it.
+"""Marks of files written here, so that nothing else is replaced, and the key of the job that made each
+picture.
 
-An SVG says the same in a comment (``svg.write``). A PNG has a text chunk behind its header, a PDF a comment
-behind its end.
+An SVG and a page have a comment, a PNG a text chunk behind its header, a GIF a comment, a PDF, a WebP and an
+MP4 something at their ends that readers ignore.
 """
 
 from __future__ import annotations
@@ -9,6 +10,32 @@ from __future__ import annotations
 import re
 import struct
 import zlib
+
+HEAD = 2000
+"""Bytes at the start of a file in which its mark stands."""
+
+TAIL = 64
+"""Bytes at the end of a file in which its mark stands."""
+
+SVG_MARKS = b"<!--warpsplat", b"<metadata>warpsplat "
+"""In the head of every SVG written here (``svg.write_svg``), now and by earlier versions."""
+
+SHORT_SVG = re.compile(
+    rb'<svg viewBox="0 0 [\d.]+ [\d.]+" xmlns="http://www\.w3\.org/2000/svg" height="\d+" width="\d+">'
+)
+"""The head of short ones: nobody else has the attributes in this order (``svg.write.shortened``)."""
+
+PAGE_MARK = b"<!--warpsplat page-->"
+"""In the head of every page written here (``pages.MARK``)."""
+
+GIF_COMMENT = b"warpsplat"
+GIF_MARK = b"!\xfe" + bytes([len(GIF_COMMENT)]) + GIF_COMMENT
+
+WEBP_MARK = b"wspl\x0a\0\0\0warpsplat\n"
+"""A chunk of a private kind at the end."""
+
+MP4_MARK = b"\0\0\0\x12freewarpsplat\n"
+"""A box of free space at the end."""
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -19,27 +46,27 @@ PNG_MARK = b"tEXtSoftware\0warpsplat"
 """Type, keyword and beginning of the text of the chunk."""
 
 PNG_END = b"IEND\xaeB`\x82"
-"""How a PNG ends that was not cut short."""
+"""The end of a complete PNG."""
 
 PNG_KEY = re.compile(re.escape(PNG_MARK) + rb" ([\w.]{1,20})")
 
 PDF_START = b"%PDF-"
 
-PDF_TAIL = 64
-"""Bytes at the end of a PDF in which its mark stands."""
-
 PDF_KEY = re.compile(rb"\n%warpsplat(?: ([\w.]{1,20}))?\n\Z")
+
+GZIP = b"\x1f\x8b"
+"""The beginning of gzipped files."""
 
 
 def mark_png(png: bytes, key: str = "") -> bytes:
-    """A PNG with a ``Software`` chunk, which has the ``key`` of the job that made it, if there is one."""
+    """Return a PNG with a ``Software`` chunk, which has the ``key`` of the job that made it, if any."""
     chunk = PNG_MARK + _spaced(key)
     whole = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
     return png[:PNG_HEADER] + whole + png[PNG_HEADER:]
 
 
 def mark_pdf(pdf: bytes, key: str = "") -> bytes:
-    """A PDF with a comment behind its end, as ``mark_png``."""
+    """Return a PDF with a comment behind its end, as ``mark_png``."""
     return pdf + b"\n%warpsplat" + _spaced(key) + b"\n"
 
 
@@ -47,21 +74,38 @@ def _spaced(key: str) -> bytes:
     return f" {key}".encode() if key else b""
 
 
-def is_marked_pdf(tail: bytes) -> bool:
-    """Whether a PDF with these last ``PDF_TAIL`` bytes was written here."""
-    return PDF_KEY.search(tail) is not None
+def is_marked(head: bytes, tail: bytes) -> bool:
+    """Return whether a file was written here or is empty; by its first ``HEAD`` and last ``TAIL`` bytes."""
+    if head.startswith(PDF_START):
+        return PDF_KEY.search(tail) is not None
+    for place, signature, mark in ((0, b"RIFF", WEBP_MARK), (4, b"ftyp", MP4_MARK)):
+        if head.startswith(signature, place):
+            return tail.endswith(mark)
+    head = unpacked(head)
+    marks = (*SVG_MARKS, PAGE_MARK, PNG_MARK, GIF_MARK)
+    return not head or SHORT_SVG.match(head) is not None or any(mark in head for mark in marks)
+
+
+def unpacked(head: bytes) -> bytes:
+    """Return the beginning of a file, decompressed if it is gzipped."""
+    if not head.startswith(GZIP):
+        return head
+    try:
+        return zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(head)
+    except zlib.error:
+        return head
 
 
 def picture_key(data: bytes) -> str:
-    """The key that a whole picture bears; empty if it has none, was cut short, or is no picture."""
+    """Return the key in a PNG or PDF; empty: it has none, was truncated, or is something else."""
     found = None
     if data.startswith(PNG_SIGNATURE) and data.endswith(PNG_END):
         found = PNG_KEY.match(data, PNG_HEADER + 4)  # behind the length of the chunk
     elif data.startswith(PDF_START):
-        found = PDF_KEY.search(data[-PDF_TAIL:])
+        found = PDF_KEY.search(data[-TAIL:])
     return (found[1] or b"").decode("ascii", "replace") if found else ""
 
 
 def is_result(head: bytes) -> bool:
-    """Whether a file that begins like this is the picture of a job: a PNG that bears a key."""
+    """Return whether a file with this beginning is a PNG with a key: the result of a job."""
     return head.startswith(PNG_SIGNATURE) and PNG_KEY.match(head, PNG_HEADER + 4) is not None

@@ -1,7 +1,7 @@
-"""Numbers and arrays in one file, that NumPy's ``load`` and any unzipper can look into.
+"""Numbers and arrays in one file, which NumPy's ``load`` and any unzip program can read.
 
-A zip archive, nothing in it compressed: first ``header.json``, then an ``.npy`` file for each array. Reading
-it runs and unpickles nothing, and takes no more memory than a few times the file's length.
+An uncompressed zip archive: first ``header.json``, then an ``.npy`` file for each array. Reading it runs and
+unpickles nothing, and takes no more memory than a few times the file's length.
 """
 
 from __future__ import annotations
@@ -18,68 +18,64 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.errors import CheckpointError
+from warpsplat.errors import CheckpointError, cause_of
 from warpsplat.files.inputs import read_input
 
 HEADER = "header.json"
 
 MARK = b'{"warpsplat": "checkpoint"'
-"""How the header begins."""
+"""The beginning of the header."""
 
 FORMAT = 1
-"""Version of what a file holds; another one is refused."""
+"""Version of the format; files of others are refused."""
 
 HEAD = 100
 """Bytes at the start of a file in which its mark stands."""
 
 LONGEST_HEADER = 16 << 20
-"""Of the file's [bytes]."""
+"""[bytes]"""
 
 LONGEST_LIST = 16 << 20
-"""Of the archive's list of its members [bytes]."""
+"""Longest central directory of the archive [bytes]."""
 
 ARRAY = re.compile(
     rb"\x93NUMPY\x01\x00..\{'descr': '(?P<type><[fi]4)', 'fortran_order': False, "
     rb"'shape': \((?P<shape>[\d, ]{0,40})\), \} *\n",
     re.DOTALL,
 )
-"""How the ``.npy`` files begin that are written here. NumPy's own reader evaluates what stands there, and
-takes more: other types, Python 2's notation."""
+"""The beginning of ``.npy`` files written here. NumPy's own reader evaluates it as Python, and accepts more:
+other types, Python 2's notation."""
 
 LONGEST_CAUSE = 100
 """Characters of a library's message."""
 
 
 def is_packed(path: Path) -> bool:
-    """Whether ``path`` is a file that ``pack`` made, by its beginning.
-
-    Raises:
-        OSError: it cannot be read.
-    """
+    """Return whether ``path`` begins like a file that ``pack`` made; raises ``OSError``."""
     with path.open("rb") as file:
         head = file.read(HEAD)
     return head.startswith(b"PK") and MARK in head
 
 
 def pack(header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
-    """A file's content."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_STORED) as archive:
+    """Return a file's content."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
         text = json.dumps({"warpsplat": "checkpoint", "format": FORMAT, **header})
         archive.writestr(zipfile.ZipInfo(HEADER), text)
         for name, array in arrays.items():
             part = io.BytesIO()
             np.lib.format.write_array(part, np.ascontiguousarray(array), allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), part.getbuffer())
-    return made.getvalue()
+    return packed.getvalue()
 
 
 def unpack(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
-    """Header and arrays of a file that ``pack`` made.
+    """Return the header and arrays of a file that ``pack`` made.
 
     Raises:
-        CheckpointError: it is damaged, or of another version.
-        ImageError: it cannot be read.
+        CheckpointError: It is damaged, or of another version.
+        ImageError: It cannot be read.
     """
     data = read_input(path, "a checkpoint")
     try:
@@ -93,14 +89,14 @@ def unpack(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
         raise CheckpointError(f"{path}: {error}") from error
     except MemoryError:
         raise
-    except Exception as error:  # of whatever kind zipfile, json and NumPy find for what is damaged
-        cause = str(error)[:LONGEST_CAUSE] or type(error).__name__
+    except Exception as error:  # zipfile, json and NumPy raise many kinds on damaged data
+        cause = cause_of(error)[:LONGEST_CAUSE]
         raise CheckpointError(f"{path}: the checkpoint is damaged: {cause}") from error
     return header, arrays
 
 
 def _check_end(data: bytes) -> None:
-    """Before the list of members is read: it is short."""
+    """Raise ``ValueError`` unless the list of members, which is not yet read, is short."""
     end = data[-END:]
     if len(end) < END or end[:4] != b"PK\5\6" or data[-END - LOCATOR :][:4] == b"PK\6\7":
         raise ValueError("its end is missing")
@@ -109,11 +105,11 @@ def _check_end(data: bytes) -> None:
 
 
 END, LOCATOR = 22, 20
-"""Lengths of what a zip archive ends with, and of what lies before that in one of over 4 GiB [bytes]."""
+"""Lengths of a zip archive's end record, and of the locator before it in archives over 4 GiB [bytes]."""
 
 
 def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
-    """Before anything is read: nothing is compressed, and all lies in the file side by side."""
+    """Raise ``ValueError`` unless all members are uncompressed and fit in the file together."""
     if not members or members[0].filename != HEADER or members[0].file_size > LONGEST_HEADER:
         raise ValueError("it has no header")
     if any(info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1 for info in members):
@@ -139,7 +135,7 @@ def _header(text: bytes) -> dict[str, Any]:
 
 
 def _array(data: bytes) -> npt.NDArray[Any]:
-    """The array of an ``.npy`` file, none of whose bytes is missing or too many."""
+    """Return the array of an ``.npy`` file of exactly the right length."""
     found = ARRAY.match(data)
     if not found or int.from_bytes(data[8:10], "little") + 10 != found.end():
         raise ValueError("an array is of an unknown type")

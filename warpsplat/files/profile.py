@@ -1,7 +1,7 @@
-"""Colour profiles (ICC): pixels as the screen's usual colours, sRGB.
+"""Colour profiles (ICC): conversion of pixels to sRGB.
 
-Little CMS, which comes with Pillow, converts 8 bits a channel. Relative to white, black as black: what
-programs that show photographs do.
+Little CMS, which comes with Pillow, converts 8 bits a channel. The rendering intent is relative colorimetric
+with black point compensation, as in programs that show photographs.
 """
 
 from __future__ import annotations
@@ -14,73 +14,64 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from warpsplat.errors import cause_of
+
 log = logging.getLogger(__name__)
 
 SPACES = {"RGB": "RGB", "GRAY": "L", "CMYK": "CMYK"}
-"""What a profile calls the colours that it describes, and the mode that Pillow has them in."""
+"""Colour spaces of profiles, and Pillow's modes for them."""
 
 SAME = 1
-"""Levels of 255 up to which a profile is sRGB itself: there are several, that differ by rounding."""
+"""Largest difference from sRGB, in levels of 255, of a profile for sRGB itself; several exist."""
 
 GRID = 9
-"""Levels of each channel that are tried for that."""
+"""Levels of each channel that are compared for that."""
 
 Levels = npt.NDArray[np.uint8]
 
 
 class Profile:
-    """Of an image: how its colours become sRGB."""
+    """A conversion of an image's colours to sRGB; made by ``profile_of``."""
 
     def __init__(self, mode: str, convert: Callable[[Image.Image], Image.Image]) -> None:
-        """Use ``profile_of``.
-
-        Args:
-            mode: that the profile describes, RGB, L or CMYK.
-            convert: an image of that mode -> RGB.
-        """
+        """``convert`` makes RGB of an image of ``mode``: RGB, L or CMYK."""
         self._mode, self._convert = mode, convert
 
     def rgb(self, image: Image.Image) -> Image.Image:
-        """An image, or a part of it, as RGB; of opacity nothing is left."""
+        """Return an image, or a part of it, as RGB, without opacity."""
         return self._convert(image if image.mode == self._mode else image.convert(self._mode))
 
     def rgba(self, image: Image.Image) -> Image.Image:
-        """With its opacity, as RGBA."""
+        """Return an image, or a part of it, as RGBA."""
         straight = image.convert("RGBA")
-        made = self.rgb(straight.convert("RGB"))
-        made.putalpha(straight.getchannel("A"))
-        return made
+        converted = self.rgb(straight.convert("RGB"))
+        converted.putalpha(straight.getchannel("A"))
+        return converted
 
     def grey(self) -> npt.NDArray[np.float32]:
-        """sRGB in [0, 1] of 256 levels of grey, shape (256,)."""
+        """Return sRGB in [0, 1] of 256 levels of grey, shape (256,)."""
         ramp = Image.fromarray(np.arange(256, dtype=np.uint8)[None])
         return np.asarray(self.rgb(ramp), np.float32)[0].mean(axis=1) / np.float32(255)
 
 
 def profile_of(image: Image.Image, name: str | None = "the image") -> Profile | None:
-    """The profile that ``image`` has, or None where it has none, or one that changes nothing.
+    """Return the profile of ``image``; None: it has none, or one that changes nothing.
 
-    One that cannot be used, or not with such an image, is ignored; with a ``name``, with a warning that
-    begins with it.
+    A profile that cannot be used is ignored, with a warning that begins with ``name`` if there is one.
     """
     data = image.info.get("icc_profile")
     if not data:
         return None
     try:
         return _profile(data, image)
-    except Exception as error:  # of broken ones Little CMS and Pillow raise several kinds
-        cause = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    except Exception as error:  # Little CMS and Pillow raise several kinds on broken profiles
         if name is not None:
-            log.warning("%s: its colour profile is ignored: %s", name, cause)
+            log.warning("%s: its colour profile is ignored: %s", name, cause_of(error))
         return None
 
 
 def _profile(data: bytes, image: Image.Image) -> Profile | None:
-    """As ``profile_of``.
-
-    Raises:
-        Exception: it cannot be used.
-    """
+    """Return the profile as ``profile_of``, or raise an exception if it cannot be used."""
     from PIL import ImageCms
 
     source = ImageCms.ImageCmsProfile(io.BytesIO(data))
@@ -104,7 +95,7 @@ def _profile(data: bytes, image: Image.Image) -> Profile | None:
 
 
 def color_mode(image: Image.Image) -> str:
-    """The mode of the colours alone, without opacity, palette and depth."""
+    """Return the mode of the colours alone, regardless of opacity, palette and depth."""
     if image.mode in {"1", "L", "LA", "La", "F"} or image.mode.startswith("I"):
         return "L"
     return image.mode if image.mode == "CMYK" else "RGB"

@@ -1,8 +1,7 @@
 """Files behind URLs (``s3://``, ``gs://``, ``https://`` ...); an extra, ``pip install "warpsplat[remote]"``.
 
-Such a file is a path of universal_pathlib, which is pathlib's interface over fsspec: names, parents and ``/``
-are those of a path of this machine, so that both have one type here. What the system does with names
-(``os.path``) cannot be done with them; who asks it looks at ``is_remote`` first.
+Such a file is a path of universal_pathlib, which has pathlib's interface over fsspec, so that local and
+remote files have one type here. ``os.path`` cannot be used with it: check ``is_remote`` first.
 """
 
 from __future__ import annotations
@@ -14,22 +13,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
-from warpsplat.errors import ImageError, OutputError, UsageError, WarpsplatError, printable
+from warpsplat.errors import ImageError, OutputError, UsageError, WarpsplatError, cause_of, printable
 
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
-"""How URLs begin; the letter of a drive is no protocol."""
+"""The beginning of URLs; the letter of a drive is no protocol."""
 
 WILD = "*?["
 """Characters that make a name a pattern."""
 
 READ_ONLY = ("http", "https", "data", "github")
-"""Protocols that nothing is written through."""
+"""Protocols without writing."""
 
 WHOLE = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oci", "memory")
-"""Protocols of stores that show an object when all of it is there, and that know no renaming."""
+"""Protocols of stores that write objects atomically and cannot rename them."""
 
 FRESH = 300.0
-"""Seconds for which the names in a folder are remembered: one request lists a thousand, or asks for one."""
+"""Seconds for which the names in a folder are cached: one request lists a thousand, or asks for one."""
 
 Value = TypeVar("Value")
 
@@ -38,20 +37,20 @@ _listed: dict[str, tuple[float, frozenset[str]]] = {}
 
 
 def is_url(name: str) -> bool:
-    """Whether a user's name of a file is a URL."""
+    """Return whether the name of a file is a URL."""
     return URL.match(name) is not None
 
 
 def is_remote(path: PurePath) -> bool:
-    """Whether a path is behind a URL."""
+    """Return whether a path is behind a URL."""
     return not isinstance(path, PurePath)
 
 
 def remote(url: str) -> Path:
-    """The path that a URL means; ``file://`` is one of this machine.
+    """Return the path of a URL; that of a ``file://`` URL is local.
 
     Raises:
-        UsageError: a package is missing, or nobody knows the protocol.
+        UsageError: A package is missing, or the protocol is unknown.
     """
     try:
         from upath import UPath
@@ -69,14 +68,14 @@ def remote(url: str) -> Path:
 
 
 def find_remote(url: str, endings: tuple[str, ...]) -> tuple[list[Path], Path]:
-    """The images that a URL means, sorted, and the folder that they were looked for in.
+    """Return the images behind a URL, sorted, and the folder that they were searched in.
 
     Args:
-        url: of one image, a folder, or with ``*``, ``?``, ``[`` a pattern; a query belongs to the name.
-        endings: of names that are taken for images in a folder.
+        url: URL of one image, a folder, or with ``*``, ``?``, ``[`` a pattern; a query belongs to the name.
+        endings: Endings of images in a folder.
 
     Raises:
-        UsageError: the store does not answer, or does not know the pattern.
+        UsageError: The store does not answer, or the pattern is invalid.
     """
     path: Any = remote(url)
     if path.protocol in READ_ONLY:
@@ -101,11 +100,7 @@ def find_remote(url: str, endings: tuple[str, ...]) -> tuple[list[Path], Path]:
 
 
 def read_remote(path: Path, limit: int) -> bytes:
-    """At most ``limit + 1`` bytes of a file.
-
-    Raises:
-        ImageError: it is not there, or its store does not give it.
-    """
+    """Return at most ``limit + 1`` bytes of a file; raise ``ImageError`` if it cannot be read."""
 
     def read() -> bytes:
         with path.open("rb") as file:
@@ -115,10 +110,10 @@ def read_remote(path: Path, limit: int) -> bytes:
 
 
 def write_remote(path: Path, data: bytes) -> None:
-    """Write a file: stores show it once it is whole; elsewhere it is written beside, then renamed.
+    """Write a file atomically: if the store does not, to a temporary file that is renamed.
 
     Raises:
-        OutputError: the store does not take it.
+        OutputError: It could not be written.
     """
     there: Any = path
 
@@ -139,17 +134,17 @@ def write_remote(path: Path, data: bytes) -> None:
 
 
 def listed(path: Path) -> bool:
-    """Whether a file was there when its folder was listed, in the last minutes.
+    """Return whether a file was there when its folder was last listed, up to ``FRESH`` seconds ago.
 
     Raises:
-        OutputError: its store does not say.
+        OutputError: The folder cannot be listed.
     """
     there: Any = path
     folder = str(path.parent)
     when, names = _listed.get(folder, (-FRESH, frozenset()))
     if time.monotonic() - when > FRESH:
 
-        def look() -> Iterator[str]:
+        def names_there() -> Iterator[str]:
             try:
                 there.fs.invalidate_cache()
                 for entry in there.fs.ls(there.parent.path, detail=False):
@@ -157,26 +152,18 @@ def listed(path: Path) -> bool:
             except FileNotFoundError:
                 return
 
-        names = _asked(lambda: frozenset(look()), path.parent, OutputError, "cannot be listed")
+        names = _asked(lambda: frozenset(names_there()), path.parent, OutputError, "cannot be listed")
         _listed[folder] = (time.monotonic(), names)
     return path.name in names
 
 
 def exists(path: Path) -> bool:
-    """Whether a file is there, which it is said to be.
-
-    Raises:
-        OutputError: its store does not say.
-    """
+    """Return whether a file is there, by its folder's cached list or by asking; raises ``OutputError``."""
     return listed(path) or _asked(path.exists, path, OutputError, "cannot be looked for")
 
 
 def check_remote(path: Path) -> None:
-    """Find out whether results can be written there, as far as the name tells.
-
-    Raises:
-        UsageError: they cannot.
-    """
+    """Raise ``UsageError`` if the protocol does not allow writing."""
     there: Any = path
     if there.protocol in READ_ONLY:
         raise UsageError(f"{printable(str(path))}: nothing can be written to {there.protocol}://")
@@ -185,6 +172,7 @@ def check_remote(path: Path) -> None:
 def _asked(
     question: Callable[[], Value], path: Path, kind: Callable[[str], WarpsplatError], verb: str
 ) -> Value:
+    """Return the result of ``question``, or raise an error of ``kind``."""
     name = printable(str(path))
     try:
         return question()
@@ -195,5 +183,4 @@ def _asked(
 
 
 def _cause(error: BaseException) -> str:
-    lines = str(error).strip().splitlines()
-    return printable(lines[0]) if lines else type(error).__name__
+    return printable(cause_of(error))

@@ -1,4 +1,4 @@
-"""What callers hand over as an image or an SVG: a path, bytes, an open file, or pixels."""
+"""Images and SVGs that callers pass: a path, bytes, an open file, a Pillow image, or pixels."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageOps
 
-from warpsplat.errors import ImageError
-from warpsplat.files.image import MAX_PIXELS, MIN_SIDE, boxed, composited, load_image, reduced
+from warpsplat.errors import ImageError, cause_of
+from warpsplat.files.image import boxed, check_size, composited, load_image, reduced
 from warpsplat.files.inputs import MAX_INPUT, input_name, read_input
 from warpsplat.scene import FloatArray
 
@@ -21,20 +21,20 @@ class Readable(Protocol):
     """An open file."""
 
     def read(self, size: int = -1, /) -> Any:
-        """Bytes, or text."""
+        """Return bytes or text."""
 
 
 ImageSource = str | os.PathLike[str] | bytes | Readable | Image.Image | npt.NDArray[Any]
 """A file's path, an image file's bytes, a file open for reading, a Pillow image, or pixels: uint8, uint16,
 bool, or floats in [0, 1], shape (height, width) or (height, width, channels): grey, grey and opacity, RGB, or
-RGB and opacity, which is straight."""
+RGB and straight opacity."""
 
 
 def source_bytes(source: str | os.PathLike[str] | bytes | Readable, what: str = "an image") -> bytes:
-    """What a path, bytes or an open file hold.
+    """Return the content of a path, bytes or an open file.
 
     Raises:
-        ImageError: it cannot be read, is empty or larger than ``MAX_INPUT``.
+        ImageError: It cannot be read, is empty or larger than ``MAX_INPUT``.
     """
     if isinstance(source, (bytes, bytearray, memoryview)):
         return bytes(source)
@@ -44,7 +44,7 @@ def source_bytes(source: str | os.PathLike[str] | bytes | Readable, what: str = 
     try:
         data = source.read(MAX_INPUT + 1)
     except OSError as error:
-        raise ImageError(f"{name}: cannot be read: {error.strerror or error}") from error
+        raise ImageError(f"{name}: cannot be read: {cause_of(error)}") from error
     if isinstance(data, str):
         data = data.encode()
     if not isinstance(data, bytes):
@@ -57,16 +57,16 @@ def source_bytes(source: str | os.PathLike[str] | bytes | Readable, what: str = 
 
 
 def held(source: ImageSource) -> ImageSource:
-    """``source`` as it can be read twice: the bytes of a file; pixels, and what is no image, as they are.
+    """Return ``source`` in a form that can be read twice: the bytes of a file; anything else as it is.
 
     Raises:
-        ImageError: as ``source_bytes``.
+        ImageError: As ``source_bytes``.
     """
     return source_bytes(source) if isinstance(source, (str, os.PathLike, bytes, Readable)) else source
 
 
 def source_name(source: object, default: str = "the image") -> str:
-    """How messages call a source."""
+    """Return what messages call a source."""
     if isinstance(source, (str, os.PathLike)):
         return input_name(Path(source))
     name = getattr(source, "filename", None) or getattr(source, "name", None)
@@ -80,22 +80,23 @@ def image_of(
     paper: float | FloatArray | None = None,
     factor: int = 1,
 ) -> FloatArray:
-    """The pixels of ``source``, see ``load_image``; the same image gives the same ones in whatever form, but
-    for JPEGs that are read smaller.
+    """Return the pixels of ``source``, as ``load_image``.
+
+    They do not depend on the form of the source, except of JPEGs that are read smaller.
 
     Raises:
-        ImageError: as ``load_image``, or pixels of another shape or type.
-        TypeError: something else than an ``ImageSource``.
+        ImageError: As ``load_image``, or pixels of another shape or type.
+        TypeError: Not an ``ImageSource``.
     """
     name = name or source_name(source)
     if isinstance(source, np.ndarray):
         try:
-            pixels = _of_array(source, paper)
+            pixels = _from_array(source, paper)
             return pixels if factor == 1 else boxed(pixels, factor)
         except ImageError as error:
             raise ImageError(f"{name}: {error}") from None
     if isinstance(source, Image.Image):
-        return _of_pillow(source, name, paper, factor)
+        return _from_pillow(source, name, paper, factor)
     if isinstance(source, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
         return load_image(source_bytes(source), name, paper=paper, factor=factor)
     raise TypeError(
@@ -103,23 +104,22 @@ def image_of(
     )
 
 
-def _of_pillow(image: Image.Image, name: str, paper: float | FloatArray | None, factor: int) -> FloatArray:
-    """As ``load_image``: upright; a file that Pillow has not read yet may be damaged."""
-    _check_size(image.width, image.height)
+def _from_pillow(image: Image.Image, name: str, paper: float | FloatArray | None, factor: int) -> FloatArray:
     try:
+        check_size(image.width, image.height)
         return reduced(ImageOps.exif_transpose(image), paper, factor, name)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
-    except (OSError, ValueError, SyntaxError) as error:
+    except (OSError, ValueError, SyntaxError) as error:  # a file that Pillow has not read yet may be damaged
         raise ImageError(f"{name}: damaged or unsupported image: {error}") from error
 
 
-def _of_array(pixels: npt.NDArray[Any], paper: float | FloatArray | None) -> FloatArray:
+def _from_array(pixels: npt.NDArray[Any], paper: float | FloatArray | None) -> FloatArray:
     values = pixels[..., None] if pixels.ndim == 2 else pixels
     if values.ndim != 3 or values.shape[2] not in {1, 2, 3, 4}:
         raise ImageError(f"pixels of shape {pixels.shape}, not (height, width[, channels])")
     height, width, channels = values.shape
-    _check_size(width, height)
+    check_size(width, height)
     if values.dtype in (np.uint8, np.uint16, np.bool_):
         white = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}.get(values.dtype, 1)
         levels = values.astype(np.float32) / np.float32(white)
@@ -136,10 +136,3 @@ def _of_array(pixels: npt.NDArray[Any], paper: float | FloatArray | None) -> Flo
     if opacity is None:
         return color
     return composited([(slice(None), color, opacity)], (width, height), paper)
-
-
-def _check_size(width: int, height: int) -> None:
-    if min(width, height) < MIN_SIDE:
-        raise ImageError(f"{width}x{height} pixels; at least {MIN_SIDE}x{MIN_SIDE} are needed")
-    if width * height > MAX_PIXELS:
-        raise ImageError(f"more than {MAX_PIXELS / 1e6:g} million pixels")

@@ -16,7 +16,7 @@ from PIL import Image
 
 from warpsplat.errors import UsageError
 from warpsplat.files.image import WEBP_SIDE
-from warpsplat.files.output import GIF_COMMENT, MP4_MARK, WEBP_MARK
+from warpsplat.files.marks import GIF_COMMENT, MP4_MARK, WEBP_MARK
 from warpsplat.motion.timing import HOLD
 
 VIDEO_PACKAGE = "av"

@@ -1,7 +1,4 @@
-"""Elementary functions in float64, elementwise, with the same bits everywhere.
-
-Good to a few units in the last place.
-"""
+"""Elementary functions in float64, elementwise, accurate to a few units in the last place."""
 
 from __future__ import annotations
 
@@ -12,19 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 Values = Any
-"""A number or an array of them; results are float64 of the same shape."""
+"""A number or an array; results are float64 of the same shape."""
 
 Result = npt.NDArray[np.float64]
 
 LN2, LN10 = 0.6931471805599453, 2.302585092994046
-"""The natural logarithms of 2 and 10."""
+"""Natural logarithms of 2 and 10."""
 
 LN2_HIGH = float.fromhex("0x1.62e42feep-1")
 LN2_LOW = float.fromhex("0x1.a39ef35793c76p-33")
-"""That of 2 as a sum: products of the first part with whole numbers are exact."""
+"""The logarithm of 2 as a sum: products of the first part with whole numbers are exact."""
 
 HALF_PI_PARTS = tuple(map(float.fromhex, ("0x1.921fb544p+0", "0x1.0b4611a6p-34", "0x1.3198a2e037073p-69")))
-"""Half of pi as a sum, the same way."""
+"""Half of pi as such a sum."""
 
 EXP_MIN, EXP_MAX = -746.0, 710.0
 """Beyond these ``exp`` is 0 or infinite."""
@@ -40,11 +37,11 @@ TAN_EIGHTH = float.fromhex("0x1.a827999fcef32p-2")
 """Tangent of an eighth of pi."""
 
 TAN_SIXTEENTH, TAN_THREE_SIXTEENTHS = 0.198912367379658, 0.6681786379192989
-"""Where one centre of the arctangent's series takes over from another."""
+"""Tangents at which the centre of the arctangent's series changes."""
 
 
 def _polynomial(x: Result, terms: tuple[float, ...]) -> Result:
-    """Value at ``x`` by Horner's rule."""
+    """Return the value at ``x`` by Horner's rule."""
     value = np.full_like(x, terms[0])
     for term in terms[1:]:
         value = value * x + term
@@ -88,15 +85,6 @@ def log10(x: Values) -> Result:
     return log(x) * (1 / LN10)
 
 
-def log1p(x: Values) -> Result:
-    """Return the natural logarithm of ``1 + x``, precise near 0."""
-    x = np.asarray(x, np.float64)
-    total = 1 + x
-    missed = total - 1
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(missed == 0, x, log(total) * (x / np.where(missed == 0, 1.0, missed)))[()]
-
-
 def power(base: Values, exponent: Values) -> Result:
     """Return ``base`` (0 or more) to the power ``exponent``; 0 to the power 0 is 1."""
     base, exponent = np.asarray(base, np.float64), np.asarray(exponent, np.float64)
@@ -111,7 +99,7 @@ def power_of_ten(exponent: int) -> float:
 
 
 def _quarter_turns(x: Values) -> tuple[Result, Result]:
-    """Split angles [radians] into whole quarter turns and a rest of at most an eighth turn."""
+    """Split angles [radians] into whole quarter turns and a rest of at most an eighth of a turn."""
     x = np.asarray(x, np.float64)
     turns = np.rint(x * (2 / math.pi))
     for part in HALF_PI_PARTS:
@@ -120,13 +108,13 @@ def _quarter_turns(x: Values) -> tuple[Result, Result]:
 
 
 def _sine(x: Result) -> Result:
-    """Sine between -pi / 4 and pi / 4."""
+    """Return the sine of ``x`` between -pi / 4 and pi / 4."""
     square = x * x
     return x + x * (square * _polynomial(square, SIN_TERMS))
 
 
 def _cosine(x: Result) -> Result:
-    """Cosine between -pi / 4 and pi / 4."""
+    """Return the cosine of ``x`` between -pi / 4 and pi / 4."""
     square = x * x
     return (1 - 0.5 * square) + square * square * _polynomial(square, COS_TERMS)
 

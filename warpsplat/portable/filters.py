@@ -1,12 +1,13 @@
-"""Filters of images, the same bits everywhere: what OpenCV has in floating point, by sums of slices.
+"""Image filters like OpenCV's, by sums of slices.
 
-Images are float arrays of shape (height, width) or (height, width, channels). Results are float64 where the
-image is, else float32. All go through the image in bands that fit a processor's cache.
+Images are float arrays of shape (height, width) or (height, width, channels). Results are float64 for float64
+images, else float32. Images are processed in bands that fit a processor's cache.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,25 +20,24 @@ from warpsplat.portable import elementary
 Floats = npt.NDArray[Any]
 Indices = npt.NDArray[np.intp]
 Border = Literal["reflect101", "replicate"]
-"""How an image continues past its border: reflected about the outermost pixels, or by copies of them."""
+"""Continuation of an image past its border: reflected about the outermost pixels, or copies of them."""
 
 BAND = 1 << 16
-"""Numbers in a band: a few such arrays fit a processor's second cache."""
+"""Numbers in a band: a few such arrays fit a processor's L2 cache."""
 
 CUBIC = -0.75
-"""The slope of cubic interpolation's kernel at 1, which OpenCV has."""
+"""Slope of cubic interpolation's kernel at 1, as in OpenCV."""
 
 FADE_SQUARINGS, FADE_TERMS, FADE_MOST = 5, (1 / 24, -1 / 6, 1 / 2, -1.0), 0.625
-"""How ``bilateral`` finds exp(-x): by squarings of the first terms of its series at x / 32, the highest power
-first, where x is no more than 20.
-"""
+"""For exp(-x) in ``bilateral``: squarings of the series at x / 32, its coefficients, the highest power first,
+and the largest x / 32."""
 
 LUMA = 0.299, 0.587, 0.114
-"""Shares of red, green and blue (ITU-R BT.601)."""
+"""Weights of red, green and blue (ITU-R BT.601)."""
 
 XYZ = (0.412453, 0.357580, 0.180423), (0.212671, 0.715160, 0.072169), (0.019334, 0.119193, 0.950227)
 WHITE = 0.950456, 1.0, 1.088754
-"""Linear sRGB as CIE XYZ, and white in it (D65)."""
+"""The matrix from linear sRGB to CIE XYZ, and white in XYZ (D65)."""
 
 
 def _floats(image: Floats) -> Floats:
@@ -45,23 +45,20 @@ def _floats(image: Floats) -> Floats:
     return image if image.dtype == np.float64 else image.astype(np.float32, copy=False)
 
 
-# Resizing.
-
-
 @dataclass(frozen=True)
 class _Taps:
-    """Which pixels of a side make each pixel of the resized side."""
+    """The pixels along one axis of an image that each pixel of a resized axis is a weighted sum of."""
 
     indices: Indices
     """Shape (tap, pixel)."""
     weights: Floats
-    """Their shares, the same shape."""
+    """The same shape."""
     whole: bool = False
-    """Whether pixel i is the mean of as many pixels as there are taps, from the first that no other has."""
+    """Whether each pixel is the mean of a block of its own."""
 
 
 def _area_taps(before: int, after: int, dtype: Any) -> _Taps:
-    """Shares by the length that pixels have in common, found in whole numbers."""
+    """Return taps with weights by overlap, computed in whole numbers."""
     taps = 2 if after > before else -(-before // after) + (before % after > 0)
     pixel, tap = np.arange(after), np.arange(taps)[:, None]
     index = pixel * before // after + tap
@@ -72,31 +69,31 @@ def _area_taps(before: int, after: int, dtype: Any) -> _Taps:
 
 
 def _point_taps(before: int, after: int, dtype: Any, *, cubic: bool) -> _Taps:
-    """Weights of the pixels around a resized pixel's middle; beyond the border they are as at it."""
+    """Return taps of linear or cubic interpolation at the centres of pixels; border pixels repeat."""
     place = (np.arange(after) + 0.5) * (before / after) - 0.5
     low = np.floor(place)
     x = place - low
     weights, offsets = [1 - x, x], [0, 1]
     if cubic:
-        weights = [_cubic_far(1 + x), _cubic_near(x), _cubic_near(1 - x)]
+        weights = [_outer_cubic(1 + x), _inner_cubic(x), _inner_cubic(1 - x)]
         weights.append(1 - weights[0] - weights[1] - weights[2])
         offsets = [-1, 0, 1, 2]
     indices = low.astype(np.intp) + np.array(offsets)[:, None]
     return _Taps(np.clip(indices, 0, before - 1), np.array(weights).astype(dtype))
 
 
-def _cubic_near(x: Floats) -> Floats:
-    """The cubic kernel between 0 and 1."""
+def _inner_cubic(x: Floats) -> Floats:
+    """Return the cubic kernel between 0 and 1."""
     return ((CUBIC + 2) * x - (CUBIC + 3)) * x * x + 1
 
 
-def _cubic_far(x: Floats) -> Floats:
-    """The cubic kernel between 1 and 2."""
+def _outer_cubic(x: Floats) -> Floats:
+    """Return the cubic kernel between 1 and 2."""
     return ((CUBIC * x - 5 * CUBIC) * x + 8 * CUBIC) * x - 4 * CUBIC
 
 
 def _gathered(band: Floats, taps: _Taps, axis: int) -> Floats:
-    """The band (row, number) with the pixels of one axis resized."""
+    """Return a band (row, number) with one axis resized."""
     shape = list(band.shape)
     shape[axis] = taps.indices.shape[1]
     total, spare = np.zeros(shape, band.dtype), np.empty(shape, band.dtype)
@@ -111,7 +108,7 @@ def _gathered(band: Floats, taps: _Taps, axis: int) -> Floats:
 
 
 def _resized(image: Floats, down: _Taps, across: _Taps) -> Floats:
-    """The image by the taps of its height and those of its width."""
+    """Return an image resized by the taps of its height and of its width."""
     image = np.ascontiguousarray(image)
     channels = image.shape[2] if image.ndim == 3 else 1
     height, width = down.indices.shape[1], across.indices.shape[1]
@@ -128,38 +125,31 @@ def _resized(image: Floats, down: _Taps, across: _Taps) -> Floats:
 
 
 def resize_area(image: Floats, size: tuple[int, int]) -> Floats:
-    """Return an image at another size, whose pixels are means of what they cover of the image.
+    """Return an image at another size (width, height) [px]; pixels are means of the area that they cover.
 
-    As OpenCV's ``INTER_AREA``, but where one side grows while the other shrinks, which OpenCV samples.
-
-    Args:
-        image: Shape (height, width) or (height, width, channels).
-        size: Width and height [px].
+    As OpenCV's ``INTER_AREA``, except where one side grows while the other shrinks, which OpenCV samples.
     """
-    image = _floats(image)
-    across, down = (_area_taps(image.shape[1 - i], size[i], image.dtype) for i in (0, 1))
-    return _resized(image, down, across)
+    return _resize(image, size, _area_taps)
 
 
 def resize_linear(image: Floats, size: tuple[int, int]) -> Floats:
-    """Return an image at another size, interpolated linearly at the middles of pixels; as ``resize_area``."""
-    image = _floats(image)
-    across, down = (_point_taps(image.shape[1 - i], size[i], image.dtype, cubic=False) for i in (0, 1))
-    return _resized(image, down, across)
+    """Return an image at another size (width, height) [px], interpolated linearly at pixel centres."""
+    return _resize(image, size, functools.partial(_point_taps, cubic=False))
 
 
 def resize_cubic(image: Floats, size: tuple[int, int]) -> Floats:
-    """Return an image at another size, interpolated by cubics at middles of pixels; as ``resize_area``."""
+    """Return an image at another size (width, height) [px], interpolated by cubics at pixel centres."""
+    return _resize(image, size, functools.partial(_point_taps, cubic=True))
+
+
+def _resize(image: Floats, size: tuple[int, int], taps: Callable[[int, int, Any], _Taps]) -> Floats:
     image = _floats(image)
-    across, down = (_point_taps(image.shape[1 - i], size[i], image.dtype, cubic=True) for i in (0, 1))
+    across, down = (taps(image.shape[1 - i], size[i], image.dtype) for i in (0, 1))
     return _resized(image, down, across)
 
 
-# Convolutions.
-
-
 def _beyond(places: Indices, size: int, border: Border) -> Indices:
-    """Which of ``size`` pixels stand for these, some of which lie beyond the border."""
+    """Return the pixels, of ``size``, that stand for places, some of them beyond the border."""
     if border == "replicate" or size == 1:
         return np.clip(places, 0, size - 1)
     period = 2 * (size - 1)
@@ -168,7 +158,7 @@ def _beyond(places: Indices, size: int, border: Border) -> Indices:
 
 
 def _weighted(parts: Sequence[Floats], weights: Sequence[float], total: Floats, spare: Floats) -> None:
-    """Write the weighted sum of ``parts``, two at a time where their weights are alike."""
+    """Write the weighted sum of ``parts`` to ``total``, in pairs if the weights are symmetric."""
     middle = len(parts) // 2
     mirrored = len(parts) % 2 == 1 and list(weights) == list(weights)[::-1]
     np.multiply(parts[middle], weights[middle], out=total)
@@ -184,10 +174,7 @@ def _weighted(parts: Sequence[Floats], weights: Sequence[float], total: Floats, 
 def _convolved(
     image: Floats, down: Sequence[float], across: Sequence[float], border: Border = "reflect101"
 ) -> Floats:
-    """The sum of the pixels around each one, by weights that are products of two sequences'.
-
-    A sequence of n weights begins n // 2 pixels before the pixel.
-    """
+    """Return an image convolved with a separable kernel; n weights begin n // 2 pixels before the pixel."""
     image = np.ascontiguousarray(_floats(image))
     height, width = image.shape[:2]
     channels = image.shape[2] if image.ndim == 3 else 1
@@ -219,9 +206,9 @@ def _convolved(
 
 
 def gaussian_weights(sigma: float, size: int) -> list[float]:
-    """Weights of a Gaussian's kernel of ``size`` pixels, whose sum is 1."""
-    away = np.arange(size) - (size - 1) / 2
-    weights = elementary.exp(away * away * (-0.5 / (sigma * sigma)))
+    """Return the weights of a Gaussian kernel of ``size`` pixels, which sum to 1."""
+    offsets = np.arange(size) - (size - 1) / 2
+    weights = elementary.exp(offsets * offsets * (-0.5 / (sigma * sigma)))
     return [float(weight) for weight in weights / weights.sum()]
 
 
@@ -233,40 +220,40 @@ def gaussian_blur(
     Args:
         image: Shape (height, width) or (height, width, channels).
         sigma: Standard deviation [px].
-        border: What lies beyond the border.
-        size: Side of the kernel [px, odd]; None for one that reaches four standard deviations.
+        border: Continuation past the border.
+        size: Side of the kernel [px, odd]; None: it reaches four standard deviations.
     """
     weights = gaussian_weights(sigma, size or round(8 * sigma + 1) | 1)
     return _convolved(image, weights, weights, border)
 
 
 def box_sum(image: Floats, size: int) -> Floats:
-    """Return the sum of the ``size`` x ``size`` pixels around each one, mirrored beyond the border."""
+    """Return the sum of the ``size`` x ``size`` pixels around each one, reflected past the border."""
     return _convolved(image, [1.0] * size, [1.0] * size)
 
 
 def box_blur(image: Floats, size: int) -> Floats:
-    """Return the mean of the ``size`` x ``size`` pixels around each one, mirrored beyond the border."""
+    """Return the mean of the ``size`` x ``size`` pixels around each one, reflected past the border."""
     total = box_sum(image, size)
     total *= total.dtype.type(1 / (size * size))
     return total
 
 
 def sobel(image: Floats) -> tuple[Floats, Floats]:
-    """Return eight times the slope of an image along x and along y, by Sobel's kernels of 3 x 3 px."""
+    """Return eight times the derivatives of an image along x and y, by Sobel kernels of 3 x 3 px."""
     smooth, slope = (1.0, 2.0, 1.0), (-1.0, 0.0, 1.0)
     return _convolved(image, smooth, slope), _convolved(image, slope, smooth)
 
 
 def bilateral(image: Floats, diameter: int, sigma_color: float, sigma_space: float) -> Floats:
-    """Return an image blurred among pixels of like colour; mirrored beyond the border.
+    """Return an image after a bilateral filter, reflected past the border.
 
     Args:
         image: Shape (height, width) or (height, width, channels).
-        diameter: Pixels across the disc of neighbours that count [px, odd].
-        sigma_color: Standard deviation of the Gaussian by which neighbours count, in the sum of the channels'
-            absolute differences.
-        sigma_space: That of the Gaussian by which they count by their distance [px].
+        diameter: Diameter of the disc of neighbours [px, odd].
+        sigma_color: Standard deviation of the weight by colour, in the sum of the channels' absolute
+            differences.
+        sigma_space: Standard deviation of the weight by distance [px].
     """
     image = _floats(image)
     height, width = image.shape[:2]
@@ -279,17 +266,17 @@ def bilateral(image: Floats, diameter: int, sigma_color: float, sigma_space: flo
     for top in range(0, height, step):
         bottom = min(top + step, height)
         band = planes[:, _beyond(np.arange(top - reach, bottom + reach), height, "reflect101")][:, :, columns]
-        changed = _calmer(band.reshape(channels, -1), band.shape[2], reach, sigma_color, sigma_space)
-        inner = changed.reshape(band.shape)[:, reach : reach + bottom - top, reach : reach + width]
+        blurred = _bilateral_band(band.reshape(channels, -1), band.shape[2], reach, sigma_color, sigma_space)
+        inner = blurred.reshape(band.shape)[:, reach : reach + bottom - top, reach : reach + width]
         result[:, top:bottom] = inner
     return np.ascontiguousarray(result.transpose(1, 2, 0)).reshape(image.shape)
 
 
-def _calmer(planes: Floats, width: int, reach: int, sigma_color: float, sigma_space: float) -> Floats:
-    """Planes (channel, pixel) of rows of ``width`` -> what ``bilateral`` makes of what is off their margins.
+def _bilateral_band(planes: Floats, width: int, reach: int, sigma_color: float, sigma_space: float) -> Floats:
+    """Return planes (channel, pixel) of rows of ``width`` after a bilateral filter.
 
-    Each of two pixels counts for the other alike, so that half of the neighbours are looked at; in margins of
-    ``reach`` px these may be of another row.
+    Weights are symmetric, so that half of the neighbours are visited. In margins of ``reach`` px, where they
+    may belong to another row, the result is wrong.
     """
     size = planes.shape[1]
     total, weights = np.zeros_like(planes), np.ones(size, planes.dtype)
@@ -304,10 +291,10 @@ def _calmer(planes: Floats, width: int, reach: int, sigma_color: float, sigma_sp
             rest, weight = spare[: size - offset], all_weight[: size - offset]
             for channel, plane in enumerate(planes):
                 step = np.subtract(plane[offset:], plane[:-offset], out=steps[channel, : size - offset])
-                away = np.abs(step, out=rest if channel else weight)
+                difference = np.abs(step, out=rest if channel else weight)
                 if channel:
-                    weight += away
-            # exp(-x) is a power of exp(-x / 32), which a few terms of its series give.
+                    weight += difference
+            # exp(-x) is a power of exp(-x / 32), for which a few terms of the series suffice.
             np.multiply(weight, weight, out=rest)
             rest *= scale
             np.minimum(rest, FADE_MOST, out=rest)
@@ -330,16 +317,13 @@ def _calmer(planes: Floats, width: int, reach: int, sigma_color: float, sigma_sp
     return total
 
 
-# The rest.
-
-
 def remap_linear(image: Floats, x: Floats, y: Floats) -> Floats:
-    """Return the values of an image at places, interpolated linearly; beyond its border they are as at it.
+    """Return the values of an image at places, interpolated linearly; border pixels repeat.
 
     Args:
         image: Shape (height, width).
-        x: Columns [px, whole at the middles of pixels], any shape.
-        y: Rows, of the same shape.
+        x: Columns [px, whole at the centres of pixels], any shape.
+        y: Rows, the same shape.
     """
     image = np.ascontiguousarray(_floats(image))
     height, width = image.shape
@@ -358,12 +342,12 @@ def remap_linear(image: Floats, x: Floats, y: Floats) -> Floats:
 def distance(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Return the distance of each pixel of ``mask`` from the nearest that is 0 [px], shape (height, width).
 
-    By steps to neighbours at up to a knight's move, 2 % too long or short at most. With labels OpenCV does so
-    in whole numbers; without, Intel's library does it in floating point where there is one.
+    By steps of up to a knight's move, accurate to 2 %. With labels OpenCV computes it in whole numbers;
+    without, Intel's library may do it in floating point.
     """
     pixels = np.asarray(mask, np.uint8)
-    away, _ = cv2.distanceTransformWithLabels(pixels, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    return np.asarray(away, np.float32)
+    found, _ = cv2.distanceTransformWithLabels(pixels, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    return np.asarray(found, np.float32)
 
 
 def grey(rgb: Floats) -> Floats:

@@ -1,6 +1,6 @@
-"""Products and decompositions of small matrices, in stacks or alone, the same bits everywhere.
+"""Products and decompositions of small matrices or stacks of them.
 
-Sums go by the inner index in its order. Matrices are the last two axes, as in ``np.linalg``.
+Sums run over the inner index in ascending order. Matrices are the last two axes, as in ``np.linalg``.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 Matrices = Any
-"""An array of numbers, or what makes one."""
+"""An array of numbers, or nested sequences."""
 
 Result = npt.NDArray[Any]
 
 SWEEPS = 30
-"""Rounds of Jacobi rotations at most; they converge quadratically, within ten."""
+"""Most rounds of Jacobi rotations; they converge quadratically, within ten."""
 
 DEPENDENT = 1e-20
-"""Share of a column's square below which the other columns nearly make it up."""
+"""Fraction of a column's square norm below which it depends on the columns before."""
 
 LOOPED = 64
-"""Products with a longer inner index are summed by NumPy at once rather than term by term."""
+"""Longest inner index that is summed term by term, rather than by NumPy."""
 
 
 def product(a: Matrices, b: Matrices) -> Result:
@@ -49,9 +49,9 @@ def product(a: Matrices, b: Matrices) -> Result:
 
 
 def _eliminated(matrix: Matrices, right: Result) -> tuple[Result, Result, Result]:
-    """Bring ``matrix`` (..., n, n) to upper triangular form, and ``right`` (..., n, k) with it.
+    """Eliminate the lower triangle of ``matrix`` (..., n, n), in ``right`` (..., n, k) as well.
 
-    By Gaussian elimination with partial pivoting. Returns both and the sign of the exchanges of rows.
+    By Gaussian elimination with partial pivoting. Return both, and the sign of the row permutation.
     """
     upper = np.array(matrix, np.float64)
     right = np.array(np.broadcast_to(right, upper.shape[:-1] + right.shape[-1:]), np.float64)
@@ -88,11 +88,6 @@ def solve(matrix: Matrices, right: Matrices) -> Result:
         found[..., k, :] /= upper[..., k, k, None]
         found[..., :k, :] -= upper[..., :k, k, None] * found[..., k : k + 1, :]
     return found[..., 0] if right.ndim == 1 else found
-
-
-def inverse(matrix: Matrices) -> Result:
-    """Return the inverse of square matrices (..., n, n); raises as ``solve``."""
-    return solve(matrix, np.eye(np.shape(matrix)[-1]))
 
 
 def determinant(matrix: Matrices) -> Result:
@@ -134,7 +129,7 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
         right, values, left = svd(np.swapaxes(matrix, -2, -1))
         return np.swapaxes(left, -2, -1), values, np.swapaxes(right, -2, -1)
     size = matrix.shape[-1]
-    turned = np.zeros((*matrix.shape[:-2], size, size)) + np.eye(size)
+    rotation = np.zeros((*matrix.shape[:-2], size, size)) + np.eye(size)
     for _ in range(SWEEPS):
         done = True
         for p in range(size):
@@ -147,12 +142,12 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
                     continue
                 done = False
                 ratio = (squares[1] - squares[0]) / (2 * np.where(apart, mixed, 1.0))
-                with np.errstate(over="ignore"):  # of columns that are 0 beside others: no turn
+                with np.errstate(over="ignore"):  # a column of zeros is not rotated
                     tangent = np.where(ratio < 0, -1.0, 1.0) / (np.abs(ratio) + np.sqrt(1 + ratio * ratio))
                 tangent = np.where(apart, tangent, 0.0)
                 cosine = (1 / np.sqrt(1 + tangent * tangent))[..., None]
                 sine = cosine * tangent[..., None]
-                for columns in (matrix, turned):
+                for columns in (matrix, rotation):
                     one, two = columns[..., p].copy(), columns[..., q].copy()
                     columns[..., p] = cosine * one - sine * two
                     columns[..., q] = sine * one + cosine * two
@@ -163,7 +158,7 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
     values = np.take_along_axis(values, order, axis=-1)
     left = np.take_along_axis(matrix, order[..., None, :], axis=-1)
     left = left / np.where(values == 0, 1.0, values)[..., None, :]
-    return left, values, np.swapaxes(np.take_along_axis(turned, order[..., None, :], axis=-1), -2, -1)
+    return left, values, np.swapaxes(np.take_along_axis(rotation, order[..., None, :], axis=-1), -2, -1)
 
 
 def pinv(matrix: Matrices, tolerance: float = 1e-15) -> Result:
@@ -180,18 +175,15 @@ def pinv(matrix: Matrices, tolerance: float = 1e-15) -> Result:
 def lstsq(matrix: Matrices, right: Matrices) -> Result:
     """Return the shortest ``x`` with the least squared error of ``matrix @ x = right``."""
     matrix, right = np.asarray(matrix, np.float64), np.asarray(right, np.float64)
-    found = (
-        _orthogonalized(matrix, right) if right.ndim == 1 and matrix.shape[-2] >= matrix.shape[-1] else None
-    )
-    return _by_pinv(matrix, right) if found is None else found
-
-
-def _by_pinv(matrix: Result, right: Result) -> Result:
+    if right.ndim == 1 and matrix.shape[-2] >= matrix.shape[-1]:
+        found = _orthogonalized(matrix, right)
+        if found is not None:
+            return found
     return product(pinv(matrix, np.finfo(np.float64).eps * max(matrix.shape[-2:])), right)
 
 
 def _orthogonalized(matrix: Result, right: Result) -> Result | None:
-    """Solve for a vector by making the columns orthogonal; None where some are nearly dependent."""
+    """Solve for a vector by orthogonalising the columns; None if some are nearly dependent."""
     size = matrix.shape[1]
     rest = np.concatenate([matrix.T, right[None]])
     whole = (rest * rest).sum(axis=1)

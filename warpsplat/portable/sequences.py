@@ -1,4 +1,4 @@
-"""Interpolation and convolution of sequences of numbers, the same bits everywhere."""
+"""Interpolation and convolution of sequences of numbers."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ def interp(x: Any, places: Any, values: Any) -> npt.NDArray[np.float64]:
     """Return a piecewise linear function at ``x``, held constant beyond its ends, as ``np.interp``.
 
     Args:
-        x: Where to take it, any shape.
-        places: Where its values are given, shape (n,), ascending.
-        values: Its values there, shape (n,).
+        x: Arguments, any shape.
+        places: Arguments with given values, shape (n,), ascending.
+        values: The values there, shape (n,).
     """
     x, places, values = (np.asarray(part, np.float64) for part in (x, places, values))
     if len(places) == 1:
@@ -27,10 +27,7 @@ def interp(x: Any, places: Any, values: Any) -> npt.NDArray[np.float64]:
 
 
 def convolve(signal: Any, kernel: Any) -> npt.NDArray[np.float64]:
-    """Return where ``kernel`` (m,) lies wholly on ``signal`` (n,) the sum of products, shape (n - m + 1,).
-
-    As ``np.convolve(signal, kernel, "valid")``: the kernel is reversed.
-    """
+    """Return the full-overlap convolution of ``signal`` (n,) and ``kernel`` (m,), shape (n - m + 1,)."""
     signal, kernel = np.asarray(signal, np.float64), np.asarray(kernel, np.float64)
     count = len(signal) - len(kernel) + 1
     total = np.zeros(count)

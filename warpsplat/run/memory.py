@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from warpsplat.errors import ResourceError
-from warpsplat.files.image import Facts, image_facts
+from warpsplat.files.image import ImageFacts, image_facts
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
@@ -85,7 +85,7 @@ class Need:
         return PROGRAM + max(self.reading, self.working, self.scoring)
 
 
-def need(facts: Facts, settings: Settings, factor: int = 1, mask: Facts | None = None) -> Need:
+def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None) -> Need:
     """What a run takes whose image is ``factor`` times smaller in each direction than it is, with a ``mask``
     of how much errors count.
 
@@ -108,7 +108,7 @@ def need(facts: Facts, settings: Settings, factor: int = 1, mask: Facts | None =
     return Need(*(round(x) for x in (reading, working, scoring)))
 
 
-def mask_factor(facts: Facts, mask: Facts, factor: int) -> int:
+def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
     """How many times smaller the mask of an image is read that is worked on ``factor`` times smaller: none of
     the detail that is left there is lost.
     """
@@ -118,7 +118,7 @@ def mask_factor(facts: Facts, mask: Facts, factor: int) -> int:
     return found
 
 
-def _fitting(facts: Facts, settings: Settings, factor: int) -> float:
+def _fitting(facts: ImageFacts, settings: Settings, factor: int) -> float:
     """Of the finest phase, which is the largest; the surplus has gone by then."""
     phase = phases(settings, -(-facts.width // factor), -(-facts.height // factor))[-1]
     pixels, curves = phase.width * phase.height, settings.curves
@@ -131,7 +131,7 @@ def _fitting(facts: Facts, settings: Settings, factor: int) -> float:
     return levels * 1.5 * slots * slot + TRAINED * pixels + SHAPE * curves
 
 
-def _scoring(facts: Facts, settings: Settings, pixels: float) -> float:
+def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
     """Of a picture of so many ``pixels``, without the image itself."""
     if pixels <= WHOLE_PIXELS:
         per_pixel: float = SHOWN + 16
@@ -148,22 +148,22 @@ def has_room_for_eyes(settings: Settings, pixels: int) -> bool:
     return limit is None or PROGRAM + (EYES + 16) * pixels <= limit
 
 
-def whole_score(facts: Facts, settings: Settings, factor: int) -> int:
+def whole_score(facts: ImageFacts, settings: Settings, factor: int) -> int:
     """Of measuring a file at the image's own size after a run on a smaller one [bytes]."""
     pixels = facts.width * facts.height
     held = 4 * facts.channels * pixels / factor**2 + (facts.decoded + facts.kept) * pixels
     return round(PROGRAM + held + _scoring(facts, settings, pixels))
 
 
-def facts_of(source: ImageSource) -> Facts | None:
+def facts_of(source: ImageSource) -> ImageFacts | None:
     """Of bytes of a file, a Pillow image or an array; None where they cannot be told."""
     if isinstance(source, bytes):
         return image_facts(source)
     if isinstance(source, np.ndarray) and source.ndim in {2, 3}:
         channels = source.shape[2] if source.ndim == 3 else 1
-        return Facts(source.shape[1], source.shape[0], 4 if channels in {2, 4} else 3, 12, drafts=False)
+        return ImageFacts(source.shape[1], source.shape[0], 4 if channels in {2, 4} else 3, 12, drafts=False)
     if isinstance(source, Image.Image):
-        return Facts(source.width, source.height, 4, 4, drafts=False)
+        return ImageFacts(source.width, source.height, 4, 4, drafts=False)
     return None
 
 
@@ -189,7 +189,9 @@ def share_machine(processes: int) -> None:
     _Process.sharers = processes
 
 
-def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1, mask: Facts | None = None) -> int:
+def factor_for(
+    facts: ImageFacts, settings: Settings, name: str, least: int = 1, mask: ImageFacts | None = None
+) -> int:
     """How many times smaller an image is to be worked on: a power of two, from ``least`` on. Arguments are
     those of ``need``.
 
@@ -206,7 +208,7 @@ def factor_for(facts: Facts, settings: Settings, name: str, least: int = 1, mask
     return factor
 
 
-def need_refined(facts: Facts, settings: Settings) -> int:
+def need_refined(facts: ImageFacts, settings: Settings) -> int:
     """What refining an SVG of as many shapes as usual takes [bytes]."""
     pixels = facts.width * facts.height
     cleared = PROGRAM + CLEARED * pixels if facts.channels == 4 else 0

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from warpsplat.files.image import Facts, boxed
+from warpsplat.files.image import ImageFacts, boxed
 from warpsplat.files.sources import ImageSource
 from warpsplat.files.whole import load_whole
 from warpsplat.fit.loop import Fit
@@ -68,10 +68,10 @@ class Reduction:
 class Memory:
     """What is known of an image before it is read, and how small it has to be worked on."""
 
-    facts: Facts | None
+    facts: ImageFacts | None
     """None where nothing can be told: it is worked on as it is."""
     source: ImageSource
-    mask: Facts | None = None
+    mask: ImageFacts | None = None
     """Of the mask, if there is one."""
 
     @staticmethod

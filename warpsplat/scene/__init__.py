@@ -1,4 +1,4 @@
-"""What is optimised and what a file holds: shapes on a canvas. NumPy only."""
+"""Scenes: shapes on a canvas, which are optimised and which files hold. NumPy only."""
 
 from warpsplat.scene.attributes import (
     ATTRIBUTES,
@@ -17,8 +17,7 @@ from warpsplat.scene.attributes import (
     Spread,
     Unit,
 )
-from warpsplat.scene.picture import Picture
-from warpsplat.scene.scene import Canvas, FloatArray, IndexArray, Scene
+from warpsplat.scene.scene import Canvas, FloatArray, IndexArray, Picture, Scene
 
 __all__ = [
     "ATTRIBUTES",

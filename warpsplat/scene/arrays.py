@@ -1,4 +1,4 @@
-"""A scene's shapes as named arrays, for files, and back: what comes from a file is checked."""
+"""A scene's shapes as named arrays for files, and back, with checks."""
 
 from __future__ import annotations
 
@@ -30,38 +30,30 @@ from warpsplat.scene.scene import Scene
 Array = npt.NDArray[Any]
 
 LAYOUT = ("kind", "basis", "first", "starts", "closed", "stop_first")
-"""Arrays that say what the rows of the others are."""
+"""Arrays that give the rows of the others their meaning."""
 
 STARTS = ("first", "starts", "stop_first")
-"""Those of them that ascend from 0."""
+"""Arrays that ascend from 0."""
 
 FARTHEST = 1e9
 """Largest coordinate or length [canvas units]."""
 
 MOST_LAYERS = 1_000_000
 
-CHOICES = {
-    "kind": Kind,
-    "basis": Basis,
-    "rule": Rule,
-    "cap": Cap,
-    "join": Join,
-    "paint": Paint,
-    "spread": Spread,
-}
+CHOICES = {one.__name__.lower(): one for one in (Kind, Basis, Rule, Cap, Join, Paint, Spread)}
 
 
 def to_arrays(scene: Scene) -> dict[str, Array]:
-    """The shapes of ``scene``; its canvas, pictures, names of layers and patterns of dashes are left out."""
+    """Return the shapes of ``scene``, without canvas, pictures, names of layers and dash patterns."""
     names = (*LAYOUT, *(row.name for row in (*TRAITS, *ATTRIBUTES)))
     return {name: getattr(scene, name) for name in names}
 
 
 def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
-    """The scene of which ``to_arrays`` made ``arrays``, with what these lack from ``like``.
+    """Return the scene of ``to_arrays``, with what it leaves out taken from ``like``.
 
     Raises:
-        ValueError: one is missing, of another type or size, or has numbers that no scene has.
+        ValueError: An array is missing, of another type or size, or has numbers that no scene has.
     """
     whole = {name: np.int32 for name in LAYOUT} | {trait.name: trait.dtype for trait in TRAITS}
     values: dict[str, Any] = {name: typed(arrays, name, dtype) for name, dtype in whole.items()}
@@ -77,9 +69,7 @@ def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
     if len(values["stop_first"]) != len(values["first"]):
         raise ValueError("stop_first is not that of the shapes")
     limits: dict[str, tuple[float, float]] = {
-        name: (min(kinds), max(kinds)) for name, kinds in CHOICES.items()
-    }
-    limits |= {
+        **{name: (min(kinds), max(kinds)) for name, kinds in CHOICES.items()},
         "closed": (0, 1),
         "twin": (0, 1),
         "layer": (0, MOST_LAYERS),
@@ -95,11 +85,7 @@ def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
 
 
 def typed(arrays: Mapping[str, Array], name: str, dtype: Any) -> Array:
-    """The array ``name``.
-
-    Raises:
-        ValueError: it is missing, or its elements are not ``dtype``.
-    """
+    """Return the array ``name``; raise ``ValueError`` if it is missing or its elements are not ``dtype``."""
     array = arrays.get(name)
     if array is None or array.dtype != dtype:
         raise ValueError(f"{name} is missing" if array is None else f"{name} has elements of another type")
@@ -107,23 +93,15 @@ def typed(arrays: Mapping[str, Array], name: str, dtype: Any) -> Array:
 
 
 def between(name: str, values: Array, low: float, high: float) -> None:
-    """Check that all ``values`` lie between two.
-
-    Raises:
-        ValueError: one does not, or is no number.
-    """
+    """Raise ``ValueError`` unless all ``values`` lie between two numbers."""
     if not ((values >= low) & (values <= high)).all():
         raise ValueError(f"{name} has numbers that are not from {low:g} to {high:g}")
 
 
 def numbers(arrays: Mapping[str, Array], attribute: Attribute) -> Array:
-    """The values of an attribute.
-
-    Raises:
-        ValueError: they are none that it can have.
-    """
+    """Return the values of an attribute; raise ``ValueError`` for values that it cannot have."""
     values = typed(arrays, attribute.name, np.float32)
-    if attribute.low[1] == attribute.high[1] == Unit.ONE:  # what was read from a file may be opaque, or 0
+    if attribute.low[1] == attribute.high[1] == Unit.ONE:  # shapes read from a file may be opaque, or 0
         between(attribute.name, values, min(attribute.low[0], 0.0), max(attribute.high[0], 1.0))
     else:
         between(attribute.name, values, 0.0 if attribute.name == "widths" else -FARTHEST, FARTHEST)

@@ -1,9 +1,7 @@
-"""The table of what a shape has and an optimiser may change.
-
-What a shape is and stays has a table of its own (``TRAITS``).
+"""The tables of what an optimiser may change of shapes (``ATTRIBUTES``), and of what it may not (``TRAITS``).
 
 A scene's arrays, the device's arrays with their gradients and moments, Adam, surgery, ``take`` and ``append``
-all read this table: a further attribute is a row here, a field of ``Scene``, and what gives it a meaning.
+all read them: a new attribute is a row here, a field of ``Scene``, and the code that gives it a meaning.
 """
 
 from __future__ import annotations
@@ -18,33 +16,33 @@ from warpsplat.kernels import constants
 
 
 class Kind(IntEnum):
-    """What a path is painted with."""
+    """How a path is painted."""
 
     FILL = constants.FILL
-    """Painted inside its contours; one that is open is closed by a straight line."""
+    """Painted inside its contours; open ones are closed by a straight line."""
     STROKE = constants.STROKE
     """Painted along its contours."""
 
 
 class Basis(IntEnum):
-    """What the control points of an outline are."""
+    """The meaning of an outline's control points."""
 
     CUBIC = constants.CUBIC
     """A chain of cubic Béziers: points 0, 3, 6 ... lie on the outline, the others are handles."""
     SPLINE = constants.SPLINE
     """A uniform quadratic B-spline: each point is the control point of one quadratic Bézier, which begins and
-    ends midway to the neighbouring points. A stroke begins and ends at its first and last point."""
+    ends midway to the neighbouring points. An open one begins and ends at its first and last point."""
 
 
 class Rule(IntEnum):
-    """What is inside of a fill (SVG 1.1, 11.3)."""
+    """Which points are inside a fill (SVG 1.1, 11.3)."""
 
     NONZERO = constants.NONZERO
     EVENODD = constants.EVENODD
 
 
 class Cap(IntEnum):
-    """How an open contour of a stroke, or a dash, ends (SVG 1.1, 11.4)."""
+    """The ends of open strokes and dashes (SVG 1.1, 11.4)."""
 
     ROUND = constants.ROUND
     BUTT = constants.BUTT
@@ -52,7 +50,7 @@ class Cap(IntEnum):
 
 
 class Join(IntEnum):
-    """How the pieces of a stroke meet in a corner (SVG 1.1, 11.4)."""
+    """The corners of strokes (SVG 1.1, 11.4)."""
 
     ROUND = constants.ROUND
     MITER = constants.MITER
@@ -60,7 +58,7 @@ class Join(IntEnum):
 
 
 class Paint(IntEnum):
-    """What a shape is coloured with (SVG 1.1, 13)."""
+    """The colouring of a shape (SVG 1.1, 13)."""
 
     FLAT = constants.FLAT
     """``colors``."""
@@ -69,11 +67,11 @@ class Paint(IntEnum):
     RADIAL = constants.RADIAL
     """Stops from the frame's focus to its unit circle."""
     PICTURE = constants.PICTURE
-    """What a viewer draws of the shape's row of ``Scene.pictures``."""
+    """The pixels of the shape's row of ``Scene.pictures``."""
 
 
 class Spread(IntEnum):
-    """How a gradient goes on beyond its ends."""
+    """The continuation of a gradient beyond its ends."""
 
     PAD = constants.PAD
     REFLECT = constants.REFLECT
@@ -81,23 +79,23 @@ class Spread(IntEnum):
 
 
 class Unit(Enum):
-    """What a number of the table is counted in."""
+    """Units of numbers in the table."""
 
     ONE = "1"
     PIXEL = "px"
-    """Of the finest training size."""
+    """Pixel of the finest training size."""
     CANVAS = "canvas"
     """The canvas's longer side."""
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """A row of the table."""
+    """An attribute that may be optimised."""
 
     name: str
-    """Of the field of ``Scene``."""
+    """Name of the field of ``Scene``."""
     per: Literal["point", "shape", "stop"]
-    """What has a row of it: each control point, each shape, or each stop of a gradient."""
+    """What has a row: each control point, each shape, or each stop of a gradient."""
     size: int
     """Numbers in a row."""
     rate: float
@@ -108,17 +106,17 @@ class Attribute:
     high: tuple[float, Unit]
     """Largest value."""
     kinds: tuple[Kind, ...] = (Kind.FILL, Kind.STROKE)
-    """The shapes that have it; of others it is 0 and not updated."""
+    """The shapes that have it; for others it is 0 and not updated."""
     paints: tuple[Paint, ...] = (Paint.FLAT, Paint.LINEAR, Paint.RADIAL)
     """The same by paint."""
 
 
 @dataclass(frozen=True)
 class Trait:
-    """A row of the table of what a shape is, which no optimiser changes: a number of each shape."""
+    """A number of each shape that is not optimised."""
 
     name: str
-    """Of the field of ``Scene``."""
+    """Name of the field of ``Scene``."""
     default: float
     dtype: type[np.generic] = np.int32
 
@@ -143,7 +141,7 @@ TRAITS = (
 )
 
 OPACITY_RANGE = (0.02, 0.9985)
-"""Bounds of an opacity. The upper one rounds to opaque in the file and keeps 1 - alpha away from 0."""
+"""Bounds of opacities. The upper one rounds to opaque in the file and keeps 1 - alpha away from 0."""
 
 GRADIENTS = (Paint.LINEAR, Paint.RADIAL)
 

@@ -1,4 +1,4 @@
-"""Measures of shapes: outlines, areas, boxes."""
+"""Outlines, areas and boxes of shapes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from warpsplat.scene.attributes import Basis, Kind
 from warpsplat.scene.scene import Canvas, FloatArray, Scene
 
 PIECES = 8
-"""Straight pieces a Bézier that measures are taken on."""
+"""Straight pieces of a Bézier from which areas and boxes are computed."""
 
 
 def beziers(points: FloatArray, closed: bool, basis: Basis) -> FloatArray:
-    """Béziers of contours of equal length as cubics: (contour, point, 2) -> (contour, Bézier, 4, 2)."""
+    """Return contours of equal length as cubics: (contour, point, 2) -> (contour, Bézier, 4, 2)."""
     if basis == Basis.SPLINE:
         return _elevated(points, closed)
     count = points.shape[1]
@@ -24,7 +24,7 @@ def beziers(points: FloatArray, closed: bool, basis: Basis) -> FloatArray:
 
 
 def _elevated(points: FloatArray, closed: bool) -> FloatArray:
-    """The quadratics of splines as cubics."""
+    """Return the quadratics of splines as cubics."""
     if closed:
         before, middle, after = np.roll(points, 1, axis=1), points, np.roll(points, -1, axis=1)
     else:
@@ -36,12 +36,12 @@ def _elevated(points: FloatArray, closed: bool) -> FloatArray:
 
 
 def flatten(points: FloatArray, closed: bool, basis: Basis, pieces: int = PIECES) -> FloatArray:
-    """Contours as polylines of ``pieces`` pieces a Bézier: (contour, point, 2) -> (contour, vertex, 2)."""
+    """Return contours as polylines, ``pieces`` to a Bézier: (contour, point, 2) -> (contour, vertex, 2)."""
     t = np.arange(pieces, dtype=np.float32)[:, None] / pieces
     s = 1 - t
     weights = np.concatenate([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
     curves = beziers(points, closed, basis)
-    # By rows of all Béziers: sums over long rows take a fraction of the time.
+    # One product for all Béziers: sums over long rows take a fraction of the time.
     rows = product(weights, np.moveaxis(curves, 2, 0).reshape(4, -1))
     vertices = np.moveaxis(rows.reshape(pieces, *curves.shape[:2], 2), 0, 2).reshape(len(points), -1, 2)
     if not closed:
@@ -50,8 +50,9 @@ def flatten(points: FloatArray, closed: bool, basis: Basis, pieces: int = PIECES
 
 
 def areas(scene: Scene) -> FloatArray:
-    """Area of each shape [canvas units squared]: what its contours enclose, holes taken off, or length times
-    width; shape (shape,).
+    """Return the area of each shape [canvas units squared], shape (shape,).
+
+    That of a fill is what its contours enclose, less holes; that of a stroke is its length times its width.
     """
     result = np.zeros(len(scene), np.float64)
     for kind, basis, closed, shapes, _, points in scene.alike():
@@ -68,7 +69,7 @@ def areas(scene: Scene) -> FloatArray:
 
 
 def bounds(scene: Scene) -> FloatArray:
-    """Boxes (x0, y0, x1, y1) of the shapes [canvas units], stroke width included; shape (shape, 4)."""
+    """Return the boxes (x0, y0, x1, y1) of the shapes [canvas units] with their strokes, shape (shape, 4)."""
     low = np.full((len(scene), 2), np.inf, np.float32)
     high = np.full((len(scene), 2), -np.inf, np.float32)
     for _, basis, closed, shapes, _, points in scene.alike():
@@ -80,7 +81,7 @@ def bounds(scene: Scene) -> FloatArray:
 
 
 def enlarged(scene: Scene, factor: int, width: int, height: int) -> Scene:
-    """A scene ``factor`` times as large, on a canvas of ``width`` x ``height`` units."""
+    """Return a scene ``factor`` times as large, on a canvas of ``width`` x ``height`` units."""
     return replace(
         scene,
         canvas=Canvas(width, height, scene.canvas.background),

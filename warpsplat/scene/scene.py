@@ -1,4 +1,4 @@
-"""The scene: shapes as a struct of arrays."""
+"""The scene: shapes as a struct of arrays, and pictures between them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene.attributes import ATTRIBUTES, GRADIENTS, TRAITS, Attribute, Basis, Kind
-from warpsplat.scene.picture import Picture
 
 FloatArray = npt.NDArray[np.float32]
 IndexArray = npt.NDArray[np.intp]
@@ -19,28 +18,41 @@ IntArray = npt.NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Canvas:
-    """What the shapes lie on."""
+    """The canvas that the shapes lie on."""
 
     width: int
-    """[px of the input image], which are the canvas units."""
+    """[px of the input image], the canvas units."""
     height: int
     """[px]"""
     background: FloatArray | None
     """sRGB in [0, 1], shape (3,); None: transparent."""
     crisp: bool = False
-    """Whether viewers are to draw edges without antialiasing: cells abut."""
+    """Whether viewers should draw edges without antialiasing, because cells abut."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """SVG elements that no shape can hold, and their rendering."""
+
+    markup: str
+    size: tuple[float, float]
+    """Size of the canvas in the markup's units."""
+    corner: tuple[int, int]
+    """Row and column of the first pixel on the canvas."""
+    pixels: FloatArray
+    """Premultiplied sRGB and opacity, shape (height, width, 4); empty if nothing is visible."""
 
 
 class Alike(NamedTuple):
-    """Contours of shapes of one kind and basis, all closed or all open, with equally many points."""
+    """Contours of the same kind and basis, all closed or all open, with equally many points."""
 
     kind: Kind
     basis: Basis
     closed: bool
     shapes: IndexArray
-    """Whose they are, shape (contour,)."""
+    """Index of each contour's shape, shape (contour,)."""
     contours: IndexArray
-    """Which they are, shape (contour,)."""
+    """Index of each contour, shape (contour,)."""
     points: FloatArray
     """Shape (contour, point, 2)."""
 
@@ -49,14 +61,13 @@ class Alike(NamedTuple):
 class Scene:
     """Bézier shapes on a canvas; row 0 is painted first (furthest back).
 
-    Shapes have as many contours as they need, and contours as many Béziers: the control points of all lie in
-    one array, those of contour ``c`` from ``starts[c]`` to ``starts[c + 1]``, those of shape ``i`` from
-    ``first[i]`` to ``first[i + 1]``. The shape's ``basis`` says what they are. Of a closed contour they are a
-    ring: the last cubic ends at point 0, a spline has a quadratic for each point. Of an open one they are a
-    chain: cubics have one point more, a spline has two points more than quadratics.
+    Shapes have any number of contours, and contours any number of Béziers. All control points are in one
+    array: those of contour ``c`` from ``starts[c]`` to ``starts[c + 1]``, those of shape ``i`` from
+    ``first[i]`` to ``first[i + 1]``; ``basis`` gives their meaning. Those of a closed contour are a ring: the
+    last cubic ends at point 0, a spline has a quadratic for each point. Those of an open contour are a chain:
+    cubics need one point more, a spline has two points more than quadratics.
 
-    What is left out of contours and traits is what a shape of one contour has by default: fills are closed,
-    strokes open.
+    Contours and traits may be left out: then each shape has one contour, closed in fills and open in strokes.
     """
 
     canvas: Canvas
@@ -79,9 +90,9 @@ class Scene:
     closed: IntArray = None  # type: ignore[assignment]
     """1 for closed contours, else 0, shape (contour,)."""
     rule: IntArray = None  # type: ignore[assignment]
-    """``Rule`` of each shape, shape (shape,); it says something of fills only."""
+    """``Rule`` of each shape, shape (shape,); used for fills only."""
     cap: IntArray = None  # type: ignore[assignment]
-    """``Cap`` of each shape, shape (shape,); this and what follows says something of strokes only."""
+    """``Cap`` of each shape, shape (shape,); used for strokes only, as the next three."""
     join: IntArray = None  # type: ignore[assignment]
     """``Join`` of each shape, shape (shape,)."""
     miter_limits: FloatArray = None  # type: ignore[assignment]
@@ -89,47 +100,46 @@ class Scene:
     dash: IntArray = None  # type: ignore[assignment]
     """Row of ``dashes`` of each shape, or NO_DASHES, shape (shape,)."""
     twin: IntArray = None  # type: ignore[assignment]
-    """1 for a shape that shares its points with the one before it, a path that is filled and stroked; shape
-    (shape,)."""
+    """1 for a shape with the points of the one before, from a path that is filled and stroked, shape
+    (shape,).
+    """
     layer: IntArray = None  # type: ignore[assignment]
-    """Number of the group that each shape is in, ascending, shape (shape,)."""
+    """Number of each shape's layer, ascending, shape (shape,)."""
     paint: IntArray = None  # type: ignore[assignment]
-    """``Paint`` of each shape, shape (shape,); what follows says something of gradients only."""
+    """``Paint`` of each shape, shape (shape,)."""
     spread: IntArray = None  # type: ignore[assignment]
     """``Spread`` of each shape, shape (shape,)."""
     frames: FloatArray = None  # type: ignore[assignment]
-    """Where a gradient's unit space lies on the canvas: origin, first axis and second axis [canvas units],
-    shape (shape, 6). A linear one goes from the origin along the first axis; a radial one ends at the unit
-    circle."""
+    """Origin, first and second axis of a gradient's unit space [canvas units], shape (shape, 6). A linear one
+    goes from the origin along the first axis; a radial one ends at the unit circle."""
     focus: FloatArray = None  # type: ignore[assignment]
     """Centre and radius of the circle where a radial gradient begins, in its unit space, shape (shape, 3)."""
     stop_first: IntArray = None  # type: ignore[assignment]
     """First stop of each shape's gradient and, last, the number of stops, shape (shape + 1,)."""
     stop_offsets: FloatArray = None  # type: ignore[assignment]
-    """Where along the gradient the stops lie, in [0, 1], shape (stop,). One that lies before the one before
-    it counts as lying there."""
+    """Positions of the stops in [0, 1], shape (stop,); each counts as at least the one before."""
     stop_colors: FloatArray = None  # type: ignore[assignment]
     """sRGB in [0, 1], shape (stop, 3)."""
     stop_opacities: FloatArray = None  # type: ignore[assignment]
-    """In [0, 1], besides the shape's, shape (stop,)."""
+    """In [0, 1], a factor on the shape's, shape (stop,)."""
     fades: FloatArray = None  # type: ignore[assignment]
-    """What is added to a stroke's opacity in each of its thirds (of three cubics: in each), shape (shape, 3).
-    Soft Gaussians alone know of it: a path has one opacity."""
+    """Offsets of a stroke's opacity in each of its thirds, shape (shape, 3); for soft Gaussians only, as a
+    path has one opacity.
+    """
     picture: IntArray = None  # type: ignore[assignment]
     """Row of ``pictures`` of each shape, or NO_PICTURE, shape (shape,)."""
     pictures: tuple[Picture, ...] = ()
-    """What is shown between other shapes and stays as it is."""
+    """Pictures between the shapes, which are not optimised."""
     layer_names: tuple[str, ...] = ()
-    """Names of the groups by their number; none: levels."""
+    """Names of the layers by number; empty: they are levels."""
     dashes: tuple[tuple[float, ...], ...] = ()
-    """Patterns of dashes [canvas units]: where in the pattern a stroke begins, then dashes and gaps in turn,
-    as many of these as of those."""
+    """Dash patterns [canvas units]: an offset, then dashes and gaps in turn, equally many."""
 
     def __post_init__(self) -> None:
         """Check that the arrays fit one another.
 
         Raises:
-            ValueError: they do not, or a shape has a number of points that its kind cannot have.
+            ValueError: They do not, or a shape has an impossible number of points.
         """
         if self.first.shape != (len(self) + 1,) or self.first[0] != 0 or self.first[-1] != len(self.points):
             raise ValueError(
@@ -189,15 +199,14 @@ class Scene:
         basis: IntArray | None = None,
         **attributes: Any,
     ) -> Scene:
-        """Shapes with the ``attributes`` that are known.
+        """Return shapes with these ``attributes``.
 
         Args:
-            canvas: what they lie on.
-            kind: shape (shape,).
-            first: shape (shape + 1,).
-            basis: shape (shape,); default: cubics.
-            attributes: of the table, ``points`` among them; those left out are 0. Traits and contours as
-                well; those left out are the default.
+            canvas: The canvas.
+            kind: Kind of each shape, shape (shape,).
+            first: As the field, shape (shape + 1,).
+            basis: Basis of each shape, shape (shape,); None: cubics.
+            attributes: Any of ``ATTRIBUTES``, by default 0, and ``points``; traits and contours.
         """
         rows: dict[str, Any] = {
             a.name: np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
@@ -216,14 +225,14 @@ class Scene:
         basis: Basis = Basis.CUBIC,
         **attributes: FloatArray,
     ) -> Scene:
-        """Shapes of one kind and basis with equally many control points.
+        """Return shapes of one kind and basis with equally many control points.
 
         Args:
-            kind: of all shapes.
-            canvas: what they lie on.
-            points: shape (shape, point, 2).
-            basis: of all shapes.
-            attributes: the others of the table; those left out are 0.
+            kind: Kind of all shapes.
+            canvas: The canvas.
+            points: Control points, shape (shape, point, 2).
+            basis: Basis of all shapes.
+            attributes: Others of ``ATTRIBUTES``, by default 0.
         """
         count, each = points.shape[:2]
         return Scene.of(
@@ -236,46 +245,46 @@ class Scene:
         )
 
     def shape_of(self, attribute: Attribute) -> tuple[int, ...]:
-        """Shape of the array of ``attribute``."""
+        """Return the shape of an attribute's array."""
         rows = {"point": len(self.points), "shape": len(self), "stop": int(self.stop_first[-1])}[
             attribute.per
         ]
         return (rows, attribute.size) if attribute.size > 1 else (rows,)
 
     def point_counts(self) -> IntArray:
-        """Control points of each shape, shape (shape,)."""
+        """Return the number of control points of each shape, shape (shape,)."""
         return np.diff(self.first)
 
     def contour_shapes(self) -> IndexArray:
-        """The shape of each contour, shape (contour,)."""
+        """Return the index of each contour's shape, shape (contour,)."""
         owner = np.searchsorted(self.first, self.starts[:-1], "right") - 1
         return np.asarray(np.minimum(owner, len(self) - 1), np.intp)
 
     def contour_beziers(self) -> IntArray:
-        """Béziers of each contour, shape (contour,)."""
+        """Return the number of Béziers of each contour, shape (contour,)."""
         counts = np.diff(self.starts)
         spline = np.where(self.closed, counts, counts - 2)
         cubics = self.basis[self.contour_shapes()] == Basis.CUBIC
         return np.where(cubics, counts // 3, spline).astype(np.int32)
 
     def bezier_counts(self) -> IntArray:
-        """Béziers of each shape, shape (shape,)."""
+        """Return the number of Béziers of each shape, shape (shape,)."""
         owner = self.contour_shapes()
         return np.bincount(owner, self.contour_beziers(), len(self)).astype(np.int32)
 
     def points_of(self, shape: int) -> FloatArray:
-        """Control points of one shape, shape (point, 2)."""
+        """Return the control points of one shape, shape (point, 2)."""
         return self.points[self.first[shape] : self.first[shape + 1]]
 
     def contours_of(self, shape: int) -> list[tuple[FloatArray, bool]]:
-        """Points of each contour of a shape, shape (point, 2), and whether it is closed."""
+        """Return the points of each contour of a shape, shape (point, 2), and whether it is closed."""
         low, high = np.searchsorted(self.starts, self.first[shape : shape + 2])
         return [
             (self.points[self.starts[c] : self.starts[c + 1]], bool(self.closed[c])) for c in range(low, high)
         ]
 
     def alike(self) -> Iterator[Alike]:
-        """Groups of contours of shapes of one kind and basis with equally many points."""
+        """Yield contours grouped by kind, basis, closedness and number of points."""
         owner, counts = self.contour_shapes(), np.diff(self.starts)
         keys = np.stack([self.kind[owner], self.basis[owner], self.closed, counts], axis=1)
         for kind, basis, closed, count in sorted(set(map(tuple, keys.tolist()))):
@@ -284,7 +293,7 @@ class Scene:
             yield Alike(Kind(kind), Basis(basis), bool(closed), owner[index], index, points)
 
     def rows(self, attribute: Attribute, index: IndexArray) -> IndexArray:
-        """Rows of ``attribute``'s array that belong to the shapes ``index``, in that order."""
+        """Return the rows of an attribute's array that belong to the shapes ``index``, in that order."""
         if attribute.per == "shape":
             return index
         if attribute.per == "stop":
@@ -292,7 +301,7 @@ class Scene:
         return ranges(self.first[index], self.point_counts()[index])
 
     def take(self, index: IndexArray) -> Scene:
-        """The shapes ``index``, in that order. One that is taken without its twin is a shape of its own."""
+        """Return the shapes ``index``, in that order; one without its twin is no longer one."""
         index = np.asarray(index, np.intp)
         values: dict[str, Any] = {a.name: getattr(self, a.name)[self.rows(a, index)] for a in ATTRIBUTES}
         values |= {t.name: getattr(self, t.name)[index] for t in TRAITS}
@@ -311,19 +320,19 @@ class Scene:
         )
 
     def append(self, other: Scene) -> Scene:
-        """This scene with the shapes of ``other`` in front."""
+        """Return this scene with the shapes of ``other`` in front."""
         values: dict[str, Any] = {
             row.name: np.concatenate([getattr(self, row.name), getattr(other, row.name)])
             for row in (*ATTRIBUTES, *TRAITS)
         }
-        if other.dashes != self.dashes:
-            moved = np.where(other.dash >= 0, other.dash + len(self.dashes), other.dash)
-            values["dash"] = np.concatenate([self.dash, moved]).astype(np.int32)
-            values["dashes"] = (*self.dashes, *other.dashes)
-        if other.pictures != self.pictures:
-            moved = np.where(other.picture >= 0, other.picture + len(self.pictures), other.picture)
-            values["picture"] = np.concatenate([self.picture, moved]).astype(np.int32)
-            values["pictures"] = (*self.pictures, *other.pictures)
+        for name, rows in (("dash", "dashes"), ("picture", "pictures")):
+            own, others = getattr(self, rows), getattr(other, rows)
+            if others != own:
+                index = getattr(other, name)
+                values[name] = np.append(getattr(self, name), index + len(own) * (index >= 0)).astype(
+                    np.int32
+                )
+                values[rows] = (*own, *others)
         return replace(
             self,
             kind=np.concatenate([self.kind, other.kind]),
@@ -336,23 +345,23 @@ class Scene:
         )
 
     def without_points(self, keep: npt.NDArray[np.bool_]) -> Scene:
-        """The same shapes with only the points ``keep``, shape (point,)."""
+        """Return the shapes with only the points ``keep``, shape (point,)."""
         left = np.concatenate([[0], np.cumsum(keep)]).astype(np.int32)
         return replace(self, first=left[self.first], starts=left[self.starts], points=self.points[keep])
 
 
 def ranges(low: npt.NDArray[np.integer], counts: npt.NDArray[np.integer]) -> IndexArray:
-    """Numbers from each of ``low`` on, so many each, in a row."""
+    """Return ``counts`` consecutive numbers from each of ``low``, concatenated."""
     counts = counts.astype(np.intp)
     ends = np.cumsum(counts)
     return np.repeat(low - (ends - counts), counts) + np.arange(counts.sum())
 
 
 def starts_of(counts: npt.NDArray[np.integer]) -> IntArray:
-    """Prefix sum with a 0 in front: ``Scene.first`` of shapes with ``counts`` points."""
+    """Return prefix sums with a 0 in front: ``Scene.first`` of shapes with ``counts`` points."""
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
 
 
 def level_ends(scene: Scene) -> tuple[int, ...]:
-    """Shapes of each layer and of those before it; not of the last, which has all."""
+    """Return the number of shapes up to the end of each layer but the last."""
     return tuple(int(i) + 1 for i in np.flatnonzero(np.diff(scene.layer)))

@@ -1,4 +1,4 @@
-"""What a nested viewport leaves of shapes, and whether shapes overlap."""
+"""Clipping of shapes by nested viewports and ``clip-path``, and whether shapes overlap."""
 
 from __future__ import annotations
 
@@ -11,22 +11,28 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import product
-from warpsplat.svg.paths import Points, Subpath, line
+from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.geometry import Matrix, about, moved, outline, parse_transform
+from warpsplat.svg.gradients import parse_link
+from warpsplat.svg.paths import Points, Subpath, cubics, line
 from warpsplat.svg.shapes import Shape
+from warpsplat.svg.values import Viewport, check_length
 
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""
 
-
 NEAR_END = 1e-9
-"""Cubics are not cut nearer to their ends than this, of their parameter."""
+"""Cubics are not cut closer to their ends than this, in their parameter."""
 
 OVERLAP_SHAPES = 2000
 """Most shapes of a group that are compared with each other."""
 
+EDGE = 1e-3
+"""Overlap [px] of boxes that still counts as touching."""
+
 
 def overlap(shapes: list[Shape]) -> bool:
-    """Whether shapes overlap, as far as boxes tell."""
+    """Return whether the boxes of shapes overlap."""
     if len(shapes) < 2:
         return False
     if len(shapes) > OVERLAP_SHAPES:
@@ -36,15 +42,11 @@ def overlap(shapes: list[Shape]) -> bool:
     return bool(np.all((low[:, None] < high) & (low < high[:, None]), axis=2).sum() > len(shapes))
 
 
-EDGE = 1e-3
-"""By how much boxes that only touch may overlap [px]."""
-
-
 def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
-    """What is seen of shapes within a convex polygon.
+    """Return the parts of shapes inside a convex polygon.
 
     Raises:
-        ImageError: a stroke reaches beyond it.
+        ImageError: A stroke reaches beyond it.
     """
     ring = _oriented(corners)
     if ring is None:
@@ -56,12 +58,11 @@ def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
         elif is_outside:
             continue
         elif shape.line is None:
-            parts = [part for part in (cut_subpath(s, ring) for s in shape.subpaths) if part]
-            if parts:
+            if parts := [part for part in (cut_subpath(s, ring) for s in shape.subpaths) if part]:
                 kept.append(replace(shape, subpaths=parts, is_rect=False, known_box=[]))
         else:
             raise ImageError("a stroke that a viewport cuts off is not supported")
-    # A shape that was cut shares its points with none.
+    # A shape that was cut no longer shares its points.
     return [
         replace(shape, is_twin=False)
         if shape.is_twin and (i == 0 or kept[i - 1].subpaths is not shape.subpaths)
@@ -71,7 +72,7 @@ def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
 
 
 def within(shapes: list[Shape], corners: Points) -> list[Shape]:
-    """The shapes that a convex polygon cuts nothing off."""
+    """Return the shapes that lie wholly inside a convex polygon."""
     ring = _oriented(corners)
     if ring is None:
         return []
@@ -79,7 +80,7 @@ def within(shapes: list[Shape], corners: Points) -> list[Shape]:
 
 
 def _oriented(corners: Points) -> Points | None:
-    """The corners so that the inside lies to the left of the sides; None where there is none."""
+    """Return the corners with the inside to the left of the sides; None if the area is 0."""
     following = np.roll(corners, -1, axis=0)
     doubled = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
     if not abs(doubled) > TOLERANCE:
@@ -88,7 +89,7 @@ def _oriented(corners: Points) -> Points | None:
 
 
 def _places(shapes: list[Shape], ring: Points) -> tuple[list[bool], list[bool]]:
-    """Whether each shape lies inside of a polygon, and outside, as far as its box tells."""
+    """Return whether each shape's box lies inside a polygon, and whether it lies outside."""
     if not shapes:
         return [], []
     boxes = np.stack([shape.box() for shape in shapes])
@@ -100,25 +101,29 @@ def _places(shapes: list[Shape], ring: Points) -> tuple[list[bool], list[bool]]:
 
 
 def _heights(points: Points, a: Points, b: Points) -> Points:
-    """Distances of points from a line, positive to its left."""
-    way = (b - a) / hypot(*(b - a))
-    return product(points - a, [-way[1], way[0]])
+    """Return distances of points from the line from ``a`` to ``b``, positive to its left."""
+    return product(points - a, _normal(a, b))
+
+
+def _normal(a: Points, b: Points) -> Points:
+    """Return the unit vector to the left of the line from ``a`` to ``b``."""
+    x, y = (b - a) / hypot(*(b - a))
+    return np.array([-y, x])
 
 
 def cut_subpath(subpath: Subpath, corners: Points) -> Subpath | None:
-    """A closed subpath of a fill within a convex polygon; None if nothing is left.
+    """Return a closed subpath of a fill within a convex polygon; None if nothing is left.
 
-    Side by side (Sutherland and Hodgman): what lies beyond a side becomes a straight line along it, so that
-    the windings inside stay what they were.
+    Cut by one side after another (Sutherland and Hodgman): what lies beyond a side becomes a straight line
+    along it, so that winding numbers inside stay.
 
     Args:
-        subpath: what to cut; one that is open is closed by a straight line.
-        corners: of the polygon, counted so that its inside lies to the left of its sides, shape (corner, 2).
+        subpath: What to cut; an open one is closed by a straight line.
+        corners: The polygon's corners, its inside to the left of its sides, shape (corner, 2).
     """
     chain = _cubics(subpath.points)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        way = (b - a) / hypot(*(b - a))
-        chain = _cut(chain, a, np.array([-way[1], way[0]]))
+        chain = _cut(chain, a, _normal(a, b))
         if not chain:
             return None
     points = np.concatenate([chain[0][:1], *(cubic[1:] for cubic in chain)])
@@ -137,7 +142,7 @@ def _straight(start: Points, end: Points) -> Points:
 
 
 def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
-    """The part of a closed chain of cubics where ``(point - at) . inward`` is not negative."""
+    """Return the part of a closed chain of cubics where ``(point - at) . inward`` is not negative."""
     kept: list[Points] = []
     for cubic in chain:
         for piece in _split(cubic, product(cubic - at, inward)):
@@ -152,7 +157,7 @@ def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
 
 
 def _split(cubic: Points, heights: Points) -> list[Points]:
-    """A cubic in pieces each on one side of a line that its points are ``heights`` above."""
+    """Split a cubic into pieces that are each on one side of a line; ``heights``: of its points above it."""
     if (heights >= -TOLERANCE).all() or (heights <= TOLERANCE).all():
         return [cubic]
     pieces, start = [], 0.0
@@ -164,19 +169,19 @@ def _split(cubic: Points, heights: Points) -> list[Points]:
 
 
 def _zeros(a: float, b: float, c: float, d: float) -> list[float]:
-    """Where between 0 and 1 a cubic with these control heights changes its sign, ascending."""
+    """Return where between 0 and 1 a cubic with these control values changes its sign, ascending."""
 
     def height(t: float) -> float:
         return a + t * (3 * (b - a) + t * (3 * (c - 2 * b + a) + t * (d - 3 * c + 3 * b - a)))
 
-    # Between its turns a cubic is monotonic; they are where u t^2 + 2 v t + w is 0.
+    # A cubic is monotonic between its extrema, where u t^2 + 2 v t + w is 0.
     u, v, w = d - 3 * c + 3 * b - a, c - 2 * b + a, b - a
     root = v + math.copysign(math.sqrt(max(v * v - u * w, 0.0)), v)
-    turns = [top / bottom for top, bottom in ((-root, u), (w, -root)) if abs(top) < abs(bottom)]
-    # Where it is 0 at a turn it touches, or crosses level.
-    turns = sorted(t for t in turns if NEAR_END < t < 1 - NEAR_END and height(t) != 0)
+    extrema = [top / bottom for top, bottom in ((-root, u), (w, -root)) if abs(top) < abs(bottom)]
+    # Where an extremum is 0, the curve touches the line or crosses it with a slope of 0.
+    extrema = sorted(t for t in extrema if NEAR_END < t < 1 - NEAR_END and height(t) != 0)
     found = []
-    for low, high in pairwise([NEAR_END, *turns, 1 - NEAR_END]):
+    for low, high in pairwise([NEAR_END, *extrema, 1 - NEAR_END]):
         if (height(low) > 0) == (height(high) > 0):
             continue
         start, end = (low, high) if height(high) > 0 else (high, low)
@@ -187,7 +192,7 @@ def _zeros(a: float, b: float, c: float, d: float) -> list[float]:
 
 
 def _halves(cubic: Points, t: float) -> tuple[Points, Points]:
-    """Both parts of a cubic, cut at ``t`` (de Casteljau)."""
+    """Return both parts of a cubic, cut at ``t`` (de Casteljau)."""
     rows = [cubic]
     while len(rows[-1]) > 1:
         rows.append(rows[-1][:-1] + t * (rows[-1][1:] - rows[-1][:-1]))
@@ -195,7 +200,43 @@ def _halves(cubic: Points, t: float) -> tuple[Points, Points]:
 
 
 def polygon(corners: Points) -> Subpath:
-    """A closed polygon with these corners."""
+    """Return a closed polygon with these corners, shape (corner, 2)."""
     ring = [*map(complex, *corners.T), complex(*corners[0])]
     points = [ring[0], *(z for a, b in pairwise(ring) for z in line(a, b))]
     return Subpath(np.array([(z.real, z.imag) for z in points]), True, False)
+
+
+def clip_rectangle(link: str, document: Document, matrix: Matrix, viewport: Viewport) -> Points | None:
+    """Return the corners of a ``clip-path`` that is one rectangle (SVG 1.1, 14.3); None: there is no clip.
+
+    Raises:
+        ImageError: It is not a rectangle.
+    """
+    if link == "none":
+        return None
+    found = parse_link(link)
+    element = document.called(found[0]) if found else None
+    content = document.once(_content, element) if element is not None else None
+    if element is not None and content is not None:
+        units = element.get("clipPathUnits", "userSpaceOnUse")
+        for part in (element, content):
+            style = document.style_of(part)
+            own = about(style["transform-origin"], viewport, parse_transform(style["transform"]))
+            matrix = product(matrix, own)
+            units += "" if style["clip-path"] == "none" and style["display"] != "none" else " clipped"
+        drawn = cubics(outline("rect", content.attrib, viewport), keep_dots=False)
+        is_rect = style["visibility"] == "visible" and drawn and len(drawn[0].points) == 13
+        if units == "userSpaceOnUse" and is_rect:
+            return moved(matrix, drawn[0].points[:12:3])
+    raise ImageError("uses a clip-path that is no rectangle, not supported")
+
+
+def _content(element: Element, document: Document) -> Element | None:
+    """Return the only element in a ``clipPath`` if it is a rectangle, else None."""
+    content = [child for child in element if name_of(child)]
+    if name_of(element) != "clipPath" or len(content) != 1 or name_of(content[0]) != "rect":
+        return None
+    for part in (element, content[0]):
+        for name, value in document.style_of(part).items() | part.attrib.items():
+            check_length(name, value)
+    return content[0]

@@ -1,12 +1,13 @@
-"""Lines and cubics in the path commands that take the fewest characters (SVG 1.1, 8.3).
+"""Outlines as the path data with the fewest characters (SVG 1.1, 8.3).
 
-Each may be said in several ways: relative or absolute, level and upright lines by one number, a cubic whose
-first handle mirrors the one before without it; and a command that is the one before needs no letter. The
-shortest text is found by dynamic programming over the last letter.
+A segment may be written in several ways: relative or absolute, level and upright lines by one number, a cubic
+whose first handle mirrors the one before without it; and a command equal to the one before needs no letter.
+The shortest text is found by dynamic programming over the last letter.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -18,31 +19,29 @@ class Segment(NamedTuple):
 
     start: Pair
     handles: tuple[Pair, Pair] | None
-    """Of a cubic; None: a line."""
+    """None: a line."""
     end: Pair
 
     def has_extent(self) -> bool:
-        """Whether it is more than a point."""
+        """Return whether it is more than a point."""
         return self.end != self.start or self.handles not in (None, (self.start, self.start))
 
     def mirrored(self) -> Pair:
-        """The first handle that a smooth cubic has behind it."""
+        """Return the first handle of a smooth cubic that follows."""
         if self.handles is None:
             return self.end
         (x, y), (u, v) = self.end, self.handles[1]
         return 2 * x - u, 2 * y - v
 
 
-class Written(NamedTuple):
-    """What is written so far: a chain, so that a long contour is not copied with each piece."""
+class _Written(NamedTuple):
+    """Path data so far, as a linked list: a long contour is not copied with each segment."""
 
     length: int
     added: str
-    """What came last."""
-    before: Written | None
+    before: _Written | None
 
     def text(self) -> str:
-        """All of it."""
         parts, last = [], self
         while last.before:
             parts.append(last.added)
@@ -51,120 +50,136 @@ class Written(NamedTuple):
 
 
 def minus(a: Pair, b: Pair) -> Pair:
-    """The way from ``b`` to ``a``."""
+    """Return the vector from ``b`` to ``a``."""
     return a[0] - b[0], a[1] - b[1]
 
 
 def row(numbers: Sequence[int], separated: bool) -> str:
-    """Numbers with the fewest separators: a sign separates itself. ``separated``: something stands before."""
-    text = " ".join(map(str, numbers)).replace(" -", "-")
+    """Return numbers with the fewest separators; ``separated``: also from what stands before."""
+    text = " ".join(map(str, numbers)).replace(" -", "-")  # a sign separates
     return f" {text}" if separated and numbers[0] >= 0 else text
 
 
 IMPLIED = {"M": "L", "m": "l"}
-"""What pairs behind a move are (SVG 1.1, 8.3.2)."""
+"""The commands that pairs after a move stand for (SVG 1.1, 8.3.2)."""
 
 
-def _ways(segment: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
-    """Commands that draw ``segment``; ``mirrored``: the first handle that smooth ones have."""
+def choices(segment: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
+    """Return the commands that draw ``segment``; ``mirrored``: the first handle of a smooth cubic."""
     start, handles, end = segment
     dx, dy = minus(end, start)
     if handles is None:
-        ways: list[tuple[str, tuple[int, ...]]] = [("l", (dx, dy)), ("L", end)]
+        found: list[tuple[str, tuple[int, ...]]] = [("l", (dx, dy)), ("L", end)]
         if dy == 0:
-            ways += [("h", (dx,)), ("H", (end[0],))]
+            found += [("h", (dx,)), ("H", (end[0],))]
         if dx == 0:
-            ways += [("v", (dy,)), ("V", (end[1],))]
-        return ways
+            found += [("v", (dy,)), ("V", (end[1],))]
+        return found
     first, second = handles
-    ways = [
-        ("c", (*minus(first, start), *minus(second, start), dx, dy)),
-        ("C", (*first, *second, *end)),
-    ]
+    found = [("c", (*minus(first, start), *minus(second, start), dx, dy)), ("C", (*first, *second, *end))]
     if first == mirrored:
-        ways += [("s", (*minus(second, start), dx, dy)), ("S", (*second, *end))]
-    return ways
-
-
-class Way(NamedTuple):
-    """A command that draws a segment."""
-
-    letter: str
-    after_another: str
-    """Its numbers, where the letter need not be said."""
-    fresh: str
-    """With the letter."""
-
-
-def _written_ways(segment: Segment, mirrored: Pair) -> list[Way]:
-    """``_ways`` as text."""
-    found = []
-    for letter, numbers in _ways(segment, mirrored):
-        text = row(numbers, False)
-        found.append(Way(letter, f" {text}" if numbers[0] >= 0 else text, letter + text))
+        found += [("s", (*minus(second, start), dx, dy)), ("S", (*second, *end))]
     return found
 
 
+class _Command(NamedTuple):
+    """A command that draws a segment, as text."""
+
+    letter: str
+    repeated: str
+    """Behind the same command: its numbers only."""
+    full: str
+
+
+def _commands(segment: Segment, mirrored: Pair) -> list[_Command]:
+    """Return ``choices`` as text."""
+    return [
+        _Command(letter, row(numbers, True), letter + row(numbers, False))
+        for letter, numbers in choices(segment, mirrored)
+    ]
+
+
 def shortest(pen: Pair | None, segments: Sequence[Segment]) -> str:
-    """Path data of a contour, from its move on; ``pen``: where the one before ended, if there is one."""
+    """Return path data of a contour, its move included; ``pen``: where the contour before ended, if any."""
     start = segments[0].start
     mirrored = [start, *(segment.mirrored() for segment in segments[:-1])]
-    return _shortest(pen, start, map(_written_ways, segments, mirrored))
+    return _shortest(pen, start, map(_commands, segments, mirrored))
 
 
-def _shortest(pen: Pair | None, start: Pair, ways_of: Iterable[Sequence[Way]]) -> str:
-    """The same of segments of which only the ways to write them are known."""
+def _shortest(pen: Pair | None, start: Pair, commands: Iterable[Sequence[_Command]]) -> str:
+    """Return the shortest path data, given the commands that may draw each segment."""
     moves = {"M": f"M{row(start, False)}", "m": f"m{row(minus(start, pen or (0, 0)), False)}"}
-    best = {letter: Written(len(text), text, None) for letter, text in moves.items()}
-    for ways in ways_of:
-        after: dict[str, Written] = {}
-        for letter, written in best.items():
-            implied, length = IMPLIED.get(letter, letter), written.length
-            for way, after_another, fresh in ways:
-                added = after_another if way == implied else fresh
+    best = {letter: _Written(len(text), text, None) for letter, text in moves.items()}
+    for options in commands:
+        after: dict[str, _Written] = {}
+        for last, written in best.items():
+            implied, length = IMPLIED.get(last, last), written.length
+            for letter, repeated, full in options:
+                added = repeated if letter == implied else full
                 total = length + len(added)
-                if way not in after or total < after[way].length:
-                    after[way] = Written(total, added, written)
+                if letter not in after or total < after[letter].length:
+                    after[letter] = _Written(total, added, written)
         best = after
     least = min(written.length for written in best.values())
     return min(written.text() for written in best.values() if written.length == least)
 
 
 STARTS = 4
-"""Starts of a ring that are tried: those that promise most."""
+"""Most promising starts of a ring that are tried."""
 
 
 def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]:
-    """Path data of a ring that a fill closes, from where it is shortest, and where its last command ends.
+    """Return path data of a ring that a fill closes, from its best start, and where its last command ends.
 
     A line that comes last need not be written.
     """
     behind = [segments[-1], *segments[:-1]]
-    ways = [
-        _written_ways(segment, before.mirrored()) for before, segment in zip(behind, segments, strict=True)
+    commands = [
+        _commands(segment, before.mirrored()) for before, segment in zip(behind, segments, strict=True)
     ]
     promise = []
     for i, (before, segment) in enumerate(zip(behind, segments, strict=True)):
         spared = 0
         if before.handles is None and len(segments) > 1:
-            spared = 1 + min(len(way.after_another) for way in ways[i - 1])
+            spared = 1 + min(len(command.repeated) for command in commands[i - 1])
         promise.append((len(row(segment.start, False)) - spared, segment.start, i))
     found = []
     for _, start, i in sorted(promise)[:STARTS]:
-        # Behind the move no handle is mirrored.
-        turned = [_written_ways(segments[i], start), *ways[i + 1 :], *ways[:i]]
+        # No handle is mirrored behind the move.
+        rotated = [_commands(segments[i], start), *commands[i + 1 :], *commands[:i]]
         last = i - 1
-        if behind[i].handles is None and len(turned) > 1:
-            turned.pop()
+        if behind[i].handles is None and len(rotated) > 1:
+            rotated.pop()
             last -= 1
-        found.append((_shortest(pen, start, turned), segments[last].end))
+        found.append((_shortest(pen, start, rotated), segments[last].end))
     return min(found, key=lambda one: len(one[0]))
 
 
 def segments_of(grid: Sequence[Pair], straight: Sequence[bool], closed: bool) -> list[Segment]:
-    """Pieces of a chain of cubics; ``straight``: which of them are lines."""
+    """Return the segments of a chain of cubics; ``straight``: which of them are lines."""
     chain = [*grid, grid[0]] if closed else grid
     return [
         Segment(chain[3 * i], None if is_line else (chain[3 * i + 1], chain[3 * i + 2]), chain[3 * i + 3])
         for i, is_line in enumerate(straight)
     ]
+
+
+SMALL = 300
+"""Largest coordinates for which ``shortest_smooth`` is worth its time: larger absolute ones are hardly ever
+shorter than relative ones."""
+
+
+def shortest_smooth(joints: Sequence[Pair], control: Pair) -> str:
+    """Return path data of smooth quadratics through ``joints``; ``control``: that of the first one."""
+    start, end = joints[:2]
+    relative = "q" + row((*minus(control, start), *minus(end, start)), False)
+    absolute = "Q" + row((*control, *end), False)
+    best = {text[0]: f"M{row(start, False)}{text}" for text in (relative, absolute)}
+    for before, after in itertools.pairwise(joints[1:]):
+        found = {}
+        for letter, numbers in (("t", minus(after, before)), ("T", after)):
+            repeated, full = row(numbers, True), letter + row(numbers, False)
+            texts = (text + (repeated if last == letter else full) for last, text in best.items())
+            found[letter] = min(texts, key=lambda text: (len(text), text))
+        best = found
+    return min(best.values(), key=lambda text: (len(text), text))

@@ -1,7 +1,13 @@
-"""Style sheets: rules, selectors and which of them say something of an element (CSS 2.1, sections 4 to 6)."""
+"""Style sheets: rules, selectors, and the declarations that apply to an element (CSS 2.1, sections 4 to 6).
+
+Selectors may ask for tags, ids, classes, attributes and first children, of descendants and children: the part
+of CSS that resvg reads. Matching is linear in the document's depth whatever the selector, unlike matchers
+that backtrack.
+"""
 
 from __future__ import annotations
 
+import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,12 +17,13 @@ from xml.etree import ElementTree
 from warpsplat.errors import ImageError
 from warpsplat.svg.values import check_length
 
-Parents = Mapping[ElementTree.Element, ElementTree.Element]
-Classes = Callable[[ElementTree.Element], frozenset[str]]
+Element = ElementTree.Element
+Parents = Mapping[Element, Element]
+Classes = Callable[[Element], frozenset[str]]
 
 
 class Declaration(NamedTuple):
-    """What a rule or a ``style`` attribute says of a property."""
+    """The value that a rule or a ``style`` attribute gives to a property."""
 
     name: str
     value: str
@@ -30,16 +37,16 @@ IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 
 
 def without_comments(css: str) -> str:
-    """The text without its comments."""
+    """Return the text without its comments."""
     first, *others = css.split("/*")
     return first + "".join(part.partition("*/")[2] for part in others)
 
 
 def declarations(text: str) -> Iterator[Declaration]:
-    """The declarations of a rule or of a ``style`` attribute.
+    """Yield the declarations of a rule or of a ``style`` attribute.
 
     Raises:
-        ImageError: one has no name: viewers differ in what they skip then.
+        ImageError: A declaration has no name: viewers differ in what they skip then.
     """
     for part in PART.findall(without_comments(text)):
         name, _, value = part.partition(":")
@@ -52,127 +59,151 @@ def declarations(text: str) -> Iterator[Declaration]:
         yield Declaration(name, value[: found.start()].strip() if found else value.strip(), found is not None)
 
 
-@dataclass(frozen=True)
-class _Compound:
+AT_RULE = re.compile(r"@(?:charset|namespace)\b[^;{}]{0,1000};|@font-face\s*\{[^{}]*\}")
+"""At-rules that style no element. The bound keeps a long row of unterminated ones from being searched to the
+end of the text each."""
+
+
+def split_at_rules(css: str) -> tuple[list[str], str]:
+    """Return the at-rules that style no element, and the rest of a sheet; both without comments."""
+    css = without_comments(css).replace("<!--", "").replace("-->", "")
+    return AT_RULE.findall(css), AT_RULE.sub("", css)
+
+
+def rules(css: str) -> Iterator[tuple[str, str]]:
+    """Yield selectors and declarations of each rule of a text without comments and at-rules."""
+    parts = re.split(r"([{}])", css)  # texts, and the braces between them
+    for i in range(1, len(parts) - 2, 2):
+        if parts[i] == "{" and parts[i + 2] == "}":
+            yield parts[i - 1], parts[i + 1]
+
+
+def ancestors(element: Element, parents: Parents) -> list[Element]:
+    """Return the elements around an element, from its parent to the root."""
+    found: list[Element] = []
+    while element in parents:
+        element = parents[element]
+        found.append(element)
+    return found
+
+
+def _local_name(element: Element) -> str:
+    return str(element.tag).rpartition("}")[2]
+
+
+OPERATORS: dict[str, Callable[[str, str], bool]] = {
+    "": lambda value, wanted: True,
+    "=": operator.eq,
+    "~=": lambda value, wanted: wanted in value.split(),
+    "|=": lambda value, wanted: value == wanted or value.startswith(f"{wanted}-"),
+    "^=": str.startswith,
+    "$=": str.endswith,
+    "*=": operator.contains,
+}
+"""Tests of an attribute's value."""
+
+SPECIFICITY = {
+    "id": (1, 0, 0),
+    "class": (0, 1, 0),
+    "attribute": (0, 1, 0),
+    "first": (0, 1, 0),
+    "tag": (0, 0, 1),
+}
+
+
+class _Condition(NamedTuple):
+    """A tag, id, class, attribute or position that a selector asks for."""
+
+    kind: str
+    name: str
+    operator: str = ""
+    value: str = ""
+
+    def holds(self, element: Element, parents: Parents, classes: Classes) -> bool:
+        if self.kind == "tag":
+            return _local_name(element) == self.name
+        if self.kind == "id":
+            return element.get("id") == self.name
+        if self.kind == "class":
+            return self.name in classes(element)
+        if self.kind == "first":
+            return element not in parents or parents[element][0] is element
+        value = element.get(self.name)
+        return value is not None and OPERATORS[self.operator](value, self.value)
+
+
+class _Compound(NamedTuple):
     """Conditions on one element."""
 
-    tag: str
-    """Empty: any."""
-    ids: tuple[str, ...]
-    classes: tuple[str, ...]
-    attributes: tuple[tuple[str, str, str], ...]
-    """Name, operator (empty: it is there) and value."""
-    is_first: bool
+    conditions: list[_Condition]
     is_child: bool
-    """Of an element that the compound before is about; else only inside it."""
+    """Whether the compound before is about the element's parent, rather than any ancestor."""
 
-    def matches(self, element: ElementTree.Element, parents: Parents, classes: Classes) -> bool:
-        if self.tag and str(element.tag).rpartition("}")[2] != self.tag:
-            return False
-        if any(element.get("id") != name for name in self.ids):
-            return False
-        if self.classes and not classes(element).issuperset(self.classes):
-            return False
-        if self.is_first and element in parents and parents[element][0] is not element:
-            return False
-        return all(_attribute_matches(element.get(name), how, what) for name, how, what in self.attributes)
+    def matches(self, element: Element, parents: Parents, classes: Classes) -> bool:
+        return all(condition.holds(element, parents, classes) for condition in self.conditions)
 
-    def weight(self) -> tuple[int, int, int]:
-        return len(self.ids), len(self.classes) + len(self.attributes) + self.is_first, int(self.tag != "")
-
-
-def _attribute_matches(value: str | None, operator: str, wanted: str) -> bool:
-    if value is None:
-        return False
-    if operator == "~=":
-        return wanted in value.split()
-    if operator == "|=":
-        return value == wanted or value.startswith(f"{wanted}-")
-    if operator == "^=":
-        return value.startswith(wanted)
-    if operator == "$=":
-        return value.endswith(wanted)
-    if operator == "*=":
-        return wanted in value
-    return not operator or value == wanted
+    def key(self) -> str:
+        """Return an id, class or tag that the element must have; empty: none."""
+        names = {condition.kind: condition.name for condition in reversed(self.conditions)}
+        if "id" in names:
+            return f"#{names['id']}"
+        return f".{names['class']}" if "class" in names else names.get("tag", "")
 
 
 STEP = re.compile(
-    r"""(?P<child>\s*>\s*)|(?P<inside>\s+)|\#(?P<id>[\w-]+)|\.(?P<class>[\w-]+)|(?P<tag>\*|[\w-]+)"""
-    r"""|\[\s*(?P<name>[\w:-]+)\s*(?:(?P<how>[~|^$*]?=)\s*(?P<what>"[^"]*"|'[^']*'|[\w-]+)\s*)?\]"""
-    r"""|:(?P<first>first-child)"""
+    r"""(?P<combinator>\s*>\s*|\s+)|\#(?P<id>[\w-]+)|\.(?P<class>[\w-]+)|(?P<tag>\*|[\w-]+)"""
+    r"""|:(?P<first>first-child)|\[\s*(?P<attribute>[\w:-]+)\s*"""
+    r"""(?:(?P<operator>[~|^$*]?=)\s*(?P<value>"[^"]*"|'[^']*'|[\w-]+)\s*)?\]"""
 )
 
 
-def _compounds(selector: str) -> tuple[_Compound, ...]:
-    """The parts of a selector from left to right.
+def _parse_selector(selector: str) -> list[_Compound]:
+    """Return the compounds of a selector from left to right.
 
     Raises:
-        ImageError: a selector of a kind that is not read.
+        ImageError: The selector is of a kind that is not supported.
     """
     refusal = ImageError(f"uses the style sheet selector {selector[:40]!r}, not supported")
-    result: list[_Compound] = []
-    parts: list[re.Match[str]] = []
-    is_child = False
-
-    def finish() -> None:
-        if not parts or any(part["tag"] for part in parts[1:]):
-            raise refusal
-        result.append(
-            _Compound(
-                (parts[0]["tag"] or "").replace("*", ""),
-                tuple(part["id"] for part in parts if part["id"]),
-                tuple(part["class"] for part in parts if part["class"]),
-                tuple(
-                    (p["name"], p["how"] or "", (p["what"] or "").strip("\"'")) for p in parts if p["name"]
-                ),
-                any(part["first"] for part in parts),
-                is_child,
-            )
-        )
-        parts.clear()
-
-    position = 0
+    compounds, is_empty, position = [_Compound([], False)], True, 0
     while position < len(selector):
         found = STEP.match(selector, position)
-        if not found:
+        if not found or (found["combinator"] and is_empty) or (found["tag"] and not is_empty):
             raise refusal
-        position = found.end()
-        if found["child"] or found["inside"]:
-            finish()
-            is_child = bool(found["child"])
-        else:
-            parts.append(found)
-    finish()
-    return tuple(result)
+        position, is_empty = found.end(), bool(found["combinator"])
+        if is_empty:
+            compounds.append(_Compound([], ">" in found["combinator"]))
+        elif found["tag"] != "*":
+            kind = next(kind for kind in SPECIFICITY if found[kind])
+            value = (found["value"] or "").strip("\"'")
+            compounds[-1].conditions.append(_Condition(kind, found[kind], found["operator"] or "", value))
+    if is_empty:
+        raise refusal
+    return compounds
 
 
 @dataclass(frozen=True)
 class _Rule:
-    compounds: tuple[_Compound, ...]
+    compounds: list[_Compound]
     declarations: tuple[Declaration, ...]
     order: tuple[tuple[int, ...], int]
     """Specificity and place in the sheet."""
 
     @property
-    def reads_text(self) -> bool:
-        """Whether it looks into values of attributes."""
-        return any(compound.attributes for compound in self.compounds)
+    def reads_attributes(self) -> bool:
+        return any(one.kind == "attribute" for compound in self.compounds for one in compound.conditions)
 
-    def matches(self, element: ElementTree.Element, parents: Parents, classes: Classes) -> bool:
+    def matches(self, element: Element, parents: Parents, classes: Classes) -> bool:
         *outer, last = self.compounds
         if not last.matches(element, parents, classes):
             return False
         if not outer:
             return True
-        path = [element]
-        while path[-1] in parents:
-            path.append(parents[path[-1]])
-        # Whether the compounds up to each match, the last of them at or above an element of the path.
-        inside = [True] + len(outer) * [False]
-        above = [False] * (len(outer) + 1)
-        for node in reversed(path[1:]):
-            here = [False] * (len(outer) + 1)
+        # From the root inwards: whether the first i compounds match, the last of them at the node above, or
+        # at any node above.
+        above = [True] + len(outer) * [False]
+        inside = [*above]
+        for node in reversed(ancestors(element, parents)):
+            here = [False] * len(above)
             for i, compound in enumerate(outer):
                 before = above[i] if compound.is_child else inside[i]
                 here[i + 1] = before and compound.matches(node, parents, classes)
@@ -183,98 +214,67 @@ class _Rule:
 
 ANIMATED = "uses animation, not supported: take the still SVG of the same picture"
 
-AT_RULE = re.compile(r"@(?:charset|namespace)\b[^;{}]{0,1000};|@font-face\s*\{[^{}]*\}")
-"""Those that say nothing of elements. Without a bound, each of many that do not end is looked through to the
-end of the text."""
-
-
-def rules(css: str) -> Iterator[tuple[str, str]]:
-    """Selectors and declarations of each rule of a text without comments and at-rules."""
-    parts = re.split(r"([{}])", css)  # texts, and what stands between them
-    for i in range(1, len(parts) - 2, 2):
-        if parts[i] == "{" and parts[i + 2] == "}":
-            yield parts[i - 1], parts[i + 1]
-
-
 MAX_WORK = 5_000_000
-"""Most looks at elements to find out which rules say something of them: they are as many as rules times
-elements where selectors are plain."""
+"""Most tests of elements to find the rules that apply to them: with plain selectors, rules times elements."""
+
+DECLARATION_WORK = 10
+"""Tests of an element that take as long as applying a rule."""
+
+CHARACTERS = 100
+"""Characters of an attribute that take as long to test as an element."""
 
 
 class StyleSheet:
-    """The rules of an SVG's ``style`` elements.
-
-    Selectors may name elements, classes, ids, attributes and first children, of children and descendants.
-    """
+    """The rules of an SVG's ``style`` elements."""
 
     def __init__(self, css: str, known: frozenset[str]) -> None:
-        """Of the properties ``known``.
+        """Parse a sheet, of which only the properties ``known`` count.
 
         Raises:
-            ImageError: other selectors or at-rules, where they are about such properties.
+            ImageError: Unsupported at-rules, or selectors that set such properties.
         """
         self._rules: dict[str, list[_Rule]] = {}
-        """By what the last compound asks for first."""
-        self._classes: dict[ElementTree.Element, frozenset[str]] = {}
+        """By ``_Compound.key`` of the last compound."""
+        self._classes: dict[Element, frozenset[str]] = {}
         self._work = 0
-        css = AT_RULE.sub("", without_comments(css).replace("<!--", "").replace("-->", ""))
+        _, css = split_at_rules(css)
         if "@keyframes" in css:
             raise ImageError(ANIMATED)
         if "@" in css:
             raise ImageError("uses a style sheet with @-rules, not supported")
         for place, (selectors, body) in enumerate(rules(css)):
-            said = tuple(d for d in declarations(body) if d.name in known)
-            for one in said:
+            own = tuple(d for d in declarations(body) if d.name in known)
+            for one in own:
                 check_length(one.name, one.value)
-            for selector in selectors.split(",") if said else ():
-                compounds = _compounds(selector.strip())
-                weight = tuple(map(sum, zip(*(c.weight() for c in compounds), strict=True)))
-                self._rules.setdefault(_key(compounds[-1]), []).append(
-                    _Rule(compounds, said, (weight, place))
-                )
+            for selector in selectors.split(",") if own else ():
+                compounds = _parse_selector(selector.strip())
+                weights = [SPECIFICITY[one.kind] for compound in compounds for one in compound.conditions]
+                weight = tuple(map(sum, zip((0, 0, 0), *weights, strict=True)))
+                rule = _Rule(compounds, own, (weight, place))
+                self._rules.setdefault(compounds[-1].key(), []).append(rule)
 
-    def of(self, element: ElementTree.Element, parents: Parents) -> Sequence[Declaration]:
+    def of(self, element: Element, parents: Parents) -> Sequence[Declaration]:
         """Return the declarations that apply to an element, the strongest last.
 
         Raises:
-            ImageError: there are too many rules for too many elements.
+            ImageError: There are too many rules for too many elements.
         """
         if not self._rules:
             return ()
-        keys = ["", str(element.tag).rpartition("}")[2], f"#{element.get('id', '')}"]
+        keys = ["", _local_name(element), f"#{element.get('id', '')}"]
         keys += [f".{name}" for name in self._classes_of(element)]
         asked = [rule for key in keys for rule in self._rules.get(key, ())]
-        depth = _depth(element, parents) if any(len(rule.compounds) > 1 for rule in asked) else 0
+        is_nested = any(len(rule.compounds) > 1 for rule in asked)
+        depth = len(ancestors(element, parents)) if is_nested else 0
         text = sum(map(len, element.attrib.values())) // CHARACTERS
-        self._work += sum(1 + text * rule.reads_text + depth * (len(rule.compounds) - 1) for rule in asked)
+        self._work += sum(1 + text * one.reads_attributes + depth * (len(one.compounds) - 1) for one in asked)
         if self._work > MAX_WORK:
             raise ImageError("has a style sheet of too many rules for its elements")
-        said = [rule for rule in asked if rule.matches(element, parents, self._classes_of)]
-        self._work += SAID * len(said)
-        return [d for rule in sorted(said, key=lambda rule: rule.order) for d in rule.declarations]
+        matching = [rule for rule in asked if rule.matches(element, parents, self._classes_of)]
+        self._work += DECLARATION_WORK * len(matching)
+        return [d for rule in sorted(matching, key=lambda rule: rule.order) for d in rule.declarations]
 
-    def _classes_of(self, element: ElementTree.Element) -> frozenset[str]:
+    def _classes_of(self, element: Element) -> frozenset[str]:
         if element not in self._classes:
             self._classes[element] = frozenset(element.get("class", "").split())
         return self._classes[element]
-
-
-SAID = 10
-"""Looks at elements that take as long as what a rule says does."""
-
-CHARACTERS = 100
-"""Characters of an attribute that take as long to check as an element."""
-
-
-def _depth(element: ElementTree.Element, parents: Parents) -> int:
-    depth = 0
-    while element in parents:
-        element = parents[element]
-        depth += 1
-    return depth
-
-
-def _key(compound: _Compound) -> str:
-    if compound.ids:
-        return f"#{compound.ids[0]}"
-    return f".{compound.classes[0]}" if compound.classes else compound.tag

@@ -1,6 +1,6 @@
-"""Points of shapes as path data (SVG 1.1, 8.3), in whole numbers of the view box.
+"""Points of shapes as path data (SVG 1.1, 8.3), in whole units of the view box.
 
-Coordinates are relative, each against the rounded position before it, so that rounding errors do not add up.
+Relative coordinates refer to the rounded position before, so that rounding errors do not add up.
 """
 
 from __future__ import annotations
@@ -12,59 +12,67 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import Basis, IndexArray, Kind, Scene
-from warpsplat.svg.commands import Pair, minus, segments_of, shortest, shortest_ring
-from warpsplat.svg.smooth import SMALL, shortest_smooth
+from warpsplat.svg.commands import (
+    SMALL,
+    Pair,
+    Segment,
+    minus,
+    segments_of,
+    shortest,
+    shortest_ring,
+    shortest_smooth,
+)
 
 
 def integers(pairs: Iterable[Pair]) -> str:
-    """Whole numbers in a row with the fewest separators: a sign separates itself."""
+    """Return whole numbers in a row with the fewest separators."""
     return " ".join([f"{x} {y}" for x, y in pairs]).replace(" -", "-")
 
 
 Floats = npt.NDArray[np.float64]
 
 NEAR_THIRD = 0.05
-"""How far handles may be from the thirds of a line, in units of the view box, for it to be one ..."""
+"""Largest distance of a line's handles from its thirds, in units of the view box ..."""
 
 THIRD = 0.5 + 1e-9
-"""... and as they are rounded: as far as rounding takes them, which moves the outline by less."""
+"""... and the same for rounded points: as far as rounding moves handles, which moves the outline by less."""
 
 
 def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
-    """Which cubics a file shows as straight lines, by their first points, shape (point,).
+    """Return which cubics a file shows as straight lines, by their first points, shape (point,).
 
-    Those whose handles are its thirds; and those whose handles lie on it when they are rounded.
+    Those are cubics with handles at the thirds, or with rounded handles on the line.
 
     Args:
-        scene: whose points they are.
-        exact: the points in units of the view box, shape (point, 2).
+        scene: The scene.
+        exact: Its points in units of the view box, shape (point, 2).
     """
     found = np.zeros(len(exact), np.bool_)
     rows = cubic_rows(scene)
     for corners, near in ((exact[rows], NEAR_THIRD), (np.round(exact[rows]), THIRD)):
-        ways = corners[:, 1:] - corners[:, :1]
-        way = ways[:, 2:]
-        handles, thirds = ways[:, :2], np.array([[1 / 3], [2 / 3]]) * way
-        laid = (np.abs(handles - thirds) <= near).all(axis=(1, 2))
-        along, square = (handles * way).sum(axis=2), (way * way).sum(axis=2)
-        across = handles[..., 0] * way[..., 1] - handles[..., 1] * way[..., 0]
-        inside = ((across == 0) & (along >= 0) & (along <= square)).all(axis=1) & (square[:, 0] > 0)
-        found[rows[laid | inside, 0]] = True
+        vectors = corners[:, 1:] - corners[:, :1]
+        chord = vectors[:, 2:]
+        handles, thirds = vectors[:, :2], np.array([[1 / 3], [2 / 3]]) * chord
+        at_thirds = (np.abs(handles - thirds) <= near).all(axis=(1, 2))
+        along, square = (handles * chord).sum(axis=2), (chord * chord).sum(axis=2)
+        across = handles[..., 0] * chord[..., 1] - handles[..., 1] * chord[..., 0]
+        on_chord = ((across == 0) & (along >= 0) & (along <= square)).all(axis=1) & (square[:, 0] > 0)
+        found[rows[at_thirds | on_chord, 0]] = True
     return found
 
 
 def held_points(scene: Scene, exact: Floats) -> Floats:
-    """The points as a file has them: whole numbers, and handles of lines at the thirds."""
+    """Return the points of a file: whole numbers, and handles of lines at the thirds."""
     rows = cubic_rows(scene)
     rows = rows[straight_cubics(scene, exact)[rows[:, 0]]]
-    made = np.round(exact)
-    a, b = made[rows[:, 0]], made[rows[:, 3]]
-    made[rows[:, 1]], made[rows[:, 2]] = (2 * a + b) / 3, (a + 2 * b) / 3
-    return made
+    held = np.round(exact)
+    a, b = held[rows[:, 0]], held[rows[:, 3]]
+    held[rows[:, 1]], held[rows[:, 2]] = (2 * a + b) / 3, (a + 2 * b) / 3
+    return held
 
 
 def cubic_rows(scene: Scene) -> IndexArray:
-    """The points of each cubic of a scene, shape (cubic, 4)."""
+    """Return the indices of each cubic's points, shape (cubic, 4)."""
     rows = []
     for group in scene.alike():
         if group.basis == Basis.CUBIC:
@@ -75,7 +83,7 @@ def cubic_rows(scene: Scene) -> IndexArray:
 
 
 class PathData:
-    """``d`` of the shapes of a scene, with ``per_pixel`` units of the view box a pixel."""
+    """The ``d`` attributes of a scene's shapes, with ``per_pixel`` units of the view box to a pixel."""
 
     def __init__(self, scene: Scene, per_pixel: float) -> None:
         spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
@@ -92,9 +100,8 @@ class PathData:
         self._has_twin = np.append(scene.twin[1:], 0).tolist()
 
     def of(self, shape: int) -> str:
-        """Of one shape: its contours one after another."""
-        # Fills close by themselves, but the stroke of the same path does not. Where its pattern begins
-        # matters, too.
+        """Return the path data of one shape: its contours one after another."""
+        # A fill closes its contours, a stroke does not, and its dashes depend on the start.
         is_stroked = bool(self._strokes[shape] or self._has_twin[shape])
         texts = []
         pen: Pair | None = None
@@ -102,61 +109,49 @@ class PathData:
             rows = slice(*self._starts[contour : contour + 2])
             points, closed = self._grid[rows], bool(self._closed[contour])
             if self._splines[shape]:
-                texts.append(spline_data(points, closed, turns=not is_stroked))
+                texts.append(spline_data(points, closed, may_rotate=not is_stroked))
                 texts.append("z" if closed and is_stroked else "")
                 continue
-            straight = self._straight[rows][: len(points) - 2 : 3]
-            keep_dots = self._strokes[shape]
-            text, pen = cubic_data(
-                points, straight, closed, is_stroked=is_stroked, keep_dots=keep_dots, pen=pen
-            )
+            segments = segments_of(points, self._straight[rows][: len(points) - 2 : 3], closed)
+            if not self._strokes[shape]:  # only in a stroke does a dot show
+                segments = [segment for segment in segments if segment.has_extent()]
+            text, pen = cubic_data(segments, points[0], closed, is_stroked, pen)
             texts.append(text)
         return "".join(texts)
 
 
 def cubic_data(
-    grid: list[Pair],
-    straight: list[bool],
-    closed: bool,
-    *,
-    is_stroked: bool,
-    keep_dots: bool,
-    pen: Pair | None,
+    segments: list[Segment], start: Pair, closed: bool, is_stroked: bool, pen: Pair | None
 ) -> tuple[str, Pair]:
-    """``d`` of a chain of cubics, and where the pen is then.
+    """Return the path data of a contour of lines and cubics, and where the pen is then.
 
     Args:
-        grid: its points.
-        straight: which cubics are lines.
-        closed: whether it is a ring.
-        is_stroked: whether a ring's joint is seen, and where it begins may matter.
-        keep_dots: whether to write what has no extent as well: in a fill it draws nothing, in a stroke it may
-            be the dot that is all there is.
-        pen: where it is before; None at the beginning.
+        segments: The contour's; a ring's last one is dropped if closing draws it.
+        start: Its first point.
+        closed: Whether it is a ring.
+        is_stroked: Whether a ring's joint is visible and its start may matter.
+        pen: Where the pen is before; None at the beginning.
     """
-    segments = [
-        segment for segment in segments_of(grid, straight, closed) if keep_dots or segment.has_extent()
-    ]
     if not segments:
-        return f"M{integers(grid[:1])}z", grid[0]
-    if not is_stroked:
-        return shortest_ring(pen, segments) if closed else (shortest(pen, segments), segments[-1].end)
+        return f"M{integers([start])}z", start
+    if closed and not is_stroked:
+        return shortest_ring(pen, segments)
     if not closed:
         return shortest(pen, segments), segments[-1].end
     if segments[-1].handles is None and len(segments) > 1:
-        segments.pop()  # which closing draws
-    return f"{shortest(pen, segments)}z", grid[0]
+        segments.pop()
+    return f"{shortest(pen, segments)}z", start
 
 
-def spline_data(half: list[Pair], closed: bool, *, turns: bool = True) -> str:
-    """``d`` of a spline: one quadratic, and smooth ones, whose control points follow (SVG 1.1, 8.3.7).
+def spline_data(half: list[Pair], closed: bool, *, may_rotate: bool = True) -> str:
+    """Return the path data of a spline: one quadratic, and smooth ones (SVG 1.1, 8.3.7).
 
     Args:
-        half: its points in half of the numbers that are written.
-        closed: whether they are a ring.
-        turns: whether a ring is written from where that takes the fewest characters.
+        half: Its points, in half of the numbers that are written.
+        closed: Whether they are a ring.
+        may_rotate: Whether a ring may start where that takes the fewest characters.
     """
-    if closed and turns:
+    if closed and may_rotate:
         start = _cheapest_start(half)
         half = half[start:] + half[:start]
     joints, control = _joints(half, closed)
@@ -166,19 +161,19 @@ def spline_data(half: list[Pair], closed: bool, *, turns: bool = True) -> str:
 
 
 def even_spline_data(half: list[Pair], closed: bool) -> str:
-    """As ``spline_data``, with commands that depend on the number of points alone."""
+    """Return data as ``spline_data``, with commands that depend on the number of points alone."""
     return _relative(*_joints(half, closed))
 
 
 def even_cubic_data(grid: list[Pair], closed: bool) -> str:
-    """As ``cubic_data``, with commands that depend on the number of points alone; rings are not closed."""
+    """Return relative cubics: commands depend on the number of points alone, and rings are not closed."""
     chain = [*grid, grid[0]] if closed else grid
-    ways = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
-    return f"M{integers(grid[:1])}c{integers(ways)}"
+    steps = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
+    return f"M{integers(grid[:1])}c{integers(steps)}"
 
 
 def _joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
-    """Where the quadratics of a spline meet, and the first one's control point."""
+    """Return where the quadratics of a spline meet, and the first one's control point."""
     ring = [half[-1], *half, half[0]] if closed else half
     joints = [(a + c, b + d) for (a, b), (c, d) in itertools.pairwise(ring)]
     if not closed:
@@ -193,8 +188,10 @@ def _relative(joints: list[Pair], control: Pair) -> str:
 
 
 def _cheapest_start(half: list[Pair]) -> int:
-    """The point of a ring before which to start: the start, and the control point that is written besides,
-    are shortest there. The steps are the same from everywhere, but the second needs no separator.
+    """Return the point of a ring before which its text should start.
+
+    There the start and the one control point that is written are shortest; the steps are always the same, but
+    the second needs no separator.
     """
     near = zip([half[-1], *half[:-1]], half, [*half[2:], *half[:2]], strict=True)
     lengths = [

@@ -1,4 +1,4 @@
-"""An SVG's elements: who is inside of whom, who is called what, and the style of each."""
+"""A parsed SVG: its elements by name and place, and the style of each."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Element = ElementTree.Element
 Found = TypeVar("Found")
 
 HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
-"""Attributes that link elements; the first counts more (SVG 2, 16.1.3)."""
+"""Attributes that link elements; the first takes precedence (SVG 2, 16.1.3)."""
 
 
 def name_of(element: Element) -> str:
-    """An element's name in SVG's name space; empty for others."""
+    """Return an element's name in SVG's namespace; empty for elements of others."""
     space, _, name = str(element.tag).rpartition("}")
     return name if space[1:] == NAMESPACE else ""
 
@@ -29,10 +29,10 @@ class Document:
     """A parsed SVG."""
 
     def __init__(self, text: str) -> None:
-        """Of a text that ``inspect_svg`` has passed.
+        """Parse a text that ``inspect_svg`` has passed.
 
         Raises:
-            ImageError: a style sheet of a kind that is not read.
+            ImageError: A style sheet is not supported.
         """
         self.root = ElementTree.fromstring(text)
         self.parents = {child: element for element in self.root.iter() for child in element}
@@ -42,21 +42,17 @@ class Document:
             if "id" in element.attrib:
                 self._by_id.setdefault(element.attrib["id"], element)
             if name_of(element) == "style" and element.get("type", "text/css") == "text/css":
-                # Not what is in further elements: of many within each other that would be many times as much.
+                # Without the text of elements inside, which would count once for each level of nesting.
                 css.append("".join([element.text or "", *(child.tail or "" for child in element)]))
         self.css = "\n".join(css)
-        """Of all style sheets."""
+        """The text of all style sheets."""
         self._sheet = StyleSheet(self.css, KNOWN)
         self._styles: dict[Element, Style] = {}
         self.found: dict[tuple[Callable[..., Any], Element], Any] = {}
-        """Results of ``once`` for each element, however many others refer to it."""
+        """Results of ``once``, however many elements refer to another."""
 
     def once(self, find: Callable[[Element, Document], Found], element: Element) -> Found:
-        """Return ``find``'s result for an element, computed once.
-
-        Raises:
-            ImageError: as ``find`` does.
-        """
+        """Return ``find``'s result for an element, or raise its ``ImageError``; computed once."""
         key = find, element
         if key not in self.found:
             try:
@@ -68,34 +64,33 @@ class Document:
             raise ImageError(str(found))
         return cast("Found", found)
 
+    def _href(self, element: Element) -> str:
+        return next((element.attrib[name] for name in HREFS if name in element.attrib), "").strip()
+
     def linked(self, element: Element) -> Element | None:
-        """What an element links to; None if it links to nothing in this document."""
-        text = next((element.attrib[name] for name in HREFS if name in element.attrib), "").strip()
+        """Return the element that one links to; None if it links to nothing in this document."""
+        text = self._href(element)
         return self._by_id.get(text[1:]) if text.startswith("#") else None
 
     def links_out(self, element: Element) -> bool:
-        """Whether an element links to another document."""
-        text = next((element.attrib[name] for name in HREFS if name in element.attrib), "").strip()
+        """Return whether an element links to another document."""
+        text = self._href(element)
         return bool(text) and not text.startswith("#")
 
     def called(self, name: str) -> Element | None:
-        """The first element with that ``id``."""
+        """Return the first element with that ``id``."""
         return self._by_id.get(name)
 
     def style_in(self, element: Element, parent: Style) -> Style:
-        """All properties of an element within one of the style ``parent``.
+        """Return all properties of an element whose parent has the style ``parent``.
 
         Raises:
-            ImageError: one of them shows what shapes cannot.
+            ImageError: A property has a value that shapes cannot show.
         """
         return element_style(element, self._sheet.of(element, self.parents), parent)
 
     def style_of(self, element: Element) -> Style:
-        """All properties of an element where it stands in the document.
-
-        Raises:
-            ImageError: see ``style_in``.
-        """
+        """Return all properties of an element at its place in the document; raises as ``style_in``."""
         path = [element]
         while path[-1] not in self._styles and path[-1] in self.parents:
             path.append(self.parents[path[-1]])

@@ -1,9 +1,10 @@
-"""Draws one SVG in a process of its own: what ends or stalls there leaves the program standing.
+"""Script that draws one SVG in a process of its own, so that crashes and hangs there do not end the program.
 
-Run as a script by ``warpsplat.svg.viewer``; imports nothing of warpsplat, so that it starts within 30 ms.
+Run by ``warpsplat.svg.viewer``; imports nothing of warpsplat, so that it starts within 30 ms.
 Standard input: one line of JSON (``path``: module search path, ``seconds`` and ``memory``: limits,
 ``form``: ``png`` or ``pdf``, ``options``: of its function here), then the SVG's text in UTF-8. Standard
-output: the picture. A text that is refused ends it with ``REFUSED`` and the cause on standard error.
+output: the picture. A text that the library rejects ends the process with ``REFUSED`` and the cause on
+standard error.
 """
 
 from __future__ import annotations
@@ -16,35 +17,35 @@ import threading
 from typing import Any
 
 REFUSED = 3
-"""Exit status where the library says what is wrong; any other but 0 is a crash."""
+"""Exit status if the library rejects the text; any other but 0 is a crash."""
 
 STACK = 128 << 20
 """Stack [bytes]: resvg recurses with the document's depth, and main threads have 1 MiB on some systems."""
 
 
 def limit_resources(seconds: int, memory: int) -> None:
-    """Bound processor time [s] and address space [bytes], as far as the system can."""
+    """Limit processor time [s] and address space [bytes], as far as the system can."""
     try:
         import resource
     except ImportError:  # Windows
         return
     wanted = ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0))
     for kind, value in wanted:
-        with contextlib.suppress(ValueError, OSError):  # macOS bounds no address space
+        with contextlib.suppress(ValueError, OSError):  # macOS does not limit address space
             hard = resource.getrlimit(kind)[1]
             lowest = value if hard == resource.RLIM_INFINITY else min(value, hard)
             resource.setrlimit(kind, (lowest, hard))
 
 
 def png(text: str, options: dict[str, Any]) -> bytes:
-    """Pixels, by resvg; ``options`` are those of ``resvg_py``."""
+    """Render with resvg; ``options``: those of ``resvg_py``."""
     import resvg_py
 
     return bytes(resvg_py.svg_to_bytes(svg_string=text, **options))
 
 
 def pdf(text: str, options: dict[str, Any]) -> bytes:
-    """Paths, on a sheet of their size, by Typst, which reads SVGs with resvg's parser.
+    """Convert to a PDF of the same size with Typst, which reads SVGs with resvg's parser.
 
     ``options``: ``width`` [pt], or none for the SVG's own; ``skip_system_fonts``.
     """
@@ -55,7 +56,7 @@ def pdf(text: str, options: dict[str, Any]) -> bytes:
     sheet = f'{SHEET}#image("/picture.svg", width: {size})'
     files = {"main.typ": sheet.encode(), "picture.svg": text.encode()}
     fonts = options["skip_system_fonts"]
-    make: Any = typst.compile  # its types know of no files in memory
+    make: Any = typst.compile  # its types do not allow files in memory
     try:
         return bytes(make(files, ignore_system_fonts=fonts, pdf_tags=False))  # tags are for texts
     except typst.TypstError as error:
@@ -65,13 +66,13 @@ def pdf(text: str, options: dict[str, Any]) -> bytes:
 SHEET = """#set document(date: none)
 #set page(width: auto, height: auto, margin: 0pt, fill: none)
 """
-"""How a document of Typst says that there is nothing but a picture, and no date: files would differ."""
+"""Typst's settings for a document of nothing but a picture. A date would make files differ."""
 
 FORMS = {"png": png, "pdf": pdf}
 
 
 def draw(text: str, request: dict[str, Any], result: list[bytes | str]) -> None:
-    """Append the picture, or the cause why there is none, to ``result``; left empty by a panic."""
+    """Append the picture, or the cause of a rejection, to ``result``; a panic leaves it empty."""
     try:
         result.append(FORMS[request["form"]](text, request["options"]))
     except ValueError as error:
@@ -79,8 +80,8 @@ def draw(text: str, request: dict[str, Any], result: list[bytes | str]) -> None:
 
 
 def main() -> int:
-    """One request."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of Ctrl-C the program itself decides what ends
+    """Answer one request; return the exit status."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to act on
     request = json.loads(sys.stdin.buffer.readline())
     sys.path[:] = request["path"]
     limit_resources(request["seconds"], request["memory"])

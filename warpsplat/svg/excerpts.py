@@ -1,4 +1,4 @@
-"""Parts of a document's text: elements as they stand, with what they need to look the same elsewhere."""
+"""Excerpts of a document's text: elements as written, with what they need to look the same elsewhere."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 from warpsplat.errors import ImageError
-from warpsplat.svg.css import AT_RULE, rules, without_comments
+from warpsplat.svg.css import ancestors, rules, split_at_rules
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.inspect import view_box
 
-HEAD = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
+START_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 ATTRIBUTE = re.compile(r"""(?<!\s)\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
 REFERENCE = re.compile(
     r"""url\(\s*(?:(?:["']|&quot;|&apos;)\s*)?\#([^"'()\s&]+)|href\s*=\s*["']\s*\#([^"']+)["']"""
 )
-"""Mention of another element."""
+"""A reference to another element."""
 
 ENTITY = re.compile(r"&([^&;\s]+);")
 
 STYLE_OF_ROOTS = re.compile(r"(?<![\w-])(?:x|y|width|height|overflow)\s*:[^;\"']*;?")
 OF_ROOTS = frozenset({"x", "y", "width", "height", "version", "baseProfile", "overflow"})
-"""What means nothing, or something else, where a root has become an element: in its style, and attributes."""
+"""Style properties and attributes that mean something else once the root is an inner element."""
 
 RELATIVE = re.compile(r"[+~](?!=)|:(?!hover|active|focus|visited|link)")
-"""Selectors that ask which elements lie before others, some of which are not in an excerpt."""
+"""Selectors that depend on siblings, which may be missing in an excerpt."""
 
 
 class Excerpts:
-    """Makes them of one document."""
+    """The excerpts of one document."""
 
     def __init__(self, text: str, document: Document) -> None:
-        """``text``: that of the document.
+        """Find the elements of ``document`` in its ``text``.
 
         Raises:
-            ImageError: entities stand for elements.
+            ImageError: Entities stand for elements.
         """
         self._document = document
         self._data = text.encode("utf-8", "surrogatepass")
@@ -49,20 +49,16 @@ class Excerpts:
         self._named: set[Element] = set()
         """Ancestors whose ``id`` has been written."""
 
-    def path(self, element: Element) -> list[Element]:
-        """What an element is in, from the root to its parent."""
-        above: list[Element] = []
-        while element in self._document.parents:
-            element = self._document.parents[element]
-            above.append(element)
-        return above[::-1]
+    def _path(self, element: Element) -> list[Element]:
+        """Return an element's ancestors, from the root to its parent."""
+        return ancestors(element, self._document.parents)[::-1]
 
     def of(self, elements: Iterable[Element], size: tuple[float, float]) -> str:
-        """The elements within those that they are in, in the document's order; ``size``: of its picture."""
+        """Return the elements inside their ancestors, in the document's order; ``size``: of its picture."""
         out: list[str] = []
         around: list[Element] = []
         for element in [*sorted(elements, key=self._places.__getitem__), None]:
-            path = [] if element is None else self.path(element)
+            path = [] if element is None else self._path(element)
             same = sum(1 for a, b in zip(around, path, strict=False) if a is b)
             out += (self._tail(above) for above in reversed(around[same:]))
             out += (self._head(above, size) for above in path[same:])
@@ -72,14 +68,14 @@ class Excerpts:
         return "".join(out)
 
     def needed(self, elements: Sequence[Element]) -> list[Element]:
-        """What the elements, those that they are in, and style sheets refer to."""
+        """Return the elements that the given ones, their ancestors and style sheets refer to."""
         given = {inner for element in elements for inner in element.iter()}
         found: set[Element] = set()
         seen: set[Element] = set()
 
         def tags(element: Element) -> Iterator[str]:
-            """Start tags of what is in an element and around it, each once in all."""
-            for one in (*element.iter(), *self.path(element)):
+            """Yield the start tags of an element's descendants and ancestors, each once in all."""
+            for one in (*element.iter(), *self._path(element)):
                 if one not in seen:
                     seen.add(one)
                     yield self._slice(*self._spans[one][:2])
@@ -91,23 +87,23 @@ class Excerpts:
                 if target is not None and target not in given and target not in found:
                     found.add(target)
                     todo += tags(target)
-        return [element for element in found if not found & set(self.path(element))]
+        return [element for element in found if not found & set(self._path(element))]
 
     def style(self, scope: str) -> str:
-        """The style sheets, their rules for what is in elements of the class ``scope`` only; may be empty.
+        """Return the style sheets, restricted to elements inside those of the class ``scope``; may be empty.
 
         Raises:
-            ImageError: rules that ask for what is not in an excerpt.
+            ImageError: A rule depends on elements that may not be in an excerpt.
         """
-        css = without_comments(self._document.css).replace("<!--", "").replace("-->", "")
-        said = [rule for rule in AT_RULE.findall(css) if rule.startswith("@font-face")]
-        for selectors, body in rules(AT_RULE.sub("", css)):
+        at_rules, css = split_at_rules(self._document.css)
+        texts = [rule for rule in at_rules if rule.startswith("@font-face")]
+        for selectors, body in rules(css):
             for selector in map(str.strip, selectors.split(",")):
                 if RELATIVE.search(re.sub(r"\[[^\[\]]*\]", "", selector)):
                     raise ImageError(f"uses the style sheet selector {selector[:40]!r}, which cannot be kept")
             scoped = ",".join(f".{scope} {selector.strip()}" for selector in selectors.split(","))
-            said.append(f"{scoped}{{{body.strip()}}}")
-        return f"<style>{escape(''.join(said))}</style>" if said else ""
+            texts.append(f"{scoped}{{{body.strip()}}}")
+        return f"<style>{escape(''.join(texts))}</style>" if texts else ""
 
     def _slice(self, start: int, end: int) -> str:
         text = self._data[start:end].decode("utf-8", "surrogatepass")
@@ -116,7 +112,7 @@ class Excerpts:
         return ENTITY.sub(lambda found: self._entities.get(found[1], found[0]), text)
 
     def _whole(self, element: Element) -> str:
-        """An element without style sheets, which ``style`` has."""
+        """Return an element without style sheets, which ``style`` returns."""
         start, _, _, end = self._spans[element]
         parts = []
         first = bisect_left(self._sheets, (start, 0))
@@ -132,7 +128,7 @@ class Excerpts:
         return self._slice(*self._spans[element][2:])
 
     def _head(self, element: Element, size: tuple[float, float]) -> str:
-        """A start tag; a name is said once, but where a style sheet asks for it."""
+        """Return a start tag, its ``id`` only the first time unless a style sheet asks for it."""
         left_out = set()
         if element in self._named and f"#{element.get('id')}" not in self._document.css:
             left_out.add("id")
@@ -156,18 +152,18 @@ class Excerpts:
 
 
 Span = tuple[int, int, int, int]
-"""Where an element's start tag begins and ends, and its end tag; alike where it has none [bytes]."""
+"""Where an element's start tag and its end tag, which may be empty, begin and end [bytes]."""
 
 
 def _spans(data: bytes) -> tuple[list[Span], dict[str, str]]:
-    """Places of all elements, in the order in which they begin; and the values of entities."""
+    """Return the spans of all elements, in the order in which they begin, and the values of entities."""
     spans: list[list[int]] = []
     around: list[list[int]] = []
     entities: dict[str, str] = {}
     parser = expat.ParserCreate("utf-8")
 
     def start(_: str, __: dict[str, str]) -> None:
-        found = HEAD.match(data, parser.CurrentByteIndex)
+        found = START_TAG.match(data, parser.CurrentByteIndex)
         assert found
         around.append([found.start(), found.end()])
         spans.append(around[-1])

@@ -1,4 +1,4 @@
-"""Geometry of SVG elements: basic shapes as path data, boxes, clipping, transforms as matrices."""
+"""Geometry of SVG elements: basic shapes as path data, boxes, transforms as matrices."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ Matrix = npt.NDArray[np.float64]
 
 ACROSS = {"x", "cx", "x1", "x2", "fx", "width", "rx"}
 DOWN = {"y", "cy", "y1", "y2", "fy", "height", "ry"}
-"""Attributes whose percentages are of the viewport's width, and of its height; those of others are of its
-diagonal."""
+"""Attributes whose percentages refer to the viewport's width, and to its height; all others: its diagonal."""
 
 
 def attribute(attributes: Mapping[str, str], name: str, viewport: Viewport) -> float | None:
-    """A length among the attributes [user units]; None if it is not there or is none."""
+    """Return a length among the attributes [user units]; None if it is missing or not a length."""
     text = attributes.get(name)
     if text is None:
         return None
@@ -33,7 +32,7 @@ def attribute(attributes: Mapping[str, str], name: str, viewport: Viewport) -> f
 
 
 def outline(tag: str, attributes: Mapping[str, str], viewport: Viewport) -> str:
-    """Path data of a shape element; empty: draws nothing."""
+    """Return the path data of a shape element; empty: it draws nothing."""
 
     def get(name: str) -> float:
         return attribute(attributes, name, viewport) or 0.0
@@ -82,7 +81,7 @@ def _rect(x: float, y: float, width: float, height: float, rx: float, ry: float)
 
 
 def tight_box(subpaths: list[Subpath]) -> Points:
-    """Least and largest coordinates of the curves, shape (2, 2)."""
+    """Return the least and the largest coordinates of the curves, shape (2, 2)."""
     ends = np.concatenate([subpath.points[::3] for subpath in subpaths])
     low, high = ends.min(axis=0), ends.max(axis=0)
     p0, p1, p2, p3 = (
@@ -91,7 +90,7 @@ def tight_box(subpaths: list[Subpath]) -> Points:
     a, b, c = p3 - 3 * p2 + 3 * p1 - p0, 2 * (p2 - 2 * p1 + p0), p1 - p0
     root = np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))
     q = -0.5 * (b + np.where(b < 0, -root, root))
-    for root in (q / a, c / q):  # the stable form of both solutions; what is no number is none
+    for root in (q / a, c / q):  # the stable form of both solutions; NaN: there is none
         t = np.clip(np.nan_to_num(root, nan=0.0, posinf=0.0, neginf=0.0), 0.0, 1.0)
         u = 1 - t
         extreme = u * u * u * p0 + 3 * u * u * t * p1 + 3 * u * t * t * p2 + t * t * t * p3
@@ -100,25 +99,23 @@ def tight_box(subpaths: list[Subpath]) -> Points:
 
 
 def similarity(matrix: Matrix) -> float | None:
-    """By how much a map scales; None if not alike in all directions (to a hundredth)."""
+    """Return the factor by which a map scales; None if directions differ by more than a hundredth."""
     (a, b), (c, d) = np.nan_to_num(matrix[:2, :2])
-    with np.errstate(all="ignore"):  # what overflows is found where it is used
-        # Half the sum and half the difference of the singular values, or the other way round.
-        turning, mirroring = (
-            elementary.hypot((a + d) / 2, (c - b) / 2),
-            elementary.hypot((a - d) / 2, (c + b) / 2),
-        )
-        alike = abs(turning - mirroring) >= 0.99 * (turning + mirroring)
-    return float(max(turning, mirroring)) if alike else None
+    with np.errstate(all="ignore"):  # overflow is found where the result is used
+        # Half the sum and half the difference of the singular values, in either order.
+        turning = elementary.hypot((a + d) / 2, (c - b) / 2)
+        mirroring = elementary.hypot((a - d) / 2, (c + b) / 2)
+        is_uniform = abs(turning - mirroring) >= 0.99 * (turning + mirroring)
+    return float(max(turning, mirroring)) if is_uniform else None
 
 
 def moved(matrix: Matrix, points: Points) -> Points:
-    """Points under an affine map."""
+    """Return points under an affine map."""
     return np.asarray(product(points, matrix[:2, :2].T) + matrix[:2, 2])
 
 
 def translation(x: float, y: float) -> Matrix:
-    """The map that moves by (x, y)."""
+    """Return the map that moves by (x, y)."""
     matrix = np.eye(3)
     matrix[:2, 2] = x, y
     return matrix
@@ -128,12 +125,12 @@ ALIGN = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)")
 
 
 def view_box_map(attributes: Mapping[str, str], width: float, height: float) -> Matrix | None:
-    """Map of the units of an element's ``viewBox`` to its ``width`` x ``height``; None if it has none.
+    """Return the map of an element's ``viewBox`` to its ``width`` x ``height``; None if it has no box.
 
     Raises:
-        ImageError: it lies too far away, or its ``preserveAspectRatio`` is none.
+        ImageError: The box lies too far away, or ``preserveAspectRatio`` is invalid.
     """
-    box = view_box(dict(attributes))
+    box = view_box(attributes)
     if box is None:
         return None
     x, y, box_width, box_height = box
@@ -149,7 +146,7 @@ def view_box_map(attributes: Mapping[str, str], width: float, height: float) -> 
         part = np.array([{"Min": 0.0, "Mid": 0.5, "Max": 1.0}[word] for word in found.groups()])
         shift = part * (np.array([width, height]) - fit * (box_width, box_height))
     view = np.diag([*fit, 1.0])
-    with np.errstate(all="ignore"):  # what overflows is found where it is used
+    with np.errstate(all="ignore"):
         view[:2, 2] = shift - fit * (x, y)
         if not np.isfinite(view).all():
             raise ImageError("its viewBox lies farther than can be drawn")
@@ -160,10 +157,10 @@ FUNCTION = re.compile(r"[\s,]*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([
 
 
 def parse_transform(text: str) -> Matrix:
-    """A ``transform`` as a 3x3 matrix; what is none does nothing.
+    """Return a ``transform`` as a 3x3 matrix; the identity for a text that is none.
 
     Raises:
-        ImageError: of functions or units that only some viewers know.
+        ImageError: A function or unit is one that only some viewers support.
     """
     matrix = np.eye(3)
     position = 0
@@ -171,11 +168,9 @@ def parse_transform(text: str) -> Matrix:
     if text in {"", "none"}:
         return matrix
     while position < len(text):
-        found = FUNCTION.match(text, position)
-        values = [float(v) for v in NUMBER.findall(found[2])] if found else []
-        one = (
-            _function(found[1], values) if found and not NUMBER.sub("", found[2]).strip(" ,\t\r\n") else None
-        )
+        found, one = FUNCTION.match(text, position), None
+        if found and not NUMBER.sub("", found[2]).strip(" ,\t\r\n"):
+            one = _function(found[1], [float(value) for value in NUMBER.findall(found[2])])
         if found is None or one is None:
             if "(" not in text:
                 return np.eye(3)
@@ -189,27 +184,27 @@ PLACES = {"left": 0.0, "top": 0.0, "center": 0.5, "right": 1.0, "bottom": 1.0}
 
 
 def about(origin: str, viewport: Viewport, matrix: Matrix) -> Matrix:
-    """A transform about its ``transform-origin``.
+    """Return a transform about its ``transform-origin``.
 
     Raises:
-        ImageError: the origin is none.
+        ImageError: The origin is invalid.
     """
     if origin in {"", "none"}:
         return matrix
-    words = origin.split()[:2]
+    words, font_size = origin.split()[:2], viewport.font_size
     if words[0] in {"top", "bottom"} or words[1:] in (["left"], ["right"]):
-        words = [*words[1:], "center"][:1] + words[:1]  # the second is the horizontal one
+        words = [*words[1:], "center"][:1] + words[:1]  # the vertical one is first
     at = []
     for word, size in zip([*words, "center"], (viewport.width, viewport.height), strict=False):
-        place = (
-            PLACES[word] * size
-            if word in PLACES
-            else length(word, size, "transform-origin", viewport.font_size)
-        )
+        place = PLACES[word] * size if word in PLACES else length(word, size, "transform-origin", font_size)
         if place is None:
             raise ImageError(f"transform-origin {origin[:40]!r} is not known")
         at.append(place)
-    return product(product(translation(*at), matrix), translation(-at[0], -at[1]))
+    return _about(matrix, *at)
+
+
+def _about(matrix: Matrix, x: float, y: float) -> Matrix:
+    return product(product(translation(x, y), matrix), translation(-x, -y))
 
 
 def _function(name: str, v: list[float]) -> Matrix | None:
@@ -223,10 +218,8 @@ def _function(name: str, v: list[float]) -> Matrix | None:
     if name == "rotate" and count in {1, 3}:
         angle = np.deg2rad(v[0])
         cosine, sine = float(elementary.cos(angle)), float(elementary.sin(angle))
-        turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        if count == 3:
-            return product(product(translation(v[1], v[2]), turn), translation(-v[1], -v[2]))
-        return turn
+        rotation = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+        return _about(rotation, v[1], v[2]) if count == 3 else rotation
     if name in {"skewX", "skewY"} and count == 1:
         matrix = np.eye(3)
         matrix[(0, 1) if name == "skewX" else (1, 0)] = elementary.tan(np.deg2rad(v[0]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,18 +31,18 @@ class Flat:
 
 @dataclass(frozen=True)
 class Gradient:
-    """Colours by place."""
+    """Colours that vary with position."""
 
     is_radial: bool
-    """Along the first axis; or from the focus to the unit circle."""
+    """From the focus to the unit circle, rather than along the first axis."""
     frame: Matrix
-    """Map of the gradient's own space, that of the unit axes, to where it is drawn, 3x3."""
+    """Map of the gradient's unit space to the canvas, 3x3."""
     focus: tuple[float, float, float]
-    """Where a radial one begins, in its own space: x, y, radius."""
+    """The circle where a radial gradient begins, in its unit space: x, y, radius."""
     spread: str
     """``pad``, ``reflect`` or ``repeat``."""
     offsets: tuple[float, ...]
-    """Of the stops, ascending, in 0..1."""
+    """Offsets of the stops, ascending, in [0, 1]."""
     stops: tuple[Flat, ...]
 
 
@@ -49,12 +50,12 @@ Colouring = Flat | Gradient
 
 GRADIENTS = {"linearGradient", "radialGradient"}
 BLACK = Flat((0.0, 0.0, 0.0))
-"""What is filled with a colour that is none; viewers agree on no other."""
+"""The paint in place of an invalid colour, the only one that viewers agree on."""
 
 LINK = re.compile(r"""url\(\s*(["']?)\s*#?""")
 ENDS = {quote: re.compile(rf"{quote}\s*\)") for quote in ("", "'", '"')}
-"""How a link begins, and how it ends, by its quote. One pattern for both has many ways to share out spaces
-between its parts, and tries them all where there is no end."""
+"""The beginning of a link, and its end by the kind of quote. A single pattern could match spaces by several
+of its parts, and would try all ways where there is no end."""
 
 
 def parse_link(text: str) -> tuple[str, str] | None:
@@ -64,7 +65,7 @@ def parse_link(text: str) -> tuple[str, str] | None:
         return None
     start = found.end()
     end = ENDS[found[1]].search(text, start)
-    if not end:  # of a quote that does not end: a part of the name
+    if not end:  # an unterminated quote is a part of the name
         start, end = found.start(1), ENDS[""].search(text, start)
     return (text[start : end.start()].rstrip(), text[end.end() :].lstrip()) if end else None
 
@@ -72,18 +73,18 @@ def parse_link(text: str) -> tuple[str, str] | None:
 def resolve_paint(
     text: str, style: Style, document: Document, viewport: Viewport, subpaths: list[Subpath], matrix: Matrix
 ) -> Colouring | None:
-    """What a shape is painted with; None for nothing.
+    """Return the paint of a shape; None: it has none.
 
     Args:
-        text: value of ``fill`` or ``stroke``.
-        style: of the shape.
-        document: where gradients are.
-        viewport: what lengths refer to.
-        subpaths: of the shape [user units].
-        matrix: map of user units to those of the canvas.
+        text: Value of ``fill`` or ``stroke``.
+        style: Style of the shape.
+        document: The document with the gradients.
+        viewport: The viewport that lengths refer to.
+        subpaths: The shape's subpaths [user units].
+        matrix: Map of user units to canvas units.
 
     Raises:
-        ImageError: a pattern, or a paint that only some viewers know.
+        ImageError: A pattern, or a paint that only some viewers support.
     """
     link = parse_link(text.strip())
     if not link:
@@ -101,11 +102,7 @@ def resolve_paint(
 
 
 def flat_paint(text: str, style: Style) -> Flat | None:
-    """A colour; None for none.
-
-    Raises:
-        ImageError: a colour that only some viewers know.
-    """
+    """Return a colour, or None for ``none``; raises as ``parse_color``."""
     text = text.strip().lower()
     if text == "none":
         return None
@@ -121,22 +118,22 @@ def _gradient(
     matrix: Matrix,
     fallback: Flat | None,
 ) -> Colouring | None:
-    heritage = _heritage(element, document)
-    if heritage.stops is None:
+    chain = _chain(element, document)
+    if chain.stops is None:
         return fallback
-    offsets, stops = document.once(_stops, heritage.stops)
+    offsets, stops = document.once(_stops, chain.stops)
     if len(stops) == 1:
         return stops[0]
     is_radial = name_of(element) == "radialGradient"
 
-    def said(name: str) -> str | None:
-        """An attribute of the gradient or of those that it takes over from."""
-        text = heritage.said.get(("" if name in COMMON else name_of(element), name))
+    def given(name: str) -> str | None:
+        """Return an attribute of the gradient or of those that it inherits from."""
+        text = chain.attributes.get(("" if name in COMMON else name_of(element), name))
         if text is not None:
             check_length(name, text)
         return text
 
-    of_box = said("gradientUnits") != "userSpaceOnUse"
+    of_box = given("gradientUnits") != "userSpaceOnUse"
     box = tight_box(subpaths)
     extent = box[1] - box[0]
     if of_box and not (extent > 0).all():
@@ -144,10 +141,10 @@ def _gradient(
     unit = Viewport(1.0, 1.0, viewport.font_size) if of_box else viewport
 
     def get(name: str, default: str) -> float:
-        value = attribute({name: said(name) or default}, name, unit)
+        value = attribute({name: given(name) or default}, name, unit)
         return attribute({name: default}, name, unit) or 0.0 if value is None else value
 
-    transform = parse_transform(said("gradientTransform") or "")
+    transform = parse_transform(given("gradientTransform") or "")
     if determinant(transform) == 0:
         transform = np.eye(3)  # as resvg does
     transform = about(document.style_of(element)["transform-origin"], viewport, transform)
@@ -163,75 +160,71 @@ def _gradient(
         return None
     if not (np.abs(frame) <= np.finfo(np.float32).max).all():
         raise ImageError("a gradient reaches farther than can be drawn")
-    spread = said("spreadMethod")
-    return Gradient(
-        is_radial, frame, focus, spread if spread in {"reflect", "repeat"} else "pad", offsets, stops
-    )
+    spread = given("spreadMethod") or ""
+    spread = spread if spread in {"reflect", "repeat"} else "pad"
+    return Gradient(is_radial, frame, focus, spread, offsets, stops)
 
 
 COMMON = {"gradientUnits", "gradientTransform", "spreadMethod"}
-"""Attributes that linear gradients take over from radial ones, and the other way round."""
-
+"""Attributes that linear and radial gradients inherit from each other."""
 
 PLACES = {"x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "fr"}
-"""Those that they take over from their own kind only."""
+"""Attributes that they inherit from their own kind only."""
 
 
-@dataclass(frozen=True)
-class Heritage:
-    """A gradient's own attributes and those it inherits through its chain of links."""
+class _Chain(NamedTuple):
+    """What a gradient and those that it links to, directly or not, have."""
 
     stops: Element | None
-    """The first one with stops; None where there is none, or what is no gradient comes before."""
-    said: dict[tuple[str, str], str]
-    """Attributes by kind of gradient, empty for ``COMMON``, and name."""
+    """The first gradient with stops; None: there is none before an element that is no gradient."""
+    attributes: dict[tuple[str, str], str]
+    """Values by kind of gradient, empty for ``COMMON``, and name."""
 
 
-def _heritage(element: Element, document: Document) -> Heritage:
-    """Each gradient of a document is looked at once, whatever links to it; twice where links go in a ring."""
+NOTHING = _Chain(None, {})
+
+
+def _chain(element: Element, document: Document) -> _Chain:
+    """Return a gradient's chain; each gradient of a document is visited once, or twice in a ring of links."""
     found = document.found
-    way: dict[Element, None] = {}
+    path: dict[Element, None] = {}
     at: Element | None = element
-    while at is not None and (_heritage, at) not in found and at not in way:
-        way[at] = None
+    while at is not None and (_chain, at) not in found and at not in path:
+        path[at] = None
         at = document.linked(at)
-    back = list(way)[::-1]
-    heritage: Heritage = found.get((_heritage, at), NOTHING) if at is not None else NOTHING
-    if at in way:  # a ring: the first one of it takes over from the last one as well, so it needs two rounds
+    back = list(path)[::-1]
+    chain: _Chain = found.get((_chain, at), NOTHING) if at is not None else NOTHING
+    if at in path:  # a ring: its first gradient inherits from its last as well, which takes two rounds
         for one in back[: back.index(at) + 1]:
-            heritage = _taken_over(one, heritage)
+            chain = _extended(one, chain)
     for one in back:
-        found[_heritage, one] = heritage = _taken_over(one, heritage)
-    return heritage
+        found[_chain, one] = chain = _extended(one, chain)
+    return chain
 
 
-NOTHING = Heritage(None, {})
-
-
-def _taken_over(element: Element, heritage: Heritage) -> Heritage:
+def _extended(element: Element, chain: _Chain) -> _Chain:
+    """Return the chain of an element that links to the first gradient of ``chain``."""
     kind = name_of(element)
     if kind not in GRADIENTS:
-        return Heritage(None, heritage.said)
+        return _Chain(None, chain.attributes)
     own = {
         ("" if name in COMMON else kind, name): text
         for name, text in element.attrib.items()
         if name in COMMON or name in PLACES
     }
     has_stops = any(name_of(child) == "stop" for child in element)
-    return Heritage(element if has_stops else heritage.stops, {**heritage.said, **own})
+    return _Chain(element if has_stops else chain.stops, {**chain.attributes, **own})
 
 
 def _linear_frame(get: Callable[[str, str], float]) -> Matrix | None:
-    """Frame of the axis; None where it has no length."""
-    start = np.array([get("x1", "0%"), get("y1", "0%")])
-    way = np.array([get("x2", "100%"), get("y2", "0%")]) - start
-    if not way.any():
-        return None
-    return np.array([[way[0], -way[1], start[0]], [way[1], way[0], start[1]], [0, 0, 1]])
+    """Return the frame of the axis; None if it has no length."""
+    start = x, y = get("x1", "0%"), get("y1", "0%")
+    dx, dy = np.array([get("x2", "100%"), get("y2", "0%")]) - start
+    return np.array([[dx, -dy, x], [dy, dx, y], [0, 0, 1]]) if dx or dy else None
 
 
 def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tuple[float, float, float]]:
-    """Frame of the circle, None where it has no radius, and the focus in it."""
+    """Return the frame of the circle, None if it has no radius, and the focus in it."""
     radius, x, y = get("r", "50%"), get("cx", "50%"), get("cy", "50%")
     if not radius > 0:
         return None, (0.0, 0.0, 0.0)
@@ -244,7 +237,7 @@ def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tupl
 
 
 def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[Flat, ...]]:
-    """Offsets and colours of a gradient's stops; each offset is at least the one before."""
+    """Return the offsets, each at least the one before, and the colours of a gradient's stops."""
     offsets: list[float] = []
     stops: list[Flat] = []
     for child in element:

@@ -1,7 +1,7 @@
-"""What an SVG's text says, found without drawing it: the one gate that every foreign SVG passes first.
+"""Checks that every foreign SVG passes first, and facts found without drawing it.
 
-Size, encoding, nesting and entities are bounded here, so that whatever reads the text afterwards (resvg, the
-reader of shapes) meets a well-formed document of bounded size.
+Size, encoding, nesting and entities are bounded here, so that resvg and the reader of shapes get a
+well-formed document of bounded size.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import io
 import math
 import re
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
@@ -22,36 +23,32 @@ from warpsplat.files.inputs import input_name, read_input
 NAMESPACE = "http://www.w3.org/2000/svg"
 
 MAX_BYTES = 256 << 20
-"""Longest text [bytes], unpacked."""
+"""Longest text [bytes], uncompressed."""
 
 MAX_DEPTH = 1000
 """Deepest nesting of elements; resvg reads 1,024 levels."""
 
 MAX_EXPANSION = 16 << 20
-"""Most characters that a document's entities may grow to."""
+"""Most characters that a document's entities may expand to."""
 
 MAX_PIXELS = 200_000_000
-"""Largest picture that is drawn [pixels]: four bytes each, as many again for each layer, and 8 s to pack."""
+"""Largest picture that is drawn [pixels]: four bytes each, as many for each layer, and 8 s to compress."""
 
 
 def read_svg_text(path: Path) -> str:
-    """Text of an SVG file, or of the standard input for ``-``; gzipped (``.svgz``) or not.
+    """Return the text of an SVG file, or of the standard input for ``-``; gzipped (``.svgz``) or not.
 
-    The encoding is the one that a byte order mark or the XML declaration names; the text returned names none
-    but UTF-8.
+    The encoding is the one that a byte order mark or the XML declaration names; the text returned declares
+    none but UTF-8.
 
     Raises:
-        ImageError: missing, unreadable, larger than ``MAX_BYTES`` or not text; the message names ``path``.
+        ImageError: Missing, unreadable, larger than ``MAX_BYTES`` or not text; the message names ``path``.
     """
     return svg_text(read_input(path, "an SVG", limit=MAX_BYTES), input_name(path))
 
 
 def svg_text(data: bytes, name: str) -> str:
-    """Text of the bytes of an SVG file, which messages call ``name``; see ``read_svg_text``.
-
-    Raises:
-        ImageError: larger than ``MAX_BYTES`` or not text.
-    """
+    """Return the text of an SVG file's bytes as ``read_svg_text``; ``name``: for messages."""
     try:
         if data[:2] == b"\x1f\x8b":
             with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
@@ -66,11 +63,11 @@ def svg_text(data: bytes, name: str) -> str:
 
 DECLARED = re.compile(r"""(\s*<\?xml\b[^>]{0,200}?\sencoding\s*=\s*)["']([\w.:-]{1,40})["']""")
 
-HEAD = 400
-"""Characters at the start in which an XML declaration stands."""
+DECLARATION_END = 400
+"""Characters at the start in which an XML declaration must stand."""
 
 ENCODINGS = ("utf-8", "ascii", "iso8859", "cp", "koi8", "mac", "shift_jis", "euc", "gb", "big5")
-"""How the names of the encodings of one byte a unit begin; Python knows others, which no viewer reads."""
+"""Prefixes of the encodings with units of one byte; Python knows others, which no viewer reads."""
 
 
 def _decode(data: bytes) -> str:
@@ -79,44 +76,43 @@ def _decode(data: bytes) -> str:
     elif data[:2] in {b"<\0", b"\0<"}:
         text = data.decode("utf-16-le" if data[1] == 0 else "utf-16-be")
     else:
-        declared = DECLARED.match(data[:HEAD].decode("latin-1"))
+        declared = DECLARED.match(data[:DECLARATION_END].decode("latin-1"))
         encoding = codecs.lookup(declared[2]).name if declared else "utf-8"
         if data.startswith(codecs.BOM_UTF8):
             encoding = "utf-8-sig"
         elif not encoding.startswith(ENCODINGS):
             raise LookupError(encoding)
         text = data.decode(encoding)
-    # Only where it counts, at the start: a search of the whole text for leading spaces is quadratic.
-    return DECLARED.sub(r'\1"UTF-8"', text[:HEAD], count=1) + text[HEAD:]
+    # At the start only: a search of the whole text for leading spaces is quadratic.
+    return DECLARED.sub(r'\1"UTF-8"', text[:DECLARATION_END], count=1) + text[DECLARATION_END:]
 
 
 @dataclass(frozen=True)
-class Facts:
-    """What one pass over an SVG's text finds."""
+class SvgFacts:
+    """Facts found in one pass over an SVG's text."""
 
-    root: dict[str, str] = field(default_factory=dict)
+    root: dict[str, str]
     """Attributes of the root element."""
-    paths: int = 0
-    """Elements that draw an outline, paths and basic shapes, as often as they are written: what ``use`` shows
-    again counts once. Left out are clips, masks, and a background: a rectangle that fills the view box and is
-    behind the others.
+    paths: int
+    """Paths and basic shapes, however often ``use`` shows them. Not counted are clips, masks, and a
+    background: a rectangle that fills the view box behind the others.
     """
-    nodes: int = 0
-    """Points that the paths pass through; of the same elements, other outlines count as one."""
+    nodes: int
+    """Points that these paths pass through; basic shapes count as one."""
 
 
 DRAWN = {f"{NAMESPACE} {tag}" for tag in ("rect", "circle", "ellipse", "polygon", "polyline", "line")}
 PATH, RECT = f"{NAMESPACE} path", f"{NAMESPACE} rect"
 HIDDEN = {f"{NAMESPACE} {tag}" for tag in ("clipPath", "mask")}
-"""Elements whose content is not drawn, but says what else is."""
+"""Elements whose content is not drawn itself."""
 ROOT = f"{NAMESPACE} svg"
 
 
-def inspect_svg(text: str) -> Facts:
-    """Check an SVG's text and gather what it says, in one pass of linear time.
+def inspect_svg(text: str) -> SvgFacts:
+    """Check an SVG's text and gather facts, in one pass of linear time.
 
     Raises:
-        ImageError: not well-formed, no SVG, too long, nested too deep, or with entities that multiply.
+        ImageError: Not well-formed, not an SVG, too long, nested too deep, or with entities that multiply.
     """
     root: dict[str, str] = {}
     depth = paths = nodes = longest = hidden = 0
@@ -169,17 +165,17 @@ def inspect_svg(text: str) -> Facts:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise ImageError(f"cannot be rendered: not well-formed XML: {error}") from None
-    return Facts(root, paths, nodes) if paths or not behind else Facts(root, 1, 1)
+    return SvgFacts(root, paths, nodes) if paths or not behind else SvgFacts(root, 1, 1)
 
 
 TOKEN = re.compile(r"([MLHVCSQTAZmlhvcsqtaz])|[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 ARGUMENTS = {"m": 2, "l": 2, "t": 2, "h": 1, "v": 1, "s": 4, "q": 4, "c": 6, "a": 7, "z": 0}
-"""Numbers that each node of a path command takes (SVG 1.1 section 8.3)."""
+"""Numbers that each path command takes for a node (SVG 1.1 section 8.3)."""
 COMPACT_FLAGS = re.compile(r"([\s,]*)([01])[\s,]*([01])")
 
 
 def path_nodes(data: str) -> int:
-    """Points that a path passes through."""
+    """Return the number of points that a path passes through."""
     nodes = count = position = 0
     size = 0
     arc = False
@@ -191,7 +187,7 @@ def path_nodes(data: str) -> int:
             arc = found[1] in "aA"
             continue
         count += 1
-        if arc and count % 7 == 3:  # flags may stand without anything between them and the next number
+        if arc and count % 7 == 3:  # flags need not be separated from the next number
             flags = COMPACT_FLAGS.match(data, position)
             if flags:
                 position = flags.end()
@@ -200,27 +196,20 @@ def path_nodes(data: str) -> int:
 
 
 PIXELS_PER_UNIT = {
-    "": 1.0,
-    "px": 1.0,
-    "in": 96.0,
-    "cm": 96 / 2.54,
-    "mm": 96 / 25.4,
-    "pt": 96 / 72,
-    "pc": 16.0,
-    "em": 16.0,
-    "ex": 8.0,
+    **{"": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "pt": 96 / 72, "pc": 16.0},
+    **{"em": 16.0, "ex": 8.0},
 }
-"""CSS absolute lengths, and those relative to the font: 16 px where nothing is said, as in resvg."""
+"""CSS absolute lengths, and those relative to the default font size of 16 px, as in resvg."""
 
-# With ``\d+\.?\d*`` a long row of digits could be split in as many ways as it has digits.
+# With ``\d+\.?\d*`` there would be as many ways to match a long row of digits as it has digits.
 NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 SEPARATOR = r"(?:\s*,\s*|\s+|(?=[-+]))"
 VIEW_BOX = re.compile(rf"\s*({NUMBER.pattern})" + 3 * rf"{SEPARATOR}({NUMBER.pattern})" + r"(?=[\s,]|$)")
 LENGTH = re.compile(rf"({NUMBER.pattern})(px|in|cm|mm|pt|pc|em|ex|%|)")
 
 
-def _covers(rectangle: dict[str, str], root: dict[str, str]) -> bool:
-    """Whether a rectangle with these attributes covers the view box, or the size, of a root with those."""
+def _covers(rectangle: Mapping[str, str], root: Mapping[str, str]) -> bool:
+    """Return whether a rectangle covers the view box, or the size, of a root; given their attributes."""
     if {"rx", "ry", "transform"} & rectangle.keys():
         return False
     box = view_box(root) or (0.0, 0.0, *(_plain(root.get(name, "")) for name in ("width", "height")))
@@ -232,15 +221,15 @@ def _covers(rectangle: dict[str, str], root: dict[str, str]) -> bool:
 
 
 def _plain(text: str, whole: float = math.nan) -> float:
-    """A number of pixels or units, ``whole`` for 100 %; not a number for all else."""
+    """Return a number of pixels or units, ``whole`` for 100 %, NaN for all else."""
     found = LENGTH.fullmatch(text.strip())
     if found and found[2] == "%":
         return whole if float(found[1]) == 100 else math.nan
     return float(found[1]) if found and found[2] in {"", "px"} else math.nan
 
 
-def view_box(root: dict[str, str]) -> tuple[float, float, float, float] | None:
-    """The ``viewBox`` (x, y, width, height) of a root's attributes; None if there is none that counts."""
+def view_box(root: Mapping[str, str]) -> tuple[float, float, float, float] | None:
+    """Return the ``viewBox`` (x, y, width, height) among attributes; None if there is no valid one."""
     found = VIEW_BOX.match(root.get("viewBox", ""))
     if not found:
         return None
@@ -250,13 +239,13 @@ def view_box(root: dict[str, str]) -> tuple[float, float, float, float] | None:
     return x, y, width, height
 
 
-def svg_size(root: dict[str, str]) -> tuple[float, float] | None:
-    """Size [px] at which a viewer (resvg) shows an SVG with these attributes of its root.
+def svg_size(root: Mapping[str, str]) -> tuple[float, float] | None:
+    """Return the size [px] at which resvg shows an SVG, given the attributes of its root.
 
-    None where the root does not say it: resvg then takes the extent of what is drawn.
+    None: the root does not state it; resvg then takes the extent of the drawing.
 
     Raises:
-        ImageError: a size that is not positive, or of more than ``MAX_PIXELS``.
+        ImageError: The size is not positive, or more than ``MAX_PIXELS``.
     """
     box = view_box(root)
     own_font = "font-size" in root or "font" in root.get("style", "")

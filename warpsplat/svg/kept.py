@@ -1,4 +1,4 @@
-"""What a scene cannot hold and a file keeps: elements of the document, each whole."""
+"""Elements that a scene cannot hold and a file keeps whole."""
 
 from __future__ import annotations
 
@@ -15,45 +15,44 @@ from warpsplat.svg.shapes import Shape
 
 @dataclass(frozen=True)
 class Kept:
-    """An element that stays as it is."""
+    """An element that is kept."""
 
     element: Element
     cause: str
-    """What of it no scene can hold."""
+    """Why no scene can hold it."""
     blends: bool
     """Whether its colours depend on what lies below."""
 
 
 Part = Shape | Kept
-"""What a document draws, in painter's order."""
 
 
 def shapes_of(parts: Sequence[Part]) -> list[Shape]:
-    """Those of ``parts`` that are shapes."""
+    """Return the parts that are shapes."""
     return [part for part in parts if isinstance(part, Shape)]
 
 
 class Keeping:
-    """Which elements of a document are kept: the smallest that show the same without what is around them."""
+    """Decides which elements to keep: the smallest that look the same without what is around them."""
 
     def __init__(self, document: Document) -> None:
         self._blends = "mix-blend-mode" in document.css
         self._isolates = "isolation" in document.css
 
     def part(self, element: Element, error: ImageError) -> Kept:
-        """An element that cannot be read for the reason that ``error`` says."""
+        """Return a part for an element that cannot be read because of ``error``."""
         blends = self._blends or any("mix-blend-mode" in child.get("style", "") for child in element.iter())
         return Kept(element, str(error), blends)
 
     def isolates(self, group: Element) -> bool:
-        """Whether what is in a group blends with nothing below the group, clips aside."""
+        """Return whether a group's content blends with nothing below the group; clips aside."""
         return self._isolates or "isolation" in group.get("style", "")
 
     def inside(self, parts: list[Part], clip: Points | None) -> list[Part]:
-        """The parts of a group that isolates, or clips.
+        """Return the parts of a group that isolates or clips.
 
         Raises:
-            ImageError: they show something else without the group.
+            ImageError: They look different without the group.
         """
         if any(isinstance(part, Kept) and part.blends for part in parts):
             raise ImageError("uses a blend mode in a group, not supported")

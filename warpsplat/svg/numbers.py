@@ -10,7 +10,7 @@ from warpsplat.scene import FloatArray
 
 
 def number(value: float, decimals: int) -> str:
-    """Shortest decimal form: no trailing zeros, no leading zero, no negative zero."""
+    """Return the shortest decimal form: no trailing zeros, no leading zero, no negative zero."""
     text = f"{value:.{decimals}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
@@ -20,7 +20,7 @@ def number(value: float, decimals: int) -> str:
 
 
 def hex_colors(colors: FloatArray) -> list[str]:
-    """sRGB in [0, 1], shape (n, 3) -> ``#rrggbb``, or ``#rgb`` where that is the same."""
+    """Return sRGB colours in [0, 1], shape (n, 3), as ``#rrggbb``, or as ``#rgb`` where that is the same."""
     levels = np.clip(np.round(colors.astype(np.float64) * 255), 0, 255).astype(np.int64)
     texts = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in levels.tolist()]
     return [f"#{t[1]}{t[3]}{t[5]}" if t[1] == t[2] and t[3] == t[4] and t[5] == t[6] else t for t in texts]

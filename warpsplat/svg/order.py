@@ -1,7 +1,7 @@
-"""An order of painting that shows the same and in which neighbours are alike.
+"""Painting orders that look the same and bring similar shapes together.
 
-Shapes that do not overlap may change places. So those of one opacity are brought together, for a group to say
-it of all of them, or those of one colour, for a group to be edited as one.
+Shapes that do not overlap may change places: those of one opacity, so that a group states it once, or those
+of one colour, so that they can be edited as one.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 
 BLOCK = 1024
-"""Shapes that are looked at together: the time grows with the square."""
+"""Shapes that are ordered together: the time grows with the square."""
 
 MARGIN = 1.0
-"""Shapes nearer to each other than this [px] count as overlapping: edges are soft."""
+"""Shapes closer to each other than this [px] count as overlapping: edges are soft."""
 
 
 def by_opacity(scene: Scene) -> IndexArray:
-    """Order of the shapes in which runs of equal kind and opacity are long, shape (shape,).
+    """Return an order of the shapes with long runs of equal kind and opacity, shape (shape,).
 
-    Overlapping shapes keep their order, and all their layers. Greedy: of the shapes that nothing unpainted
-    lies below, the kind and opacity come next that make the longest run.
+    Overlapping shapes keep their order, and all shapes their layers. Greedy: of the shapes with nothing
+    unpainted below, those of the kind and opacity with the longest run come next.
     """
     return _by(scene, list(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True)))
 
 
 def by_color(scene: Scene) -> IndexArray:
-    """The same of equal kind, paint and colour in 8 bits."""
+    """Return an order with long runs of equal kind, paint and colour in 8 bits, as ``by_opacity``."""
     levels = (np.round(255 * scene.colors).astype(np.int64) * [1 << 16, 1 << 8, 1]).sum(axis=1)
     kinds = scene.kind.astype(np.int64) + len(Kind) * scene.paint
     return _by(scene, list(zip(kinds.tolist(), levels.astype(np.float64).tolist(), strict=True)))
 
 
 def _by(scene: Scene, keys: Sequence[tuple[int, float]]) -> IndexArray:
-    """Order in which runs of equal keys are long."""
+    """Return an order with long runs of equal keys."""
     boxes = bounds(scene)
     order: list[int] = []
     for start, end in itertools.pairwise((0, *level_ends(scene), len(scene))):
@@ -51,12 +51,12 @@ def _by(scene: Scene, keys: Sequence[tuple[int, float]]) -> IndexArray:
 
 
 def _arrange(boxes: FloatArray, keys: Sequence[tuple[int, float]]) -> list[int]:
-    """Order of shapes with these boxes and keys."""
+    """Return the order of shapes with these boxes and keys."""
     low, high = boxes[:, :2] - MARGIN / 2, boxes[:, 2:] + MARGIN / 2
     overlap: npt.NDArray[np.bool_] = np.all((low[:, None] < high[None]) & (low[None] < high[:, None]), axis=2)
     above = [np.flatnonzero(overlap[i, i + 1 :]) + i + 1 for i in range(len(keys))]
     below = np.triu(overlap, 1).sum(axis=0)
-    """Unpainted shapes that lie under each."""
+    """Number of unpainted shapes under each."""
     ready = [i for i in range(len(keys)) if below[i] == 0]
     order: list[int] = []
     while ready:
@@ -78,7 +78,7 @@ def _run(
     above: Sequence[npt.NDArray[np.intp]],
     below: npt.NDArray[np.int_],
 ) -> list[int]:
-    """Shapes with ``key`` that can be painted one after another."""
+    """Return the shapes with ``key`` that can be painted one after another."""
     run: list[int] = []
     todo = [i for i in reversed(ready) if keys[i] == key]
     left: dict[int, int] = {}

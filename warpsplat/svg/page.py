@@ -1,4 +1,4 @@
-"""A file as large as a sheet of paper: what plotters and printers take."""
+"""Files as large as a sheet of paper, for plotters and printers."""
 
 from __future__ import annotations
 
@@ -8,44 +8,39 @@ from dataclasses import dataclass
 
 from warpsplat.errors import UsageError, cut, shown
 from warpsplat.svg.numbers import number
-from warpsplat.svg.write import GRIDS, MARK, NAMESPACE
+from warpsplat.svg.write import GRIDS, MARK, NAMESPACE, own_head
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
-"""Of a unit of CSS."""
+"""Length of a CSS unit [mm]."""
 
 PAGES = {"a3": (297.0, 420.0), "a4": (210.0, 297.0), "a5": (148.0, 210.0), "letter": (215.9, 279.4)}
 """Width and height of sheets upright [mm]."""
 
 MARGIN = 10.0
-"""Of a page on each side, where none is given [mm]."""
+"""Default margin of a page on each side [mm]."""
 
 LARGEST = 10_000.0
-"""Of a side [mm]."""
-
-HEAD = re.compile(
-    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)"'
-)
-"""How a file written here begins: its size in pixels, and that in units of its view box."""
+"""Longest side of a sheet [mm]."""
 
 VIEW = re.compile(
     rf'<svg xmlns="{re.escape(NAMESPACE)}" (width="[\d.]+[a-z]+" height="[\d.]+[a-z]+") '
     r'viewBox="(-?[\d.]+) (-?[\d.]+) ([\d.]+) ([\d.]+)"'
 )
-"""How a file written here begins that lies on a sheet: the sheet's size, and what it covers of the units."""
+"""The beginning of a file on a sheet: the sheet's size, and its box in units of the file."""
 
 OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
-"""The same of one that nobody else wrote: others may have margins that belong to the picture."""
+"""The same, surely written here: margins of other files may belong to the picture."""
 
 NUMBER = r"(\d+(?:\.\d+)?)"
 SIZE = re.compile(rf"{NUMBER}\s*[x×]\s*{NUMBER}\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
 
 DECIMALS = 3
-"""Of a size [mm]."""
+"""Decimals of sizes and boxes."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """What a picture is drawn on."""
+    """The paper that a picture is drawn on."""
 
     width: float
     """[mm]"""
@@ -54,18 +49,18 @@ class Sheet:
     margin: float = 0.0
     """Kept free on each side [mm]."""
     unit: str = "mm"
-    """In which the file says its size."""
+    """Unit of the size in the file."""
 
 
 def parse_size(text: str, unit: str = "mm") -> Sheet:
-    """``200x150mm`` or ``8x6in`` -> a sheet that the picture fills as far as its proportions allow.
+    """Return the sheet of a size such as ``200x150mm`` or ``8x6in``.
 
     Args:
-        text: width and height; without a unit, in ``unit``.
-        unit: in which the file says its size.
+        text: Width and height; without a unit, in ``unit``.
+        unit: Unit of the size in the file.
 
     Raises:
-        UsageError: it is no size.
+        UsageError: The text is not a size.
     """
     check_unit(unit)
     found = SIZE.fullmatch(text.strip())
@@ -76,17 +71,17 @@ def parse_size(text: str, unit: str = "mm") -> Sheet:
 
 
 def parse_page(name: str, width: int, height: int, margin: float = MARGIN, unit: str = "mm") -> Sheet:
-    """A sheet of a standard format, on its side for a picture that is wider than high.
+    """Return a sheet of a standard format, in landscape for a picture that is wider than high.
 
     Args:
-        name: of the format.
-        width: of the picture.
-        height: of the picture.
-        margin: kept free on each side [mm].
-        unit: in which the file says its size.
+        name: The format.
+        width: Width of the picture.
+        height: Height of the picture.
+        margin: Kept free on each side [mm].
+        unit: Unit of the size in the file.
 
     Raises:
-        UsageError: there is no such format, or no room between the margins.
+        UsageError: There is no such format, or no space between the margins.
     """
     check_unit(unit)
     if name.lower() not in PAGES:
@@ -97,11 +92,7 @@ def parse_page(name: str, width: int, height: int, margin: float = MARGIN, unit:
 
 
 def check_unit(unit: str) -> None:
-    """Whether files can say their size in ``unit``.
-
-    Raises:
-        UsageError: they cannot.
-    """
+    """Raise ``UsageError`` for a unit that files cannot have."""
     if unit not in MILLIMETRES:
         raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {shown(unit)}")
 
@@ -114,13 +105,9 @@ def _checked(sheet: Sheet, name: str) -> Sheet:
 
 
 def check_placing(size: str, page: str, unit: str) -> None:
-    """Whether ``placed`` will understand these.
-
-    Raises:
-        UsageError: as there, or one is no text.
-    """
+    """Raise ``UsageError`` for options that ``placed`` does not understand."""
     for name, value in (("size", size), ("page", page), ("units", unit)):
-        if not isinstance(value, str):  # as batch files and callers in Python may give it
+        if not isinstance(value, str):  # batch files and callers in Python may give anything
             raise UsageError(f"{name} must be text, not {shown(value)}")
     if size and page:
         raise UsageError("size and page do not go together")
@@ -133,49 +120,37 @@ def check_placing(size: str, page: str, unit: str) -> None:
 
 
 def placed(text: str, size: str, page: str, unit: str) -> str:
-    """A file written here as large as options ask for.
+    """Return a file written here, as large as options ask for.
 
     Args:
-        text: the file.
-        size: as ``parse_size`` takes it; empty: none.
-        page: as ``parse_page`` takes it; empty: none.
-        unit: in which the file says its size; empty: pixels, or millimetres of a size or page.
+        text: The file.
+        size: A size as for ``parse_size``; empty: none.
+        page: A page as for ``parse_page``; empty: none.
+        unit: Unit of the file's size; empty: pixels, or millimetres of a size or page.
 
     Raises:
-        UsageError: one of them is not understood, or both a size and a page are given.
+        UsageError: An option is invalid, or both a size and a page are given.
     """
     check_placing(size, page, unit)
     if not (size or page or unit):
         return text
-    found = HEAD.match(text)
-    assert found
     if size:
         return on_sheet(text, parse_size(size, unit or "mm"))
+    head = own_head(text)
+    width, height = int(head[1]), int(head[2])
     if page:
-        return on_sheet(text, parse_page(page, int(found[1]), int(found[2]), unit=unit or "mm"))
-    return in_units(text, unit)
-
-
-def in_units(text: str, unit: str, dpi: float = 96.0) -> str:
-    """A file written here with its own size in ``unit``, at ``dpi`` pixels an inch.
-
-    Raises:
-        UsageError: files cannot say their size in ``unit``.
-    """
-    check_unit(unit)
-    found = HEAD.match(text)
-    assert found
-    width, height = (float(found[i]) * 25.4 / dpi for i in (1, 2))
-    return _with_size(text, Sheet(width, height, unit=unit), (0, 0, float(found[3]), float(found[4])))
+        return on_sheet(text, parse_page(page, width, height, unit=unit or "mm"))
+    sheet = Sheet(width * 25.4 / 96, height * 25.4 / 96, unit=unit)
+    return _with_size(text, sheet, (0, 0, float(head[3]), float(head[4])))
 
 
 def on_sheet(text: str, sheet: Sheet) -> str:
-    """A file written here, as large as the sheet allows and in its middle. Paths stay as they are: the view
-    box, in whole units, is what the sheet covers.
+    """Return a file written here, as large as the sheet allows and centred.
+
+    Paths stay as they are: the view box, in whole units, is what the sheet covers.
     """
-    found = HEAD.match(text)
-    assert found
-    width, height = float(found[3]), float(found[4])
+    head = own_head(text)
+    width, height = float(head[3]), float(head[4])
     units = max(width / (sheet.width - 2 * sheet.margin), height / (sheet.height - 2 * sheet.margin))
     across, down = math.ceil(sheet.width * units), math.ceil(sheet.height * units)
     left, top = round((width - across) / 2), round((height - down) / 2)
@@ -183,34 +158,36 @@ def on_sheet(text: str, sheet: Sheet) -> str:
 
 
 def _with_size(text: str, sheet: Sheet, view: tuple[float, float, float, float]) -> str:
-    """The file with another size and view box."""
+    """Return the file with another size and view box."""
     width, height = (
         number(side / MILLIMETRES[sheet.unit], DECIMALS) + sheet.unit for side in (sheet.width, sheet.height)
     )
     box = " ".join(number(value, DECIMALS) for value in view)
-    found = HEAD.match(text)
-    assert found
-    return f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{box}"{text[found.end() :]}'
+    return _with_head(text, f'width="{width}" height="{height}"', box)
+
+
+def _with_head(text: str, size: str, box: str) -> str:
+    return f'<svg xmlns="{NAMESPACE}" {size} viewBox="{box}">{text[own_head(text).end() :]}'
 
 
 PROPORTIONS = 0.02
-"""By how much the sides of a picture on a sheet may differ from those of an image, over them."""
+"""Largest relative difference between the proportions of a picture on a sheet and those of an image."""
 
 
 def picture_view(svg: str, width: int, height: int) -> str | None:
-    """The view box of the picture alone, of one that lies in the middle of a sheet; None: of any other, and
-    where it has not the proportions of the image.
+    """Return the view box of the picture alone in a file that has it in the middle of a sheet, or None.
 
-    ``width``, ``height``: of the image [px]. Margins are in whole units, so that what they leave is up to a
-    unit more or less than the picture, whose pixels have a number of units that files know (``GRIDS``).
+    None as well if the picture has not the proportions of the image, ``width`` x ``height`` px. Margins are
+    in whole units, so that the space between them is up to a unit more or less than the picture, whose pixels
+    are one of ``GRIDS`` units wide.
     """
     found = VIEW.match(svg)
     if not found:
         return None
     left, top, across, down = (float(found[i]) for i in range(2, 6))
-    rooms = ((across + 2 * left) / width, (down + 2 * top) / height)
-    low = max(room - 1 / side for room, side in zip(rooms, (width, height), strict=True))
-    high = min(room + 1 / side for room, side in zip(rooms, (width, height), strict=True))
+    spaces = (((across + 2 * left) / width, width), ((down + 2 * top) / height, height))
+    low = max(space - 1 / side for space, side in spaces)
+    high = min(space + 1 / side for space, side in spaces)
     middle = (low + high) / 2
     if low > (1 + PROPORTIONS) * high or middle <= 0:
         return None
@@ -220,17 +197,19 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
 
 
 def with_view(svg: str, view: str, width: int, height: int) -> str:
-    """A file on a sheet with the view box ``view``, as large as the image [px]."""
+    """Return a file on a sheet with the view box ``view`` and the image's size [px]."""
     head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}"'
     return VIEW.sub(head, svg, count=1)
 
 
 def on_sheet_of(svg: str, view: str, text: str) -> str:
-    """A file written here, ``text``, on the sheet of another one, ``svg``, whose picture has the view box
-    ``view``: in the same place, as large.
+    """Return ``text``, a file written here, on the sheet of ``svg``, in the place and size of the picture
+    there.
+
+    ``view``: that picture's view box.
     """
-    sheet, found = VIEW.match(svg), HEAD.match(text)
-    assert sheet and found
-    scale = float(found[3]) / float(view.split()[2])
+    sheet = VIEW.match(svg)
+    assert sheet
+    scale = float(own_head(text)[3]) / float(view.split()[2])
     box = " ".join(number(scale * float(sheet[i]), DECIMALS) for i in range(2, 6))
-    return f'<svg xmlns="{NAMESPACE}" {sheet[1]} viewBox="{box}"{text[found.end() :]}'
+    return _with_head(text, sheet[1], box)

@@ -14,19 +14,19 @@ from warpsplat.svg.numbers import hex_colors, number
 Floats = npt.NDArray[np.float64]
 
 PLACE_DECIMALS = 2
-"""Of a place in units of the view box that are coarser than pixels, or that periods are counted in."""
+"""Decimals of positions where units of the view box are coarser than pixels, or the gradient repeats."""
 
 SHARE_DECIMALS = 3
-"""Of an offset, and of what is in the unit space of a gradient: a thousandth of its extent."""
+"""Decimals of offsets and of positions in a gradient's unit space: a thousandth of its extent."""
 
 ROUND = 1e-3
-"""A frame is a circle's where its axes differ by no more than this share in length and from a right angle."""
+"""Largest relative difference of a circle's axes in length, and from a right angle."""
 
 SPREADS = {Spread.PAD: "", Spread.REFLECT: ' spreadMethod="reflect"', Spread.REPEAT: ' spreadMethod="repeat"'}
 
 
 def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]]:
-    """Elements, and the identifier of each shape that has one; alike gradients are one."""
+    """Return gradient elements, each once, and the identifier of each shape's gradient."""
     elements: dict[str, str] = {}
     owners = {}
     prefix = unused("g", "".join(picture.markup for picture in scene.pictures))
@@ -38,7 +38,7 @@ def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]
 
 
 def unused(prefix: str, text: str) -> str:
-    """``prefix``, longer by as many of its last letter that no name in ``text`` is it and a digit."""
+    """Return ``prefix``, its last letter repeated until no name in ``text`` begins with it and a digit."""
     taken = set(re.findall(rf"\b({prefix}{prefix[-1]}*)\d", text))
     while prefix in taken:
         prefix += prefix[-1]
@@ -46,10 +46,10 @@ def unused(prefix: str, text: str) -> str:
 
 
 def _gradient(scene: Scene, shape: int, per_pixel: float) -> str:
-    """The element without its identifier."""
+    """Return a shape's gradient element, without its identifier."""
     frame = scene.frames[shape].astype(np.float64) * per_pixel
     origin, axes = frame[:2], frame[2:].reshape(2, 2)
-    # As outlines, ramps lie on whole units.
+    # Ramps lie on whole units, as outlines do.
     decimals = 0 if per_pixel >= 1 and scene.spread[shape] == Spread.PAD else PLACE_DECIMALS
     if scene.paint[shape] == Paint.LINEAR:
         tag, place = "linearGradient", _line(origin, axes, decimals)
@@ -64,23 +64,23 @@ def _attributes(values: dict[str, float], decimals: int) -> str:
 
 
 def _line(origin: Floats, axes: Floats, decimals: int) -> str:
-    """From where t is 0 to where it is 1, straight across the lines of equal colour."""
+    """Return the ends of a linear gradient, perpendicular to its lines of equal colour."""
     along, across = axes
     normal = np.array([across[1], -across[0]])
     reach = float((along * normal).sum())
     square = float((normal * normal).sum())
-    way = normal * reach / square if square > 0 else along
-    (x1, y1), (x2, y2) = origin, origin + way
+    axis = normal * reach / square if square > 0 else along
+    (x1, y1), (x2, y2) = origin, origin + axis
     return _attributes({"x1": x1, "y1": y1, "x2": x2, "y2": y2}, decimals)
 
 
 def _circle(origin: Floats, axes: Floats, focus: Floats, decimals: int) -> str:
-    """A circle where the frame is one, else the unit circle under the frame's map."""
+    """Return a circle if the frame is one's, else the unit circle under the frame's map."""
     along, across = axes
     length = math.sqrt(float((along * along).sum()))
-    turned = np.array([-along[1], along[0]])
+    upright = np.array([-along[1], along[0]])
     fx, fy, fr = focus.tolist()
-    if min(np.abs(across - turned).max(), np.abs(across + turned).max()) <= ROUND * length:
+    if min(np.abs(across - upright).max(), np.abs(across + upright).max()) <= ROUND * length:
         place = {"cx": origin[0], "cy": origin[1], "r": length}
         if fx or fy:
             place["fx"], place["fy"] = origin + fx * along + fy * across

@@ -1,4 +1,4 @@
-"""Shapes of very many nodes as several paths: beyond some number editors slow down and plotters refuse."""
+"""Shapes with very many nodes as several paths: editors slow down and plotters refuse."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 from warpsplat.scene.scene import ranges, starts_of
 
 MOST_NODES = 32_000
-"""Of a path."""
+"""Most nodes of a path."""
 
 MARGIN = 1.0
-"""Contours nearer to each other than this [px] stay in one path: there the edges of both are seen."""
+"""Contours closer to each other than this [px] stay in one path: the edges of both share pixels."""
 
 
 def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
-    """``scene`` with shapes of more than ``most`` nodes as several that show the same.
+    """Return ``scene`` with shapes of more than ``most`` nodes as several that look the same.
 
-    Contours stay together whose boxes meet, as one may be a hole of the other, or both may be translucent: a
-    shape whose contours all meet stays whole. So does one that is filled and stroked.
+    Contours whose boxes meet stay together, as one may be a hole in the other, or both may be translucent.
+    Shapes that are filled and stroked stay whole.
     """
     contours = np.searchsorted(scene.starts, scene.first).astype(np.intp)
     nodes = _nodes(scene)
@@ -40,26 +40,21 @@ def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
 
 
 def _nodes(scene: Scene) -> IndexArray:
-    """Nodes of each contour: where its segments begin and end."""
+    """Return the number of nodes of each contour: where its segments begin and end."""
     points = np.diff(scene.starts)
     shape = np.searchsorted(scene.first, scene.starts[:-1], "right") - 1
     return np.where(scene.basis[shape] == Basis.CUBIC, -(-points // 3), points).astype(np.intp)
 
 
 def _boxes(scene: Scene) -> FloatArray:
-    """Of the control points of each contour, shape (contour, 4)."""
+    """Return the box of each contour's control points, shape (contour, 4)."""
     low = np.minimum.reduceat(scene.points, scene.starts[:-1], axis=0)
     high = np.maximum.reduceat(scene.points, scene.starts[:-1], axis=0)
     return np.concatenate([low, high], axis=1)
 
 
 def _clusters(boxes: FloatArray, pad: float) -> list[list[int]]:
-    """Contours that stay together, in the order of their first ones.
-
-    Args:
-        boxes: of the contours, shape (contour, 4).
-        pad: what each box grows by.
-    """
+    """Return groups of contours whose boxes, shape (contour, 4), meet when grown by ``pad``."""
     low, high = boxes[:, :2] - pad, boxes[:, 2:] + pad
     owner = np.arange(len(boxes))
     for i in range(1, len(boxes)):
@@ -71,28 +66,28 @@ def _clusters(boxes: FloatArray, pad: float) -> list[list[int]]:
 
 
 def _packed(clusters: list[list[int]], nodes: IndexArray, most: int) -> list[list[int]]:
-    """Clusters put together, one after another, as far as ``most`` nodes allow."""
+    """Return clusters joined, one after another, into parts of up to ``most`` nodes."""
     parts: list[list[int]] = []
-    room = 0
+    left = 0
     for cluster in clusters:
         need = int(nodes[cluster].sum())
-        if not parts or need > room:
+        if not parts or need > left:
             parts.append([])
-            room = most
+            left = most
         parts[-1] += cluster
-        room -= need
+        left -= need
     return parts
 
 
 def _with_parts(scene: Scene, parts: list[list[IndexArray]]) -> Scene:
-    """``scene`` with shapes of these contours, by shape."""
-    made = scene.take(np.repeat(np.arange(len(scene)), [len(own) for own in parts]))
+    """Return ``scene`` with shapes split into ``parts``: lists of contours, by shape."""
+    split = scene.take(np.repeat(np.arange(len(scene)), [len(own) for own in parts]))
     order = [part for own in parts for part in own]
     contours = np.concatenate(order)
     counts = np.diff(scene.starts)[contours]
     starts = starts_of(counts)
     return replace(
-        made,
+        split,
         points=scene.points[ranges(scene.starts[contours], counts)],
         starts=starts,
         closed=scene.closed[contours],

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from warpsplat.portable.elementary import arctan2, cos, sin, tan
 from warpsplat.portable.linear import product
 from warpsplat.svg.inspect import ARGUMENTS, NUMBER
-from warpsplat.svg.values import SPACE, numbers
+from warpsplat.svg.values import after_space, numbers
 
 Points = npt.NDArray[np.float64]
 
@@ -21,35 +21,35 @@ FLAG = re.compile(r"[01]")
 
 
 CLOSES = 1e-3
-"""Largest distance [px] of a closed spline's start from where its control points would have it."""
+"""Largest distance [px] of a closed spline's start from the middle of its control points."""
 
 
 class Subpath(NamedTuple):
-    """What one move of the pen draws."""
+    """A part of a path that is drawn without lifting the pen."""
 
     points: Points
-    """Of cubics: p0, c, c, p3, c, c, p6 ..., shape (1 + 3 cubics, 2)."""
+    """Points of cubics: p0, c, c, p3, c, c, p6 ..., shape (1 + 3 cubics, 2)."""
     is_closed: bool
     """Whether it ends with the command that closes it."""
     is_spline: bool
-    """Whether it is a quadratic and then only smooth ones: a uniform quadratic B-spline."""
+    """Whether it is a quadratic followed by smooth ones only: a uniform quadratic B-spline."""
 
     def moved(self, linear: Points, shift: Points) -> Subpath:
-        """Under an affine map."""
+        """Return it under an affine map."""
         return self._replace(points=product(self.points, linear.T) + shift)
 
     def controls(self) -> Points:
-        """Control points of the quadratics, shape (quadratic, 2)."""
+        """Return the control points of the quadratics, shape (quadratic, 2)."""
         return 1.5 * self.points[1::3] - 0.5 * self.points[:-1:3]
 
     def spline_chain(self) -> Points | None:
-        """A spline's ``Scene`` points as a stroke; None if it is none."""
+        """Return a spline's ``Scene`` points as an open contour; None if it is not a spline."""
         if not self.is_spline:
             return None
         return np.concatenate([self.points[:1], self.controls(), self.points[-1:]])
 
     def spline_ring(self) -> Points | None:
-        """A spline's ``Scene`` points as a fill; None if it is none, or does not close smoothly."""
+        """Return a spline's ``Scene`` points as a ring; None if it does not close smoothly."""
         controls = self.controls()
         if not self.is_spline or len(controls) < 3:
             return None
@@ -58,13 +58,13 @@ class Subpath(NamedTuple):
 
 
 def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
-    """Subpaths of path data, up to the first error if it has any (SVG 1.1, F.2).
+    """Return the subpaths of path data, up to its first error if it has any (SVG 1.1, F.2).
 
     ``keep_dots`` keeps subpaths without extent, which show in a stroke.
     """
     data = data.strip()
     if data in {"", "none"} or data[0] not in "Mm":
-        return []  # draws nothing, in viewers too
+        return []
     pen = _Pen()
     for command, text in COMMAND.findall(data):
         size = ARGUMENTS[command.lower()]
@@ -83,22 +83,23 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
 
 
 def _arc_arguments(text: str) -> tuple[list[float], bool]:
-    """The numbers of arcs, and whether that is all. The flags are one character, and may stand without
-    anything between them and the next number.
+    """Return the numbers of arcs, and whether they are all of the text.
+
+    A flag is one character, and need not be separated from the next number.
     """
     values: list[float] = []
-    position = SPACE.match(text).end()  # type: ignore[union-attr]  # matches the empty text
+    position = after_space(text, 0)
     while position < len(text):
         found = (FLAG if len(values) % 7 in {3, 4} else NUMBER).match(text, position)
         if not found:
             return values, False
         values.append(float(found[0]))
-        position = SPACE.match(text, found.end()).end()  # type: ignore[union-attr]
+        position = after_space(text, found.end())
     return values, True
 
 
 class _Pen:
-    """Draws commands as cubics; points are complex numbers."""
+    """A pen that draws commands as cubics; points are complex numbers."""
 
     def __init__(self) -> None:
         self.subpaths: list[tuple[list[complex], bool, bool]] = []
@@ -107,10 +108,10 @@ class _Pen:
         """Whether the subpath is a spline so far."""
         self.at = self.start = 0j
         self.control: tuple[str, complex] = ("", 0j)
-        """Kind (``c`` or ``q``) and last control point of the command before."""
+        """Family (``c`` or ``q``) and last control point of the command before."""
 
     def draw(self, command: str, v: list[float]) -> None:
-        """One command with the arguments of one node."""
+        """Draw one command with the arguments of one node."""
         kind = command.lower()
         origin = self.at if command == kind else 0j
         if kind == "m":
@@ -118,15 +119,15 @@ class _Pen:
             self.at = self.start = origin + complex(v[0], v[1])
             self.points = [self.at]
         elif kind == "z":
-            # Relative coordinates come back to the start but for rounding: no further cubic for that.
+            # Relative coordinates return to the start up to rounding, which needs no further cubic.
             if not (_is_near(self.at.real, self.start.real) and _is_near(self.at.imag, self.start.imag)):
                 self._line(self.start)
                 self.is_spline = False
             self._lift(True)
         else:
-            if not self.points:  # goes on after a subpath was closed
+            if not self.points:  # a subpath was closed before
                 self.points = [self.at]
-            # The first of a chain has a control point of its own, the others follow.
+            # In a spline only the first command has a control point.
             self.is_spline &= kind == ("t" if len(self.points) > 1 else "q")
             self._segment(kind, v, origin)
             return
@@ -162,7 +163,7 @@ class _Pen:
         self.is_spline = True
 
     def finish(self, keep_dots: bool) -> list[tuple[list[complex], bool, bool]]:
-        """All subpaths; a closed point, if dots are kept, as a cubic without extent."""
+        """Return all subpaths; a closed point, if dots are kept, as a cubic without extent."""
         self._lift(False)
         return [
             (4 * points if keep_dots and is_closed and len(points) == 1 else points, is_closed, is_spline)
@@ -174,23 +175,23 @@ class _Pen:
         self.at = end
 
     def _arc(self, v: list[float], end: complex) -> None:
-        """An elliptical arc, a quarter of the ellipse a cubic (SVG 1.1 appendix F.6)."""
+        """Draw an elliptical arc, a cubic for each quarter of the ellipse (SVG 1.1 appendix F.6)."""
         start, rx, ry = self.at, abs(v[0]), abs(v[1])
         if start == end:
             return
         if not (rx > 0 and ry > 0):
             self._line(end)
             return
-        # In the ellipse's own coordinates, in which it is a circle, half way between start and end.
+        # Half of the chord in the ellipse's own coordinates, in which it is a circle.
         angle = math.radians(v[2])
         cosine, sine = float(cos(angle)), float(sin(angle))
-        way = (start - end) / 2
-        x, y = (way.real * cosine + way.imag * sine) / rx, (way.imag * cosine - way.real * sine) / ry
+        chord = (start - end) / 2
+        x, y = (chord.real * cosine + chord.imag * sine) / rx, (chord.imag * cosine - chord.real * sine) / ry
         half = math.sqrt(x * x + y * y)
         across = 0.0
         if half < 1:
             across = math.sqrt(1 / (half * half) - 1) * (-1 if bool(v[3]) == bool(v[4]) else 1)
-        else:  # an ellipse too small grows until it reaches
+        else:  # an ellipse that is too small grows until it reaches
             x, y, rx, ry = x / half, y / half, rx * half, ry * half
         center_x, center_y = y * across, -x * across
         first = float(arctan2(y - center_y, x - center_x))
@@ -204,10 +205,8 @@ class _Pen:
             return (start + end) / 2 + complex(x * cosine - y * sine, x * sine + y * cosine)
 
         for i in range(count):
-            (ax, ay), (bx, by) = (
-                (float(cos(turn)), float(sin(turn)))
-                for turn in (first + sweep * i / count, first + sweep * (i + 1) / count)
-            )
+            ends = (first + sweep * i / count, first + sweep * (i + 1) / count)
+            (ax, ay), (bx, by) = ((float(cos(angle)), float(sin(angle))) for angle in ends)
             self.points += [
                 back(ax - ay * reach, ay + ax * reach),
                 back(bx + by * reach, by - bx * reach),
@@ -221,5 +220,5 @@ def _is_near(a: float, b: float) -> bool:
 
 
 def line(start: complex, end: complex) -> list[complex]:
-    """A straight cubic without its first point."""
+    """Return a straight cubic without its first point."""
     return [start + (end - start) / 3, start + 2 / 3 * (end - start), end]

@@ -1,7 +1,7 @@
 """Any SVG of paths -> scene.
 
-A quadratic with only smooth ones behind it is a spline, closed where it closes smoothly; any other path
-becomes cubics. A path that is filled and stroked becomes two shapes that share their points.
+A quadratic followed by smooth ones only is a spline, closed where it closes smoothly; any other path becomes
+cubics. A path that is filled and stroked becomes two shapes that share their points.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from warpsplat.svg.structure import read_shapes
 
 
 class _Outline(NamedTuple):
-    """The points of a shape as a scene has them."""
+    """The points of a shape in a scene's form."""
 
     basis: Basis
     contours: list[Points]
@@ -42,7 +42,7 @@ class _Outline(NamedTuple):
 
 
 def _ring(subpath: Subpath) -> Points:
-    """A closed ring of cubics, without the repeated end."""
+    """Return a closed ring of cubics, without the repeated end."""
     points = subpath.points
     if not np.allclose(points[-1], points[0], rtol=0, atol=1e-6):
         closing = line(complex(*points[-1]), complex(*points[0]))
@@ -51,31 +51,27 @@ def _ring(subpath: Subpath) -> Points:
 
 
 def _outline(shape: Shape, is_stroked: bool) -> _Outline:
-    """Points of a shape. What is only filled is closed, as filling closes it."""
+    """Return the points of a shape. Contours that are only filled are closed, as filling closes them."""
     closed = [subpath.is_closed or not is_stroked for subpath in shape.subpaths]
-    splines = [
-        subpath.spline_ring() if is_closed else subpath.spline_chain()
-        for subpath, is_closed in zip(shape.subpaths, closed, strict=True)
-    ]
+    pairs = list(zip(shape.subpaths, closed, strict=True))
+    splines = [subpath.spline_ring() if ring else subpath.spline_chain() for subpath, ring in pairs]
     contours = [spline for spline in splines if spline is not None]
     if len(contours) == len(splines):
         return _Outline(Basis.SPLINE, contours, closed)
-    cubics = [
-        _ring(subpath) if is_closed else subpath.points
-        for subpath, is_closed in zip(shape.subpaths, closed, strict=True)
-    ]
-    return _Outline(Basis.CUBIC, cubics, closed)
+    return _Outline(
+        Basis.CUBIC, [_ring(subpath) if ring else subpath.points for subpath, ring in pairs], closed
+    )
 
 
 def _outlines(shapes: list[Shape]) -> list[_Outline]:
-    """Points of all shapes, those of twins alike."""
+    """Return the points of all shapes, the same for twins."""
     twins = [shape.is_twin for shape in shapes] + [False]
     stroked = [s.line is not None or a or b for s, a, b in zip(shapes, twins[:-1], twins[1:], strict=True)]
     return [_outline(shape, is_stroked) for shape, is_stroked in zip(shapes, stroked, strict=True)]
 
 
 def _is_background(shape: Shape, width: int, height: int) -> bool:
-    """Whether an opaque upright rectangle covers the canvas."""
+    """Return whether a shape is an opaque upright rectangle that covers the canvas."""
     if not (shape.is_rect and isinstance(shape.paint, Flat) and opacity_of(shape) == 1):
         return False
     corners = shape.subpaths[0].points[::3]
@@ -87,31 +83,34 @@ def _is_background(shape: Shape, width: int, height: int) -> bool:
 def load_scene(
     text: str, width: int, height: int, name: str, *, background_apart: bool = True
 ) -> tuple[Scene, bool]:
-    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units; see ``scene_of``.
+    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units.
+
+    Args:
+        text: The SVG.
+        width: Width of the canvas.
+        height: Height of the canvas.
+        name: What messages call the SVG.
+        background_apart: Whether a background becomes the canvas's, rather than a shape.
 
     Returns:
-        the scene, and whether the SVG itself has a background; where it has none, the scene's is white.
+        The scene, and whether the SVG has a background; if not, the scene's is white.
 
     Raises:
-        ImageError: not an SVG, nothing drawn, something that the scene cannot hold (the message says
-            what).
+        ImageError: Not an SVG, nothing drawn, or something that the scene cannot hold.
     """
     try:
         shapes = read_shapes(text, width, height)
         if not shapes:
             raise ImageError("draws no filled or stroked path")
-        return scene_of(shapes, width, height, background_apart=background_apart)
+        return scene_of(shapes, width, height, background_apart)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
 
 
 def scene_of(
-    shapes: list[Shape], width: int, height: int, *, background_apart: bool = True
+    shapes: list[Shape], width: int, height: int, background_apart: bool = True
 ) -> tuple[Scene, bool]:
-    """Shapes as a scene, and whether the first is its background, see ``load_scene``.
-
-    ``background_apart``: without, it is a shape as any other.
-    """
+    """Return shapes as a scene, and whether the first of them is its background; as ``load_scene``."""
     background = np.ones(3)
     has_background = (
         background_apart
@@ -120,7 +119,7 @@ def scene_of(
         and not shapes[1].is_twin
     )
     if has_background:
-        background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # as _is_background says
+        background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # _is_background has checked
         shapes = shapes[1:]
     outlines = _outlines(shapes)
     contours = [points for outline in outlines for points in outline.contours]
@@ -153,7 +152,7 @@ def scene_of(
 
 
 def _layers(names: list[str]) -> IntArray:
-    """Number of each shape's level, where all are in one, in order; else 0."""
+    """Return the number of each shape's level if all are in one, in order; else 0."""
     changes = [a != b for a, b in pairwise(names)]
     if not all(names) or sum(changes) + 1 != len(set(names)):
         return np.zeros(len(names), np.int32)
@@ -161,23 +160,21 @@ def _layers(names: list[str]) -> IntArray:
 
 
 MAX_STOPS = 1_000_000
-"""Most stops of all shapes: those that share a gradient have each their own."""
+"""Most stops of all shapes together; each shape has its own copy of a shared gradient."""
 
 
 def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:
-    """The scene with the gradients of its shapes."""
+    """Return the scene with the gradients of its shapes."""
     ramps = [shape.paint if isinstance(shape.paint, Gradient) else None for shape in shapes]
     if not any(ramps):
         return scene
     if sum(len(ramp.stops) for ramp in ramps if ramp) > MAX_STOPS:
         raise ImageError(f"its gradients add up to more than {MAX_STOPS} stops")
     stops = list(chain.from_iterable(ramp.stops for ramp in ramps if ramp))
+    kinds = [Paint.FLAT if r is None else Paint.RADIAL if r.is_radial else Paint.LINEAR for r in ramps]
     return replace(
         scene,
-        paint=np.array(
-            [Paint.FLAT if r is None else Paint.RADIAL if r.is_radial else Paint.LINEAR for r in ramps],
-            np.int32,
-        ),
+        paint=np.array(kinds, np.int32),
         spread=np.array([Spread[r.spread.upper()] if r else Spread.PAD for r in ramps], np.int32),
         frames=np.array([r.frame[:2, (2, 0, 1)].T.ravel() if r else np.zeros(6) for r in ramps], np.float32),
         focus=np.array([r.focus if r else (0.0, 0.0, 0.0) for r in ramps], np.float32),
@@ -189,7 +186,7 @@ def _with_gradients(scene: Scene, shapes: list[Shape]) -> Scene:
 
 
 def _with_pictures(scene: Scene, shapes: list[Shape]) -> Scene:
-    """The scene with what it shows of its shapes as it is."""
+    """Return the scene with the pictures among its shapes."""
     pictures = [shape.paint for shape in shapes if isinstance(shape.paint, Picture)]
     if not pictures:
         return scene

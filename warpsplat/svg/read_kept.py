@@ -1,4 +1,4 @@
-"""SVG -> scene, with what no shape can hold as pictures between the shapes."""
+"""SVG -> scene, with elements that no shape can hold as pictures between the shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from warpsplat.svg.clip import polygon
 from warpsplat.svg.document import Document, name_of
 from warpsplat.svg.excerpts import Excerpts
 from warpsplat.svg.inspect import NAMESPACE, svg_size
-from warpsplat.svg.kept import Kept, Part
+from warpsplat.svg.kept import Kept, Part, shapes_of
 from warpsplat.svg.paints import unused
 from warpsplat.svg.read import scene_of
 from warpsplat.svg.shapes import Shape
@@ -26,118 +26,113 @@ MAX_PICTURES = 1000
 """Most pictures of a scene: each is drawn by itself, which takes a tenth of a second."""
 
 MARGIN = 4
-"""By how much a picture's rectangle is larger than what is seen of it [px]: its edges move nothing."""
+"""Margin of a picture's rectangle around its visible pixels [px]: the picture does not reach its edges."""
 
 SEEN = 0.5 / 255
-"""Opacity from which on something is seen."""
+"""Least opacity that is visible."""
+
+MAX_CAUSES = 6
+"""Kinds of elements that a line names."""
 
 
 @dataclass(frozen=True)
 class KeptScene:
-    """An SVG, read."""
+    """A scene read from an SVG, with kept elements."""
 
     scene: Scene
     has_background: bool
     """Whether the SVG itself has one."""
     kept: str
-    """What is kept, for people; empty: nothing."""
+    """The kept elements in words; empty: there are none."""
     document: Document | None = None
-    """That it was read from."""
+    """The document that the scene was read from."""
     elements: tuple[int | None, ...] = ()
-    """Which element of the document draws each shape, counted from 0, the root; None: no single one."""
+    """Index of the element that draws each shape, the root being 0; None: no single one does."""
     background_element: int | None = None
-    """Which one is the background."""
+    """Index of the element that is the background."""
 
 
 def load_kept(text: str, width: int, height: int, name: str, *, background_apart: bool = True) -> KeptScene:
-    """Read an SVG as ``read.load_scene`` does, but for what that refuses: this becomes pictures.
+    """Read an SVG as ``read.load_scene`` does, but make pictures of elements that it refuses.
 
     Raises:
-        ImageError: not an SVG, nothing in it that shapes can hold, or something that cannot be kept either.
+        ImageError: Not an SVG, no part that shapes can hold, or something that cannot be kept either.
     """
     try:
-        parts, document = read_parts(text, width, height)
+        parts, document = read_parts(text, width, height, keep=True)
         kept = [part for part in parts if isinstance(part, Kept)]
-        shapes = _with_pictures(parts, kept, text, document, (width, height)) if kept else parts
-        scene, has_background = scene_of(
-            [part for part in shapes if isinstance(part, Shape)],
-            width,
-            height,
-            background_apart=background_apart,
-        )
+        shapes = _with_pictures(parts, kept, text, document, (width, height)) if kept else shapes_of(parts)
+        scene, has_background = scene_of(shapes, width, height, background_apart)
         if (scene.paint == Paint.PICTURE).all():
-            causes = f": {_words(kept)}" if kept else ""
+            causes = f": {_in_words(kept)}" if kept else ""
             raise ImageError(f"has no path that can be refined{causes}")
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
     numbers = {element: number for number, element in enumerate(document.root.iter())}
-    drawn = [None if s.element is None else numbers[s.element] for s in shapes if isinstance(s, Shape)]
+    drawn = [None if shape.element is None else numbers[shape.element] for shape in shapes]
     return KeptScene(
         scene,
         has_background,
-        _words(kept, scene.pictures) if kept else "",
+        _in_words(kept, scene.pictures) if kept else "",
         document,
         tuple(drawn[has_background:]),
         drawn[0] if has_background else None,
     )
 
 
-def _words(kept: Sequence[Kept], pictures: Sequence[Picture] = ()) -> str:
-    """Which elements are kept and why, in one line."""
-    counts = Counter(
-        tag if said == tag else f"{tag} ({said})"
-        for one in kept
-        for tag in [f"<{name_of(one.element)}>"]
-        for said in [one.cause.removesuffix(", not supported").removeprefix("uses ")]
-    )
-    texts = [f"{count} {what}" if count > 1 else what for what, count in counts.items()]
-    more = f" and {len(texts) - MOST_WORDS} more kinds" if len(texts) > MOST_WORDS else ""
+def _in_words(kept: Sequence[Kept], pictures: Sequence[Picture] = ()) -> str:
+    """Return which elements are kept and why, in one line."""
+    counts: Counter[str] = Counter()
+    for one in kept:
+        tag = f"<{name_of(one.element)}>"
+        cause = one.cause.removesuffix(", not supported").removeprefix("uses ")
+        counts[tag if cause == tag else f"{tag} ({cause})"] += 1
+    texts = [f"{count} {name}" if count > 1 else name for name, count in counts.items()]
+    more = f" and {len(texts) - MAX_CAUSES} more kinds" if len(texts) > MAX_CAUSES else ""
     hidden = sum(not one.pixels.any() for one in pictures)
     unseen = f"; {hidden} of {len(pictures)} such places show nothing here" if hidden else ""
-    return ", ".join(texts[:MOST_WORDS]) + more + unseen
-
-
-MOST_WORDS = 6
-"""Kinds of elements that a line names."""
+    return ", ".join(texts[:MAX_CAUSES]) + more + unseen
 
 
 def _with_pictures(
     parts: Sequence[Part], kept: Sequence[Kept], text: str, document: Document, extent: tuple[int, int]
 ) -> list[Shape]:
-    """The parts with pictures in place of what is kept; neighbours share one.
+    """Return the parts with pictures in place of kept elements; neighbours share one.
 
     Raises:
-        ImageError: something that cannot be kept.
+        ImageError: An element cannot be kept.
     """
     root = document.style_of(document.root)
     if root["transform"] != "none":
         raise ImageError("has a transform on its root, which cannot be kept")
     size = svg_size(document.root.attrib)
-    assert size  # as reading its shapes has found
+    assert size  # reading the shapes has checked it
     excerpts = Excerpts(text, document)
     scope = f"{unused('kept', text)}0"
     definitions = excerpts.of(excerpts.needed([one.element for one in kept]), size)
     shared = excerpts.style(scope) + (f"<defs>{definitions}</defs>" if definitions else "")
+    runs = [list(run) for _, run in groupby(parts, lambda part: isinstance(part, Kept))]
+    if sum(isinstance(run[0], Kept) for run in runs) > MAX_PICTURES:
+        raise ImageError(f"has what no path can show in more than {MAX_PICTURES} places between paths")
     shapes: list[Shape] = []
     is_first = True
-    if sum(1 for is_kept, _ in groupby(parts, lambda part: isinstance(part, Kept)) if is_kept) > MAX_PICTURES:
-        raise ImageError(f"has what no path can show in more than {MAX_PICTURES} places between paths")
-    for is_kept, run in groupby(parts, lambda part: isinstance(part, Kept)):
-        if not is_kept:
-            shapes += [part for part in run if isinstance(part, Shape)]
-            continue
+    for run in runs:
+        shapes += shapes_of(run)
         alike = [part for part in run if isinstance(part, Kept)]
+        if not alike:
+            continue
         excerpt = excerpts.of([one.element for one in alike], size)
         with_shared, alone = (f'<g class="{scope}">{before}{excerpt}</g>' for before in (shared, ""))
         pixels = _drawn(with_shared, size, extent, blends=any(one.blends for one in alike))
-        shapes.append(_shape(with_shared if is_first else alone, size, pixels))
+        shapes.append(_picture_shape(with_shared if is_first else alone, size, pixels))
         is_first = False
     return shapes
 
 
 def _drawn(markup: str, size: tuple[float, float], extent: tuple[int, int], *, blends: bool) -> FloatArray:
-    """What markup shows, premultiplied with opacity; where it ``blends``, as far as paint and opacity can
-    say what it makes of black and of white, shape (height, width, 4).
+    """Render markup: premultiplied sRGB and opacity, shape (height, width, 4).
+
+    If it ``blends``, these are the paint and opacity that fit what it makes of black and of white.
     """
     head = f'<svg xmlns="{NAMESPACE}" width="{extent[0]}" height="{extent[1]}" preserveAspectRatio="none"'
     head += f' viewBox="0 0 {size[0]:.9g} {size[1]:.9g}">'
@@ -154,8 +149,8 @@ def _drawn(markup: str, size: tuple[float, float], extent: tuple[int, int], *, b
     return np.concatenate([black[..., :3], np.clip(opacity, 0, 1)], axis=2)
 
 
-def _shape(markup: str, size: tuple[float, float], pixels: FloatArray) -> Shape:
-    """The rectangle in which markup shows something."""
+def _picture_shape(markup: str, size: tuple[float, float], pixels: FloatArray) -> Shape:
+    """Return the rectangle in which markup is visible."""
     seen = pixels.max(axis=2) > SEEN
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     top, bottom = (rows[0], rows[-1] + 1) if len(rows) else (0, 1)

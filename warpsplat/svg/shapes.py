@@ -1,11 +1,12 @@
-"""The fills and strokes of an SVG element; what they cannot show of it is refused by name.
+"""The fills and strokes of an SVG element.
 
-Only what is understood in full is read: an element, property or unit that is not known here ends in an error,
-because a picture that silently lost something is worse than none.
+Elements, properties and units that are not supported in full are errors: a picture that silently lost
+something is worse than none.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, field, replace
 
@@ -23,7 +24,7 @@ from warpsplat.svg.style import Style
 from warpsplat.svg.values import Viewport, fraction, length, lengths, parse_color
 
 MAX_EXTENT = 1e5
-"""Farthest from the canvas's corner that a shape may reach [px]: beyond, float32 is too coarse."""
+"""Largest distance of a shape from the canvas's corner [px]: beyond, float32 is too coarse."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,11 @@ class Line:
     join: Join
     miter_limit: float
     dashes: tuple[float, ...]
-    """Where in the pattern it begins, then dashes and gaps in turn; empty: none."""
+    """Offset into the pattern, then dashes and gaps in turn; empty: none."""
 
     @property
     def reach(self) -> float:
-        """How far it may be from its path."""
+        """Return its largest distance from its path."""
         longest = self.miter_limit if self.join == Join.MITER else 1.0
         return 0.5 * self.width * max(longest, math.sqrt(2) if self.cap == Cap.SQUARE else 1.0)
 
@@ -51,24 +52,24 @@ class Shape:
     subpaths: list[Subpath]
     paint: Colouring | Picture
     opacity: float
-    """Besides that of the paint."""
+    """A factor on the paint's opacity."""
     line: Line | None
-    """Of a stroke; None: a fill."""
+    """None: a fill."""
     rule: Rule = Rule.NONZERO
     is_twin: bool = False
-    """Whether it shares its subpaths with the one before: a path that is filled and stroked."""
+    """Whether it shares its subpaths with the shape before: a path that is filled and stroked."""
     is_rect: bool = False
     """Whether it is a ``rect`` element with sharp corners."""
     level: str = ""
-    """Name of the level that it is in, of a layered file."""
+    """Name of its level in a layered file."""
     element: Element | None = None
-    """That draws it and can be kept in its place; None where it cannot be."""
+    """The element that draws it, if that can be kept in its place."""
 
     known_box: list[Points] = field(default_factory=list, repr=False, compare=False)
-    """``box``, once it was asked for; copies share it as long as they have the same outline."""
+    """Cache of ``box``, shared by copies with the same outline."""
 
     def box(self) -> Points:
-        """Least and largest coordinates, shape (2, 2)."""
+        """Return the least and the largest coordinates, shape (2, 2)."""
         if not self.known_box:
             reach = self.line.reach if self.line else 0.0
             self.known_box.append(tight_box(self.subpaths) + np.array([[-reach], [reach]]))
@@ -77,24 +78,23 @@ class Shape:
 
 @dataclass(frozen=True)
 class Place:
-    """What an element is drawn with."""
+    """The style and coordinates that an element is drawn with."""
 
     style: Style
-    """Its own."""
     matrix: Matrix
-    """Map of its units to those of the canvas."""
+    """Map of its units to canvas units."""
     viewport: Viewport
     context: tuple[str, str]
-    """What ``context-fill`` and ``context-stroke`` mean."""
+    """The values of ``context-fill`` and ``context-stroke``."""
     is_linked: bool = False
-    """Whether a link shows it, so that more of them may."""
+    """Whether a link shows it; others may show it as well."""
 
 
 def element_shapes(element: Element, document: Document, place: Place) -> list[Shape]:
-    """The shapes that an element draws, in painter's order.
+    """Return the shapes that an element draws, in painter's order.
 
     Raises:
-        ImageError: a style that fills and strokes cannot show.
+        ImageError: The element has a style that fills and strokes cannot show.
     """
     style, tag = place.style, name_of(element)
     if any(name_of(child) in ANIMATIONS for child in element):
@@ -106,7 +106,7 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
     line = _line(style, place) if style["stroke"] != "none" else None
     keeps_dots = line is not None and line.cap != Cap.BUTT
     if tag == "path" and place.is_linked:
-        own = document.once(_with_dots if keeps_dots else _without_dots, element)
+        own = document.once(_cubics_with_dots if keeps_dots else _cubics, element)
     else:
         own = cubics(outline(tag, element.attrib, place.viewport), keep_dots=keeps_dots)
     if not own:
@@ -133,19 +133,18 @@ def element_shapes(element: Element, document: Document, place: Place) -> list[S
     return shapes
 
 
-def _with_dots(path: Element, _: Document) -> list[Subpath]:
-    return cubics(path.get("d", ""), keep_dots=True)
+def _cubics(path: Element, _: Document, keep_dots: bool = False) -> list[Subpath]:
+    return cubics(path.get("d", ""), keep_dots=keep_dots)
 
 
-def _without_dots(path: Element, _: Document) -> list[Subpath]:
-    return cubics(path.get("d", ""), keep_dots=False)
+_cubics_with_dots = functools.partial(_cubics, keep_dots=True)
 
 
 ANIMATIONS = {"animate", "animateTransform", "animateMotion", "set"}
 
 
 def _paint(name: str, style: Style, document: Document, place: Place, own: list[Subpath]) -> Colouring | None:
-    """What a shape is filled or stroked with; None for nothing."""
+    """Return the paint of a fill or stroke; None: it has none."""
     text = style[name].strip()
     if text in CONTEXTS:
         text = place.context[CONTEXTS.index(text)]
@@ -160,11 +159,7 @@ CONTEXTS = ("context-fill", "context-stroke")
 
 
 def _line(style: Style, place: Place) -> Line | None:
-    """How a stroke is drawn; None: it is not.
-
-    Raises:
-        ImageError: as a scene's strokes cannot be.
-    """
+    """Return how a stroke is drawn; None: it is not."""
     viewport, scale = place.viewport, similarity(place.matrix) or 1.0
 
     def get(name: str, default: float) -> float:
@@ -192,14 +187,14 @@ def _line(style: Style, place: Place) -> Line | None:
 
 
 LONGEST = 1e9
-"""Miter limits and dashes [px] beyond are as this: no miter and no outline is as long."""
+"""Larger miter limits and dashes [px] are clamped: no miter and no outline is as long."""
 
 CAPS = {"round": Cap.ROUND, "square": Cap.SQUARE}
 JOINS = {"round": Join.ROUND, "bevel": Join.BEVEL}
 
 
 def _strokes_first(order: str) -> bool:
-    """Whether the stroke lies below the fill."""
+    """Return whether the stroke lies below the fill."""
     words = order.split()
     if len(set(words)) < len(words) or not set(words) <= {"fill", "stroke", "markers"}:
         return False
@@ -207,11 +202,7 @@ def _strokes_first(order: str) -> bool:
 
 
 def _check(style: Style, subpaths: list[Subpath], line: Line | None) -> None:
-    """Whether a scene can hold an element.
-
-    Raises:
-        ImageError: it cannot.
-    """
+    """Raise ``ImageError`` for an element that a scene cannot hold."""
     if any(style[name] != "none" for name in ("marker-start", "marker-mid", "marker-end")):
         raise ImageError("uses markers, not supported")
     rendering = style["shape-rendering"]
@@ -220,16 +211,16 @@ def _check(style: Style, subpaths: list[Subpath], line: Line | None) -> None:
     if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")
     reach = np.array([line.width if line else 0.0, *(np.abs(s.points).max() for s in subpaths)])
-    if not (reach <= MAX_EXTENT).all():  # what is no number is not either
+    if not (reach <= MAX_EXTENT).all():  # NaN fails as well
         raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
 
 
 BETWEEN_PIXELS = 1e-3
-"""How far an edge may be from those of pixels [px] to be the same with antialiasing and without."""
+"""Distance [px] from pixel edges within which antialiasing changes nothing."""
 
 
 def _is_of_pixels(subpaths: list[Subpath]) -> bool:
-    """Whether all outlines run between pixels."""
+    """Return whether all outlines run along pixel edges."""
     for subpath in subpaths:
         ends = subpath.points[::3]
         ring = np.concatenate([subpath.points, subpath.points[:1]])
@@ -240,5 +231,5 @@ def _is_of_pixels(subpaths: list[Subpath]) -> bool:
 
 
 def opacity_of(shape: Shape) -> float:
-    """Opacity of a shape in one colour; besides that of the stops of a gradient."""
+    """Return a shape's opacity; that of a gradient's stops comes on top."""
     return shape.opacity * (shape.paint.opacity if isinstance(shape.paint, Flat) else 1.0)

@@ -1,4 +1,4 @@
-"""Large images, strip by strip: less memory, both cores, and a chance to stop in between."""
+"""Rendering of large SVGs strip by strip: less memory, several cores, and a chance to stop in between."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 from warpsplat.errors import ImageError, Stopped
 from warpsplat.native import available_cores
@@ -21,57 +20,54 @@ STRIP_PIXELS = 1 << 20
 """Pixels of a strip."""
 
 WHOLE_PIXELS = 1 << 22
-"""Up to here an SVG is drawn in one piece. In strips, edges move by thousandths of a pixel: a viewer cuts
-curves at the border of its canvas. The PSNR changes by less than 0.0001 dB.
-"""
+"""Largest SVG that is drawn in one piece [pixels]. In strips, edges move by thousandths of a pixel, because a
+viewer clips curves at the border of its canvas; the PSNR changes by less than 0.0001 dB."""
 
 DRAWERS = 4
 """Most strips that are drawn at once."""
 
 
-def check(stop: Stop | None) -> None:
-    """Give up if the caller wants it.
-
-    Raises:
-        Stopped: ``stop`` says so.
-    """
+def check_stop(stop: Stop | None) -> None:
+    """Raise ``Stopped`` if ``stop`` returns true."""
     if stop and stop():
         raise Stopped
 
 
 def rows_of(width: int, height: int, overlap: int = 0) -> Iterator[slice]:
-    """Strips of ``STRIP_PIXELS`` from top to bottom, each ``overlap`` rows longer where there are so many."""
+    """Yield the rows of strips of ``STRIP_PIXELS`` from top to bottom, each up to ``overlap`` rows longer."""
     step = max(1, STRIP_PIXELS // width)
     for top in range(0, height - overlap, step):
         yield slice(top, min(top + step + overlap, height))
 
 
 def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: bool = False) -> Bytes:
-    """An SVG drawn by resvg at ``width`` x ``height`` px: sRGB and opacity, shape (height, width, 4).
+    """Render an SVG with resvg at ``width`` x ``height`` px: sRGB and opacity, shape (height, width, 4).
 
-    A large one is drawn in strips if it is a file of ours of that size, else in one piece. ``own`` says that
-    this program wrote the text just now, so that it needs no precautions.
+    Large files written here are drawn in strips, others in one piece. ``own``: this program wrote the text
+    just now, so that it needs no precautions.
 
     Raises:
-        ImageError: not an SVG, or one of other proportions.
-        Stopped: ``stop`` says so.
+        ImageError: Not an SVG, or one of other proportions.
+        Stopped: ``stop`` returned true.
     """
-    check(stop)
+    check_stop(stop)
     head = OUR_HEAD.match(text)
     cuttable = head is not None and (int(head[1]), int(head[2])) == (width, height)
 
     def drawn(text: str, height: int) -> Bytes:
         image = render_own(text) if own else render_svg(text, width=width, height=height)
-        return _pixels(image, width, height)
+        if image.size != (width, height):
+            size = f"{image.width}x{image.height}"
+            raise ImageError(f"renders as {size}, the image has {width}x{height} pixels")
+        return np.asarray(image.convert("RGBA"))
 
     if not cuttable or width * height <= WHOLE_PIXELS:
         return drawn(text, height)
 
     def strip(rows: slice) -> Bytes:
-        check(stop)
+        check_stop(stop)
         tall = rows.stop - rows.start
-        part = resized(text, width, tall, 1.0, rows.start)
-        return drawn(part, tall)
+        return drawn(resized(text, width, tall, 1.0, rows.start), tall)
 
     out = np.empty((height, width, 4), np.uint8)
     strips = list(rows_of(width, height))
@@ -83,9 +79,3 @@ def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: b
             drawers.shutdown(wait=False, cancel_futures=True)
             raise
     return out
-
-
-def _pixels(image: Image.Image, width: int, height: int) -> Bytes:
-    if image.size != (width, height):
-        raise ImageError(f"renders as {image.width}x{image.height}, the image has {width}x{height} pixels")
-    return np.asarray(image.convert("RGBA") if image.mode != "RGBA" else image)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, cause_of
 from warpsplat.portable.linear import determinant, product
 from warpsplat.scene import Rule
-from warpsplat.svg.clip import clipped, overlap, polygon
-from warpsplat.svg.clip_path import clip_rectangle
+from warpsplat.svg.clip import clip_rectangle, clipped, overlap, polygon
+from warpsplat.svg.css import ancestors
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import (
     Matrix,
@@ -24,34 +24,37 @@ from warpsplat.svg.geometry import (
     view_box_map,
 )
 from warpsplat.svg.gradients import Flat
+from warpsplat.svg.groups import LEVEL_ID
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
 from warpsplat.svg.kept import Keeping, Part, shapes_of
-from warpsplat.svg.names import LEVEL_ID
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
 from warpsplat.svg.style import DRAWN, ROOT, Style
 from warpsplat.svg.values import Viewport, fraction, parse_color
 
 MAX_LINKED = 100_000
-"""Most elements that links may add up to: they may multiply."""
+"""Most elements shown through links, which may multiply."""
 
 LINKED_CHARACTERS = 50
 """Characters of a linked element's attributes that count as one element."""
 
 MAX_WORK = 5_000_000
-"""Most shapes that groups may add up to that clip or fade: in one another they multiply."""
+"""Most shapes summed over the groups that clip or fade them; nesting multiplies them."""
 
 PAIRS = 30
-"""Shapes that are compared in the time that one is clipped."""
+"""Pairs of shapes that are compared in the time that clipping one takes."""
 
 MAX_DEPTH = 1000
-"""Deepest nesting with what is linked."""
+"""Deepest nesting, links included."""
 
 REFUSED = {
     *("text", "image", "switch", "foreignObject", "video", "audio", "canvas", "iframe", "mesh", "hatch"),
     "tref",
 }
-"""Elements that show what is no shape. Those that nobody knows show nothing."""
+"""Elements that show something other than shapes. Unknown elements show nothing."""
+
+VISITED = {*DRAWN, "svg", "g", "a", "use"}
+"""Elements that show shapes."""
 
 LEVEL = re.compile(rf"{LEVEL_ID}\d{{1,9}}")
 """Names of the groups that are the levels of a layered file."""
@@ -61,13 +64,13 @@ CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
 
 @dataclass(frozen=True)
 class _Unit:
-    """What is kept whole where a part of it cannot be held."""
+    """An element that is kept whole if a part of it cannot be read."""
 
     element: Element
     first: int
-    """Number of its first shape."""
+    """Index of its first shape."""
     depth: int
-    """Number of what else is to be done."""
+    """Length of the stack below it."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class _Context:
     """What an element inherits."""
 
     style: Style
-    """Of the element that it is in."""
+    """Its parent's."""
     matrix: Matrix
     viewport: Viewport
     paints: tuple[str, str]
@@ -84,97 +87,83 @@ class _Context:
     """The links that led here."""
     depth: int
     use_size: tuple[float | None, float | None] = (None, None)
-    """What a link says of the size of a nested ``svg``."""
+    """The size that a link gives a nested ``svg``."""
     link: _Unit | None = None
     """The outermost link that led here."""
     level: str = ""
-    """Name of the level, of a layered file."""
+    """Name of the level in a layered file."""
 
 
 @dataclass(frozen=True)
 class _End:
-    """Where a group ends."""
+    """The end of a group."""
 
     unit: _Unit
     first: int
-    """Number of its first shape."""
+    """Index of its first shape."""
     opacity: float = 1.0
     clip: Points | None = None
-    """Corners of what is seen of it, shape (4, 2)."""
+    """Corners of the visible quadrilateral, shape (4, 2)."""
 
 
 def read_shapes(
     text: str, width: int, height: int, scale: float | None = None, *, see_through: bool = False
 ) -> list[Shape]:
-    """The shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
+    """Return the shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
 
     Args:
-        text: the SVG.
-        width: of the picture.
-        height: of the picture.
-        scale: magnification; None: the SVG fills the picture, which has its proportions.
-        see_through: whether the shapes of a translucent group that overlap are faded one by one, so that they
-            are seen through one another, instead of refused.
+        text: The SVG.
+        width: Width of the picture.
+        height: Height of the picture.
+        scale: Magnification; None: the SVG fills the picture, which has its proportions.
+        see_through: Fade overlapping shapes of a translucent group one by one, rather than refuse them.
 
     Raises:
-        ImageError: not an SVG, of other proportions, or with something that would be lost. The message says
-            what.
+        ImageError: Not an SVG, of other proportions, or with something that would be lost.
     """
-    parts, _ = _read(text, width, height, scale, keep=False, see_through=see_through)
-    return shapes_of(parts)
+    return shapes_of(read_parts(text, width, height, scale, keep=False, see_through=see_through)[0])
 
 
-def read_parts(text: str, width: int, height: int) -> tuple[list[Part], Document]:
-    """As ``read_shapes`` with what it refuses as elements to be kept, and the document that they are in.
-
-    Raises:
-        ImageError: not an SVG, of other proportions, or with something that its root or style sheets say.
-    """
-    return _read(text, width, height, None, keep=True)
-
-
-def _read(
-    text: str, width: int, height: int, scale: float | None, *, keep: bool, see_through: bool = False
+def read_parts(
+    text: str, width: int, height: int, scale: float | None = None, *, keep: bool, see_through: bool = False
 ) -> tuple[list[Part], Document]:
-    facts = inspect_svg(text)
+    """Return the shapes as ``read_shapes``, and the document.
+
+    ``keep``: elements that ``read_shapes`` refuses are parts as well; it refuses only what the root or style
+    sheets say.
+    """
+    root = inspect_svg(text).root
     try:
-        with np.errstate(all="ignore"):  # what overflows is found where a shape's points are
+        with np.errstate(all="ignore"):  # points of shapes are checked for overflow
             document = Document(text)
             walk = _Walk(document, keep=keep, see_through=see_through)
-            return walk.parts_in(*_canvas(facts.root, width, height, scale)), document
+            return walk.parts_in(*_canvas(root, width, height, scale)), document
     except (ImageError, MemoryError):
         raise
     except Exception as error:  # arithmetic on absurd numbers overflows in many ways
-        cause = (str(error).splitlines() or [""])[0][:100]
-        raise ImageError(f"not an SVG that can be read: {cause or type(error).__name__}") from error
+        raise ImageError(f"not an SVG that can be read: {cause_of(error)[:100]}") from error
 
 
-def _canvas(
-    root: dict[str, str], width: int, height: int, magnified: float | None
-) -> tuple[Matrix, Viewport]:
-    """Map of user units to canvas units, and what lengths refer to."""
+def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) -> tuple[Matrix, Viewport]:
+    """Return the map of user units to canvas units, and the viewport."""
     size = svg_size(root)
     if size is None:
         raise ImageError("says neither its size nor a viewBox")
-    if magnified is None:
-        if abs(size[0] / size[1] - width / height) > 0.02 * width / height:
-            raise ImageError(
-                f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
-                "it has to show all of it, and nothing around it"
-            )
-        scale = np.diag([width / size[0], height / size[1], 1.0])
-    else:
-        scale = np.diag([magnified, magnified, 1.0])
+    if scale is None and abs(size[0] / size[1] - width / height) > 0.02 * width / height:
+        raise ImageError(
+            f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
+            "it has to show all of it, and nothing around it"
+        )
+    sides = (width / size[0], height / size[1]) if scale is None else (scale, scale)
+    matrix = np.diag([*sides, 1.0])
     view, box = view_box_map(root, *size), view_box(root)
     if view is None or box is None:
-        return scale, Viewport(*size)
-    return product(scale, view), Viewport(*box[2:])
+        return matrix, Viewport(*size)
+    return product(matrix, view), Viewport(*box[2:])
 
 
 class _Walk:
-    """Through a document, in painter's order. Not recursive: documents may be nested deeper than Python's
-    stack.
-    """
+    """A walk through a document in painter's order, with a stack of its own: nesting may exceed Python's."""
 
     def __init__(self, document: Document, *, keep: bool, see_through: bool) -> None:
         self._document, self._see_through = document, see_through
@@ -182,27 +171,27 @@ class _Walk:
         self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
         self._linked = 0
-        self._said_once: set[Element] = set()
+        self._seen_linked: set[Element] = set()
         self._work = 0
 
     def parts_in(self, matrix: Matrix, viewport: Viewport) -> list[Part]:
-        """All shapes, drawn by ``matrix``, and what is kept."""
+        """Return all shapes, mapped by ``matrix``, and elements that are kept."""
         self._background(matrix, viewport)
         self._todo = [(self._document.root, _Context(ROOT, matrix, viewport, ("none", "none"), (), 0))]
         while self._todo:
             item = self._todo.pop()
             if isinstance(item, _End):
-                self._do(item.unit, self._end, item)
+                self._try(item.unit, self._end, item)
             else:
                 element, context = item
                 unit = context.link or _Unit(element, len(self._shapes), len(self._todo))
-                self._do(unit, self._enter, element, context, unit)
+                self._try(unit, self._enter, element, context, unit)
         return self._shapes
 
-    def _do(self, unit: _Unit, what: Callable[..., None], *arguments: object) -> None:
-        """Where that cannot be, keep the unit, if that can be."""
+    def _try(self, unit: _Unit, step: Callable[..., None], *arguments: object) -> None:
+        """Do a step; keep the whole unit if it cannot be done and keeping is allowed."""
         try:
-            what(*arguments)
+            step(*arguments)
         except ImageError as error:
             if self._keep is None or unit.element is self._document.root:
                 raise
@@ -214,7 +203,7 @@ class _Walk:
         if tag not in VISITED and tag not in REFUSED:
             return
         if context.path:
-            self._add_linked(self._said(element) + (len(element) if tag in DRAWN else 0))
+            self._add_linked(self._linked_size(element) + (len(element) if tag in DRAWN else 0))
         style = self._document.style_in(element, context.style)
         if style["display"] == "none":
             return
@@ -231,18 +220,17 @@ class _Walk:
         if tag == "g" and context.depth == 1 and LEVEL.fullmatch(element.get("id", "")):
             inner = replace(inner, level=element.get("id", ""))
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
+        end = _End(unit, len(self._shapes), fraction(style["opacity"]), clip)
         if tag in DRAWN:
-            first = len(self._shapes)
             place = Place(style, matrix, viewport, context.paints, bool(context.path))
-            shapes = element_shapes(element, self._document, place)
-            if self._keep and not context.link:
-                shapes = [replace(shape, element=element) for shape in shapes]
-            if context.level:
-                shapes = [replace(shape, level=context.level) for shape in shapes]
-            self._shapes += shapes
-            self._end(_End(unit, first, fraction(style["opacity"]), clip))
+            own = element if self._keep and not context.link else None
+            self._shapes += [
+                replace(shape, element=own, level=context.level)
+                for shape in element_shapes(element, self._document, place)
+            ]
+            self._end(end)
             return
-        self._todo.append(_End(unit, len(self._shapes), fraction(style["opacity"]), clip))
+        self._todo.append(end)
         if tag == "use":
             self._link(element, inner, unit)
         elif tag == "svg" and element is not self._document.root:
@@ -256,10 +244,10 @@ class _Walk:
             self._add_linked(len(element))
         self._todo.extend((child, context) for child in reversed(element))
 
-    def _said(self, element: Element) -> int:
-        """As how many elements counts what one that is linked says: as none the first time."""
-        if element not in self._said_once:
-            self._said_once.add(element)
+    def _linked_size(self, element: Element) -> int:
+        """Return how many elements the attributes of a linked one count as: none the first time."""
+        if element not in self._seen_linked:
+            self._seen_linked.add(element)
             return 0
         return sum(map(len, element.attrib.values())) // LINKED_CHARACTERS
 
@@ -269,12 +257,12 @@ class _Walk:
             raise ImageError(f"links add up to more than {MAX_LINKED} elements")
 
     def _link(self, element: Element, context: _Context, unit: _Unit) -> None:
-        """A ``use``."""
+        """Follow a ``use``."""
         _check_depth(context)
         if self._document.links_out(element):
             raise ImageError("uses an element of another file, not supported")
         target = self._document.linked(element)
-        if target is None or target in context.path or self._is_inside(element, target):
+        if target is None or target in context.path or target in ancestors(element, self._document.parents):
             return  # recursive links show nothing
         tag = name_of(target)
         if tag not in VISITED and tag not in REFUSED and tag != "symbol":
@@ -285,7 +273,7 @@ class _Walk:
         path = (*context.path, target)
         inner = replace(context, path=path, paints=(fill, stroke), use_size=(None, None), link=unit)
         if tag == "symbol":
-            self._add_linked(self._said(target))
+            self._add_linked(self._linked_size(target))
             self._nested(element, inner, target, unit)
             return
         inner = replace(inner, matrix=product(context.matrix, translation(x, y)))
@@ -295,15 +283,8 @@ class _Walk:
         self._add_linked(1)
         self._todo.append((target, inner))
 
-    def _is_inside(self, element: Element, target: Element) -> bool:
-        while element in self._document.parents:
-            element = self._document.parents[element]
-            if element is target:
-                return True
-        return False
-
     def _nested(self, element: Element, context: _Context, content: Element, unit: _Unit) -> None:
-        """A new viewport: that of a nested ``svg``, which is its own content, or of a ``use`` of a symbol."""
+        """Enter a new viewport: a nested ``svg``, which is its own content, or a ``use`` of a symbol."""
         is_svg = element is content
         viewport = context.viewport
         x, y = (attribute(element.attrib, name, viewport) or 0.0 for name in "xy")
@@ -320,31 +301,26 @@ class _Walk:
         if not is_svg and style["clip-path"] != "none":
             raise ImageError("uses clip-path of a symbol, not supported")
         view = view_box_map(content.attrib, width, height)
-        box = view_box(dict(content.attrib)) if view is not None else None
+        box = view_box(content.attrib) if view is not None else None
         size = box[2:] if box else (width, height)
         matrix = product(context.matrix, translation(x, y))
         if view is not None:
             matrix = product(matrix, view)
-        seen = style["overflow"] in {"visible", "auto"}
         is_clipped = not is_svg or None not in given or context.use_size != (None, None)
         corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
-        clip = moved(context.matrix, corners) if is_clipped and not seen else None
+        is_clipped = is_clipped and style["overflow"] not in {"visible", "auto"}
+        clip = moved(context.matrix, corners) if is_clipped else None
         opacity = 1.0 if is_svg else fraction(style["opacity"])
         self._todo.append(_End(unit, len(self._shapes), opacity, clip))
-        inner = replace(
-            context,
-            style=style,
-            matrix=matrix,
-            viewport=replace(viewport, width=size[0], height=size[1]),
-            use_size=(None, None),
-        )
+        viewport = replace(viewport, width=size[0], height=size[1])
+        inner = replace(context, style=style, matrix=matrix, viewport=viewport, use_size=(None, None))
         self._children(content, inner)
 
     def _end(self, end: _End) -> None:
         """Apply the opacity and the clip of a group to its shapes.
 
         Raises:
-            ImageError: the shapes would show something else.
+            ImageError: The shapes would look different.
         """
         isolates = self._keep is not None and self._keep.isolates(end.unit.element)
         if end.clip is None and end.opacity == 1 and not isolates:
@@ -367,7 +343,7 @@ class _Walk:
         self._shapes[end.first :] = parts
 
     def _background(self, matrix: Matrix, viewport: Viewport) -> None:
-        """What the root's ``background-color`` paints below all shapes."""
+        """Add the root's ``background-color``, which is painted below all shapes."""
         style = self._document.style_of(self._document.root)
         color = parse_color(style["background-color"])
         if style["background"] != "none":
@@ -387,10 +363,6 @@ class _Walk:
 def _check_depth(context: _Context) -> None:
     if context.depth > MAX_DEPTH:
         raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
-
-
-VISITED = {*DRAWN, "svg", "g", "a", "use"}
-"""Elements that show shapes."""
 
 
 def _in_context(paint: str, context: tuple[str, str]) -> str:

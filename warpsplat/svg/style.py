@@ -1,4 +1,4 @@
-"""Style of SVG elements: attributes, style sheets and ``style``, as far as shapes and gradients need it."""
+"""The computed style of SVG elements: presentation attributes, style sheets and ``style`` combined."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ INHERITED = {
     "stroke-width": "1",
     "visibility": "visible",
 }
-"""Properties that children take over, and what they are at the root."""
+"""Inherited properties and their initial values."""
 
 OWN = {
     "background": "none",
@@ -51,40 +51,40 @@ OWN = {
     "transform-origin": "none",
     "vector-effect": "none",
 }
-"""Properties of an element alone. Isolation is none of them: without blend modes it shows nothing."""
+"""Other properties and their initial values. Isolation is left out: without blend modes it shows nothing."""
 
 ONLY_STYLE = {"background", "background-color", "mix-blend-mode"}
-"""What attributes do not say."""
+"""Properties that are no presentation attributes."""
 
 GEOMETRY = {"x", "y", "cx", "cy", "r", "rx", "ry", "d", "width", "height"}
-"""What style sheets may say of shapes in some viewers, not in resvg."""
+"""Properties that some viewers read from style sheets, but resvg does not."""
 
 KNOWN = frozenset({*INHERITED, *OWN, *GEOMETRY, "font", "marker"})
-"""Names that mean something here."""
 
 Style = dict[str, str]
+"""Values by property."""
 
 ROOT = {**OWN, **INHERITED}
-"""What the root element takes over."""
+"""The style around the root element."""
 
 DRAWN = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
 """Elements that are shapes."""
 
 
 def element_style(element: ElementTree.Element, rules: Sequence[Declaration], parent: Style) -> Style:
-    """All properties of an element.
+    """Return all properties of an element.
 
     Args:
-        element: the element.
-        rules: what style sheets say of it.
-        parent: properties of the element that it is in.
+        element: The element.
+        rules: Declarations of style sheets that apply to it, the strongest last.
+        parent: Style of its parent.
 
     Raises:
-        ImageError: one of them shows what shapes cannot.
+        ImageError: A property has a value that shapes cannot show.
     """
     style = {**parent, **OWN}
     tag = str(element.tag).rpartition("}")[2]
-    for name, value in _said(element.attrib, rules).items():
+    for name, value in _cascade(element.attrib, rules).items():
         if len(element) and name in INHERITED:
             check_length(name, value)
         if name in GEOMETRY:
@@ -106,17 +106,17 @@ def element_style(element: ElementTree.Element, rules: Sequence[Declaration], pa
     return style
 
 
-def _said(attributes: Mapping[str, str], rules: Sequence[Declaration]) -> Style:
-    """What is said of an element itself: important declarations count more, ``style`` more than rules, and
-    these more than attributes (CSS 2.1, 6.4).
+def _cascade(attributes: Mapping[str, str], rules: Sequence[Declaration]) -> Style:
+    """Return the values that an element itself is given (CSS 2.1, 6.4): important declarations win, then
+    ``style``, then rules, then attributes.
     """
     own: Style = {
         name: value.strip()
         for name, value in attributes.items()
         if (name in INHERITED or name in OWN) and name not in ONLY_STYLE
     }
-    said = [*rules, *declarations(attributes.get("style", ""))] if rules or "style" in attributes else []
-    for name, value, _ in sorted(said, key=lambda d: d.important):
+    declared = [*rules, *declarations(attributes["style"])] if "style" in attributes else rules
+    for name, value, _ in sorted(declared, key=lambda d: d.important):
         if name == "marker":
             own |= dict.fromkeys(("marker-start", "marker-mid", "marker-end"), value)
         elif name == "font":
@@ -127,20 +127,14 @@ def _said(attributes: Mapping[str, str], rules: Sequence[Declaration]) -> Style:
 
 
 FONT_SIZES = {
-    "xx-small": -3,
-    "x-small": -2,
-    "small": -1,
-    "smaller": -1,
-    "large": 1,
-    "larger": 1,
-    "x-large": 2,
-    "xx-large": 3,
+    **{"xx-small": -3, "x-small": -2, "small": -1, "smaller": -1},
+    **{"large": 1, "larger": 1, "x-large": 2, "xx-large": 3},
 }
-"""Steps of 1.2 from the size around."""
+"""Factors of 1.2 to the parent's size."""
 
 
-def _font_size(text: str, around: float) -> float:
+def _font_size(text: str, parent: float) -> float:
     if text in FONT_SIZES:
-        return around * float(power(1.2, FONT_SIZES[text]))
-    size = length(text, around, "font-size", around)
-    return around if size is None else size
+        return parent * float(power(1.2, FONT_SIZES[text]))
+    size = length(text, parent, "font-size", parent)
+    return parent if size is None else size

@@ -15,12 +15,12 @@ from warpsplat.svg.inspect import LENGTH, NUMBER, PIXELS_PER_UNIT
 OTHER_UNITS = re.compile(
     rf"{NUMBER.pattern}(q|ch|cap|ic|lh|rem|rlh|r?ex|vw|vh|vi|vb|vmin|vmax|[sld]v\w+|cq\w+)", re.IGNORECASE
 )
-"""Lengths of CSS that resvg does not read."""
+"""Lengths of CSS that resvg does not support."""
 
 
 @dataclass(frozen=True)
 class Viewport:
-    """What lengths refer to."""
+    """The lengths that percentages and font units refer to."""
 
     width: float
     """[user units]"""
@@ -31,29 +31,25 @@ class Viewport:
 
     @property
     def diagonal(self) -> float:
-        """What percentages that lie in no direction are of (SVG 1.1, 7.10)."""
+        """The reference of percentages that are neither horizontal nor vertical (SVG 1.1, 7.10)."""
         return math.sqrt((self.width * self.width + self.height * self.height) / 2)
 
 
 MAX_VALUE = 1000
-"""Longest value [characters] of what many elements may take over from one: each of them reads it."""
+"""Longest value [characters] that many elements may inherit from one: each of them parses it."""
 
 
 def check_length(name: str, value: str) -> None:
-    """Refuse a value of more than ``MAX_VALUE``.
-
-    Raises:
-        ImageError: it is longer.
-    """
+    """Raise ``ImageError`` for a value of more than ``MAX_VALUE`` characters."""
     if len(value) > MAX_VALUE:
         raise ImageError(f"says {name} in more than {MAX_VALUE} characters, not supported")
 
 
 def length(text: str, reference: float, name: str, font_size: float = 16.0) -> float | None:
-    """A length [user units]; percentages are of ``reference``. None for what is no length.
+    """Return a length [user units], or None if the text is none; percentages are of ``reference``.
 
     Raises:
-        ImageError: of a unit that only some viewers know.
+        ImageError: The unit is one that only some viewers support.
     """
     text = text.strip()
     found = LENGTH.fullmatch(text)
@@ -68,11 +64,7 @@ def length(text: str, reference: float, name: str, font_size: float = 16.0) -> f
 
 
 def lengths(text: str, reference: float, name: str, font_size: float) -> list[float]:
-    """A list of lengths, as far as it can be read.
-
-    Raises:
-        ImageError: see ``length``.
-    """
+    """Return a list of lengths up to the first that is none; raises as ``length`` does."""
     values: list[float] = []
     for part in text.replace(",", " ").split():
         value = length(part, reference, name, font_size)
@@ -83,26 +75,31 @@ def lengths(text: str, reference: float, name: str, font_size: float) -> list[fl
 
 
 def numbers(text: str) -> tuple[list[float], bool]:
-    """The numbers that a list of them begins with, and whether that is all of it."""
+    """Return the numbers that a list begins with, and whether they are all of it."""
     if not NUMBER.sub(" ", text).strip(", \t\r\n\f"):
         return [float(value) for value in NUMBER.findall(text)], True
     values: list[float] = []
-    position = SPACE.match(text).end()  # type: ignore[union-attr]  # matches the empty text
+    position = after_space(text, 0)
     while found := NUMBER.match(text, position):
         values.append(float(found[0]))
-        position = SPACE.match(text, found.end()).end()  # type: ignore[union-attr]
+        position = after_space(text, found.end())
     return values, False
 
 
 SPACE = re.compile(r"[\s,]*")
 
 
-def fraction(text: str, default: float = 1.0) -> float:
-    """An opacity: a number or a percentage, in 0..1; ``default`` for what is neither."""
+def after_space(text: str, position: int) -> int:
+    """Return where white space and commas from ``position`` on end."""
+    return SPACE.match(text, position).end()  # type: ignore[union-attr]  # matches the empty text
+
+
+def fraction(text: str) -> float:
+    """Return an opacity in [0, 1]: a number or a percentage; 1 for what is neither."""
     text = text.strip()
     number = text.removesuffix("%")
     if not NUMBER.fullmatch(number):
-        return default
+        return 1.0
     return min(max(float(number) / (100 if text.endswith("%") else 1), 0.0), 1.0)
 
 
@@ -111,14 +108,14 @@ Color = tuple[float, float, float]
 UNSURE = re.compile(
     r"(rgba?|hsla?|hwb|(ok)?lab|(ok)?lch|color|color-mix|device-cmyk|light-dark)\s*\(|rebeccapurple|.*icc-color\("
 )
-"""Colours that some viewers read, and resvg does not."""
+"""Colours that some viewers support, but resvg does not."""
 
 
 def parse_color(text: str) -> tuple[Color, float] | None:
-    """An SVG colour as sRGB in 0..1, and its opacity; None for what is no colour.
+    """Return an SVG colour as sRGB in [0, 1], and its opacity; None for what is no colour.
 
     Raises:
-        ImageError: one that only some viewers know.
+        ImageError: The colour is one that only some viewers support.
     """
     name = text.strip().lower()
     if name == "transparent":

@@ -1,7 +1,7 @@
-"""An SVG as a viewer shows it: drawn by resvg, an independent renderer.
+"""Rendering of SVGs with resvg, an independent viewer.
 
-Texts written by this program are drawn in the process. Foreign ones pass ``inspect_svg`` and are drawn in a
-process of their own under limits, because resvg can be made to crash, stall and fill the memory.
+Texts written by this program are drawn in this process. Foreign ones pass ``inspect_svg`` and are drawn in a
+process of their own under limits, because they can make resvg crash, hang or fill the memory.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy.typing as npt
 import resvg_py
 from PIL import Image, PngImagePlugin
 
-from warpsplat.errors import ImageError, ResourceError
+from warpsplat.errors import ImageError, ResourceError, cause_of
 from warpsplat.svg import draw_child
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 
@@ -28,11 +28,11 @@ Pixels = npt.NDArray[np.float64]
 OPTIONS: dict[str, Any] = {"dpi": 96.0, "skip_system_fonts": True}
 
 TEXT = re.compile(r"<(?:[\w.-]+:)?text[\s/>]")
-"""An element that the system's fonts are loaded for; other files look the same on any system."""
+"""An element that needs the system's fonts; other files look the same on any system."""
 
 
 def _open(png: bytes) -> Image.Image:
-    # Not by Image.open, whose limit on pixels is meant for files of unknown origin.
+    # Image.open has a limit on pixels for files of unknown origin.
     return PngImagePlugin.PngImageFile(io.BytesIO(png))
 
 
@@ -45,57 +45,51 @@ def render_own(text: str) -> Image.Image:
     try:
         return _open(bytes(resvg_py.svg_to_bytes(svg_string=text, **OPTIONS)))
     except ValueError as error:
-        raise ImageError(f"cannot be rendered: {_first_line(str(error))}") from error
+        raise ImageError(f"cannot be rendered: {cause_of(error)[:200]}") from error
     except BaseException as error:
         # pyo3's class for a panic of Rust code derives from BaseException and cannot be imported.
         if type(error).__name__ != "PanicException":
             raise
-        raise ImageError(f"cannot be rendered: resvg fails: {_first_line(str(error))}") from None
+        raise ImageError(f"cannot be rendered: resvg fails: {cause_of(error)[:200]}") from None
 
 
 def render_svg(
     text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
 ) -> Image.Image:
-    """Render any SVG text with resvg, at its own size, at a size in px, or magnified by ``zoom``.
-
-    Raises:
-        ImageError: see ``draw_png``.
-    """
+    """Return any SVG text rendered as by ``draw_png``."""
     return _open(draw_png(text, width=width, height=height, zoom=zoom))
 
 
 def draw_png(
     text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
 ) -> bytes:
-    """Any SVG text as a PNG, as ``render_svg`` draws it.
+    """Return any SVG text as a PNG, at its own size, at a size in px, or magnified by ``zoom``.
 
     Raises:
-        ImageError: not an SVG, one that resvg does not accept or fails on, or a picture of more than
+        ImageError: Not an SVG, one that resvg does not accept or fails on, a picture of more than
             ``MAX_PIXELS``, or one that takes more time or memory than its size and length explain.
-        ResourceError: no further process can be started.
+        ResourceError: No further process can be started.
     """
-    pixels = shown_pixels(text, width, height, zoom)
+    pixels = _shown_pixels(text, width, height, zoom)
     options = {**OPTIONS, "width": width, "height": height, "zoom": zoom}
     return _drawn("png", text, options, pixels)
 
 
 def draw_pdf(text: str, *, zoom: float = 1.0) -> bytes:
-    """Any SVG text as a PDF of the same paths, on a sheet of its own size times ``zoom``; the same text gives
-    the same bytes.
+    """Return any SVG text as a PDF of the same paths, ``zoom`` times as large; raises as ``draw_png``.
 
-    Raises:
-        ImageError, ResourceError: as for ``draw_png``.
+    The same text gives the same bytes.
     """
     own = svg_size(inspect_svg(text).root)
     width = own[0] * zoom * POINTS_PER_PIXEL if own else None
-    return _drawn("pdf", text, {"width": width}, shown_pixels(text, None, None, None))
+    return _drawn("pdf", text, {"width": width}, _shown_pixels(text, None, None, None))
 
 
 POINTS_PER_PIXEL = 72 / OPTIONS["dpi"]
 
 
 def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> bytes:
-    """What ``draw_child`` makes of ``text`` within limits for a picture of so many ``pixels``."""
+    """Return the output of ``draw_child`` for ``text``, under limits for a picture of so many ``pixels``."""
     seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
     memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
     options = {**options, "skip_system_fonts": TEXT.search(text) is None}
@@ -103,7 +97,7 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
     request = {"path": sys.path, **limits, "form": form, "options": options}
     try:
         done = subprocess.run(
-            # Isolated, and with this program's module path instead of one of its own making.
+            # Isolated, and with this program's module path.
             [sys.executable, "-I", "-S", str(Path(draw_child.__file__))],
             input=json.dumps(request).encode() + b"\n" + text.encode(),
             capture_output=True,
@@ -114,12 +108,14 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
     except subprocess.TimeoutExpired:
         raise ImageError(f"cannot be rendered within {WALL_FACTOR * seconds} s") from None
     except OSError as error:
-        raise ResourceError(f"no process to draw the SVG in: {error.strerror or error}") from error
+        raise ResourceError(f"no process to draw the SVG in: {cause_of(error)}") from error
     if done.returncode == 0:
         return done.stdout
     message = done.stderr.decode(errors="replace")
     if done.returncode == draw_child.REFUSED:
-        raise ImageError(f"cannot be rendered: {_first_line(message)}")
+        raise ImageError(
+            f"cannot be rendered: {(message.strip().splitlines() or ['no cause given'])[0][:200]}"
+        )
     if "memory allocation" in message or "MemoryError" in message:
         raise ImageError(f"cannot be rendered with {memory >> 20} MiB of memory")
     if -done.returncode in LIMIT_SIGNALS:
@@ -130,22 +126,22 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
 CPU_SECONDS = 4.0
 CPU_PER_BYTE = 5e-6
 CPU_PER_PIXEL = 1.2e-7
-"""Bounds of the processor time for a drawing [s]: three times what large plain ones take."""
+"""Bounds of the processor time [s]: three times what large plain drawings take."""
 WALL_FACTOR = 3
-"""Bound of the time on the clock, over that of the processor time."""
+"""Ratio of the bound of wall-clock time to that of processor time."""
 MEMORY = 3 << 29
 MEMORY_PER_BYTE = 100
 MEMORY_PER_PIXEL = 12
-"""Bounds of the address space for a drawing [bytes]: three layers, and 100 times the text."""
+"""Bounds of the address space [bytes]: three layers, and 100 times the text."""
 LIMIT_SIGNALS = (9, 24)
-"""SIGKILL and SIGXCPU, which end a process at its processor time."""
+"""SIGKILL and SIGXCPU, which end a process at its limit of processor time."""
 
 
-def shown_pixels(text: str, width: int | None, height: int | None, zoom: float | None) -> float:
-    """Pixels of the picture that ``draw_png`` makes; 0 where only drawing it tells.
+def _shown_pixels(text: str, width: int | None, height: int | None, zoom: float | None) -> float:
+    """Return the number of pixels that ``draw_png`` draws; 0 if that is unknown before.
 
     Raises:
-        ImageError: not an SVG, or more than ``MAX_PIXELS``.
+        ImageError: Not an SVG, or more than ``MAX_PIXELS``.
     """
     own = svg_size(inspect_svg(text).root)
     if width and height:
@@ -154,26 +150,22 @@ def shown_pixels(text: str, width: int | None, height: int | None, zoom: float |
         raise ValueError("width and height go together")
     else:
         factor = zoom or 1.0
-        # Products grow to infinity; a power of a float raises OverflowError.
+        # Unlike products, powers of floats raise OverflowError.
         pixels = max(own[0], 1.0) * max(own[1], 1.0) * factor * factor if own else 0.0
     if not pixels <= MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
     return pixels
 
 
-def _first_line(message: str) -> str:
-    return (message.strip().splitlines() or ["no cause given"])[0][:200]
-
-
 def on_white(image: Image.Image) -> Pixels:
-    """RGB in 0..255, shape (height, width, 3), transparency composited on white."""
+    """Return RGB in [0, 255], shape (height, width, 3), transparency composited on white."""
     rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
     alpha = rgba[..., 3:] / 255.0
     return np.asarray(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha))
 
 
 def premultiplied(image: Image.Image) -> Pixels:
-    """RGB times opacity, and opacity, in 0..255, shape (height, width, 4)."""
+    """Return RGB times opacity, and opacity, in [0, 255], shape (height, width, 4)."""
     rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
     rgba[..., :3] *= rgba[..., 3:] / 255.0
     return rgba

@@ -11,48 +11,46 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.errors import UsageError
 from warpsplat.portable.elementary import power_of_ten
-from warpsplat.scene import NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene import ATTRIBUTES, NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import PathData, held_points
-from warpsplat.svg.names import LEVEL_ID, Names, color_names
-from warpsplat.svg.nest import Path, nested, painted
+from warpsplat.svg.groups import LEVEL_ID, Names, PathElement, color_names, nested, painted
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
-from warpsplat.svg.valid import check_finite
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 
 OPACITY_DECIMALS = 2
-"""An 8-bit colour moves by less than an eighth of a level for half a unit of the third decimal."""
+"""Half a unit of the third decimal changes an 8-bit colour by less than an eighth of a level."""
 
 WIDTH_STEP = 0.25
 """Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth."""
 
 OPAQUE = 1 - 0.5 * power_of_ten(-OPACITY_DECIMALS)
-"""From here on an opacity rounds to 1 and is left out: opaque paths are smaller and quicker to draw."""
+"""Opacities from here on round to 1 and are left out: opaque paths are smaller and faster to draw."""
 
 GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 100)))
-"""Units of the view box a pixel of the picture: sizes of the view box have few decimals with each."""
+"""Units of the view box to a pixel of the picture, chosen so that the box's sides have few decimals."""
 
 DASH_DECIMALS = 2
-"""Of dashes, in units of the view box."""
 
 MITER_LIMIT = 4.0
-"""What holds where nothing is said."""
+"""SVG's default."""
 
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
 
 
 def width_decimals(per_pixel: float) -> int:
-    """Decimals of a stroke's width."""
+    """Return the number of decimals of a stroke's width."""
     return 0 if per_pixel * WIDTH_STEP >= 1 else 1
 
 
 def rounded(scene: Scene, per_pixel: float) -> Scene:
-    """What a file with ``per_pixel`` units a pixel holds of ``scene``."""
+    """Return ``scene`` rounded as a file with ``per_pixel`` units to a pixel has it."""
     spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
     per_unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
     points, colors, opacities, widths = (
@@ -72,97 +70,89 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
 
 
 BLACK = "#000"
-"""Of fills, it holds where nothing is said."""
+"""SVG's default for fills."""
 
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
-
-CAPS = {Cap.BUTT: "butt", Cap.ROUND: "round", Cap.SQUARE: "square"}
-JOINS = {Join.MITER: "miter", Join.ROUND: "round", Join.BEVEL: "bevel"}
+BLACK_FILL = f' fill="{BLACK}"'
 
 
-def _line(scene: Scene, shape: int, per_pixel: float, *, in_group: bool) -> str:
-    """How a stroke is drawn; ``in_group``: besides what the group of strokes says."""
-    width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
-    style = f' stroke-width="{width}"'
-    cap, join, dash = Cap(scene.cap[shape]), Join(scene.join[shape]), int(scene.dash[shape])
-    shared_cap, shared_join = (Cap.ROUND, Join.ROUND) if in_group else (Cap.BUTT, Join.MITER)
-    if cap != shared_cap:
-        style += f' stroke-linecap="{CAPS[cap]}"'
-    if join != shared_join:
-        style += f' stroke-linejoin="{JOINS[join]}"'
-    if join == Join.MITER and scene.miter_limits[shape] != MITER_LIMIT:
-        style += f' stroke-miterlimit="{number(float(scene.miter_limits[shape]), SHARE_DECIMALS)}"'
-    if dash != NO_DASHES:
-        offset, *pattern = (number(value * per_pixel, DASH_DECIMALS) for value in scene.dashes[dash])
-        style += f' stroke-dasharray="{" ".join(pattern)}"'
-        style += f' stroke-dashoffset="{offset}"' if offset != "0" else ""
-    return style
+class _Paths:
+    """The path elements of a scene's shapes."""
 
+    def __init__(
+        self, scene: Scene, per_pixel: float, ramps: Mapping[int, str], opacity_scale: float = 1.0
+    ) -> None:
+        """``ramps``: identifiers of gradients by shape; the rest is as for ``write_svg``."""
+        self._scene, self._per_pixel = scene, per_pixel
+        self._data = PathData(scene, per_pixel)
+        self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
+        """Whether the next shape has the same path."""
+        colors = hex_colors(scene.colors)
+        for shape, name in ramps.items():
+            colors[shape] = f"url(#{name})"
+        self._paints = [PAINTED[Kind(kind)] for kind in scene.kind.tolist()]
+        self._colors = [f' {paint}="{color}"' for paint, color in zip(self._paints, colors, strict=True)]
+        shown = np.minimum(scene.opacities.astype(np.float64) * opacity_scale, 1.0).tolist()
+        self._opacities = [
+            f' {paint}-opacity="{number(value, OPACITY_DECIMALS)}"' if value < OPAQUE else ""
+            for paint, value in zip(self._paints, shown, strict=True)
+        ]
 
-def _path(
-    scene: Scene,
-    shape: int,
-    data: str,
-    color: str,
-    opacity: str,
-    per_pixel: float,
-    rest: str,
-    *,
-    in_group: bool,
-) -> Path:
-    """The path of one shape; ``rest``: further attributes, of a path that is its twin's as well."""
-    kind = Kind(int(scene.kind[shape]))
-    paint = f' {PAINTED[kind]}="{color}"'
-    if kind == Kind.STROKE:
-        return Path(data, (opacity, paint, _line(scene, shape, per_pixel, in_group=in_group)), rest)
-    rule = ' fill-rule="evenodd"' if scene.rule[shape] == Rule.EVENODD else ""
-    return Path(data, (opacity, "" if color == BLACK else paint, ""), rule + rest)
+    def of(self, shape: int, *, in_group: bool, name: str = "", alone: bool = False) -> PathElement:
+        """Return the path of a shape, and of its twin unless it is ``alone``.
 
+        ``in_group``: the path is in a group of strokes. ``name``: the identifier's attribute.
+        """
+        opacity, paint, data = self._opacities[shape], self._colors[shape], self._data.of(shape)
+        own = name
+        if self.has_twin[shape] and not alone:
+            opacity += self._opacities[shape + 1]
+            own += self._twin(shape + 1)
+        if self._scene.kind[shape] == Kind.STROKE:
+            return PathElement(data, (opacity, paint, self._line(shape, in_group=in_group)), own)
+        paint = "" if paint == BLACK_FILL else paint
+        return PathElement(data, (opacity, paint, ""), self._rule(shape) + own)
 
-def _twin(scene: Scene, shape: int, colors: list[str], per_pixel: float) -> str:
-    """What the path of a shape says of its twin, the next one."""
-    kind = Kind(int(scene.kind[shape + 1]))
-    style = f' {PAINTED[kind]}="{colors[shape + 1]}"'
-    if kind == Kind.STROKE:
-        return style + _line(scene, shape + 1, per_pixel, in_group=False)
-    return style + (' fill-rule="evenodd"' if scene.rule[shape + 1] == Rule.EVENODD else "") + STROKE_FIRST
+    def _twin(self, twin: int) -> str:
+        """Return the attributes that draw a twin with the path of the shape before."""
+        if self._scene.kind[twin] == Kind.STROKE:
+            return self._colors[twin] + self._line(twin, in_group=False)
+        return f'{self._colors[twin]}{self._rule(twin)} paint-order="stroke"'
 
+    def _rule(self, shape: int) -> str:
+        return ' fill-rule="evenodd"' if self._scene.rule[shape] == Rule.EVENODD else ""
 
-STROKE_FIRST = ' paint-order="stroke"'
-
-
-def _colors(scene: Scene, ramps: Mapping[int, str]) -> list[str]:
-    """The paint of each shape; ``ramps``: identifiers of gradients."""
-    colors = hex_colors(scene.colors)
-    for shape, name in ramps.items():
-        colors[shape] = f"url(#{name})"
-    return colors
-
-
-def _opacities(scene: Scene, opacity_scale: float) -> list[str]:
-    """The attribute of each shape's opacity; empty for opaque ones."""
-    shown = np.minimum(scene.opacities.astype(np.float64) * opacity_scale, 1.0).tolist()
-    return [
-        f' {PAINTED[Kind(kind)]}-opacity="{number(value, OPACITY_DECIMALS)}"' if value < OPAQUE else ""
-        for kind, value in zip(scene.kind.tolist(), shown, strict=True)
-    ]
+    def _line(self, shape: int, *, in_group: bool) -> str:
+        """Return the attributes of a stroke, besides those of the group of strokes if it is ``in_group``."""
+        scene, per_pixel = self._scene, self._per_pixel
+        width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
+        style = f' stroke-width="{width}"'
+        cap, join, dash = Cap(scene.cap[shape]), Join(scene.join[shape]), int(scene.dash[shape])
+        shared_cap, shared_join = (Cap.ROUND, Join.ROUND) if in_group else (Cap.BUTT, Join.MITER)
+        if cap != shared_cap:
+            style += f' stroke-linecap="{cap.name.lower()}"'
+        if join != shared_join:
+            style += f' stroke-linejoin="{join.name.lower()}"'
+        if join == Join.MITER and scene.miter_limits[shape] != MITER_LIMIT:
+            style += f' stroke-miterlimit="{number(float(scene.miter_limits[shape]), SHARE_DECIMALS)}"'
+        if dash != NO_DASHES:
+            offset, *pattern = (number(value * per_pixel, DASH_DECIMALS) for value in scene.dashes[dash])
+            style += f' stroke-dasharray="{" ".join(pattern)}"'
+            style += f' stroke-dashoffset="{offset}"' if offset != "0" else ""
+        return style
 
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
-    """Bytes of each shape in a file with ``per_pixel`` units a pixel, by itself, shape (shape,)."""
-    colors, opacities = _colors(scene, gradients(scene, per_pixel)[1]), _opacities(scene, 1.0)
-    data = PathData(scene, per_pixel)
-    paths = (
-        _path(scene, i, data.of(i), colors[i], opacities[i], per_pixel, "", in_group=True)
-        for i in range(len(scene))
-    )
-    return np.array([len(str(path)) for path in paths], np.int64)
+    """Return the bytes of each shape alone in a file with ``per_pixel`` units to a pixel, shape (shape,)."""
+    paths = _Paths(scene, per_pixel, gradients(scene, per_pixel)[1])
+    sizes = [len(str(paths.of(shape, in_group=True, alone=True))) for shape in range(len(scene))]
+    return np.array(sizes, np.int64)
 
 
 def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
-    """The markup of a picture, in the file's units."""
+    """Return the markup of a picture, in the file's units."""
     across, down = (
         per_pixel * side / own
         for side, own in zip((scene.canvas.width, scene.canvas.height), picture.size, strict=True)
@@ -170,23 +160,17 @@ def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
     return f'<g transform="scale({across:.9g} {down:.9g})">{picture.markup}</g>'
 
 
-def _groups(
-    scene: Scene, ramps: Mapping[int, str], per_pixel: float, opacity_scale: float, ids: bool
-) -> Iterator[str]:
-    """Layers are groups with their names; those without, where there are several, say how many shapes they
-    complete. In them strokes that are neighbours share a group, and neighbours that say the same of
-    themselves where that is shorter. Twins are one path, pictures what they are. ``ids``: paths have names,
-    and neighbours of one paint share a group with one, unless that is what layers are.
+def _groups(scene: Scene, paths: _Paths, per_pixel: float, ids: bool) -> Iterator[str]:
+    """Yield the shapes in groups.
+
+    Layers are groups; those without a name are named by the number of shapes up to their end. Inside,
+    adjacent strokes share a group, and so do neighbours with the same attributes where that is shorter. Twins
+    are one path, and pictures their markup. ``ids``: paths have names, and so have groups of neighbours of
+    one paint, unless layers have names of their own.
     """
-    colors, opacities = _colors(scene, ramps), _opacities(scene, opacity_scale)
-    data = PathData(scene, per_pixel)
-    has_twin = np.append(scene.twin[1:], 0).tolist()
-    strokes = (scene.kind == Kind.STROKE).tolist()
-    rest = [_twin(scene, i, colors, per_pixel) if twin else "" for i, twin in enumerate(has_twin)]
     called, path_names, group_names = color_names(scene) if ids else [], Names(), Names()
-    if ids:
-        rest = [f' id="{path_names.next(name)}"{more}' for name, more in zip(called, rest, strict=True)]
-    both = [o + opacities[i + 1] if has_twin[i] else o for i, o in enumerate(opacities)]
+    attributes = [f' id="{path_names.next(name)}"' for name in called] if ids else [""] * len(scene)
+    strokes = (scene.kind == Kind.STROKE).tolist()
     pictures = (scene.paint == Paint.PICTURE).tolist()
     ends = level_ends(scene)
     layer = np.searchsorted(ends, np.arange(len(scene)), "right").tolist()
@@ -196,7 +180,7 @@ def _groups(
     last = None
     for (level, is_picture, in_group), run in itertools.groupby(
         np.flatnonzero(scene.twin == 0).tolist(),
-        lambda i: (layer[i], pictures[i], strokes[i] and not has_twin[i]),
+        lambda i: (layer[i], pictures[i], strokes[i] and not paths.has_twin[i]),
     ):
         if (ends or scene.layer_names) and level != last:
             yield ("" if last is None else "</g>") + f'<g id="{names[level]}">'
@@ -205,27 +189,23 @@ def _groups(
         if is_picture:
             yield from (_picture(scene.pictures[scene.picture[i]], scene, per_pixel) for i in shapes)
             continue
-        paths = [
-            _path(scene, i, data.of(i), colors[i], both[i], per_pixel, rest[i], in_group=in_group)
-            for i in shapes
-        ]
-        paths = _joined(scene, shapes, paths)
-        group = (f"<g {STROKE_ATTRIBUTES}>", "</g>") if in_group else ("", "")
+        elements = [paths.of(i, in_group=in_group, name=attributes[i]) for i in shapes]
+        elements = _joined(scene, shapes, elements)
         by_color = ids and not scene.layer_names
-        inner = painted(paths, [called[i] for i in shapes], group_names) if by_color else nested(paths)
-        yield from (group[0], *inner, group[1])
+        inner = painted(elements, [called[i] for i in shapes], group_names) if by_color else nested(elements)
+        yield from (f"<g {STROKE_ATTRIBUTES}>", *inner, "</g>") if in_group else inner
     if last is not None:
         yield "</g>"
 
 
 APART = 1.0
-"""Shapes nearer to each other than this [px] share pixels."""
+"""Shapes closer to each other than this [px] share pixels."""
 
 
-def _joined(scene: Scene, shapes: list[int], paths: list[Path]) -> list[Path]:
-    """Neighbours among fitted fills that say the same and lie apart as one path, which shows the same.
+def _joined(scene: Scene, shapes: list[int], paths: list[PathElement]) -> list[PathElement]:
+    """Return the paths with adjacent fitted fills of the same attributes that lie apart joined into one.
 
-    Those of drawings stay: there a path is a region.
+    Those of drawings, where a path is a region, stay.
     """
     alike = [a.shared == b.shared and not (a.own or b.own) for a, b in itertools.pairwise(paths)]
     if not any(alike):
@@ -255,25 +235,24 @@ def write_svg(
     title: str = "",
     ids: bool = False,
 ) -> str:
-    """The scene as an SVG document: a background and one path a shape, in painter's order; but for shapes of
-    very many nodes (``in_parts``).
+    """Return the scene as an SVG: a background and, in painter's order, one path for each shape.
+
+    Shapes with very many nodes become several paths (``in_parts``).
 
     Args:
-        scene: what to write; canvas units become user units.
-        per_pixel: units of the view box a pixel; coordinates are whole numbers of units, points of splines
-            even ones.
-        metadata: text behind the program's name in the comment that marks the file.
-        opacity_scale: opacity of a solid path over that of the scene's shape. A splat's plateau is a little
-            below 1 (``constants.PLATEAU``): a solid path needs that much less opacity to look alike.
-        background: whether to write it, if the canvas has one; without, the picture is transparent where no
-            shape is.
-        title: of the picture; empty: none.
-        ids: whether paths have identifiers, by their colours, and neighbours of one colour a group with one.
+        scene: What to write; canvas units become user units.
+        per_pixel: Units of the view box to a pixel. Coordinates are whole units, those of splines even ones.
+        metadata: Text behind the program's name in the comment that marks the file.
+        opacity_scale: Factor on the opacity of solid paths. A splat's plateau is a little below 1
+            (``constants.PLATEAU``): a solid path needs that much less opacity to look the same.
+        background: Whether to write the canvas's background.
+        title: Title of the picture; empty: none.
+        ids: Whether paths, and groups of neighbours of one colour, have identifiers after their colours.
 
     Raises:
-        UsageError: a number of the scene is not finite.
+        UsageError: A number of the scene is not finite.
     """
-    check_finite(scene)
+    _check_finite(scene)
     scene = in_parts(scene)
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
@@ -284,7 +263,8 @@ def write_svg(
         behind = f'<rect width="{width}" height="{height}"{paint}/>'
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
-    shapes = "".join(_groups(scene, ramps, per_pixel, opacity_scale, ids))
+    paths = _Paths(scene, per_pixel, ramps, opacity_scale)
+    shapes = "".join(_groups(scene, paths, per_pixel, ids))
     if canvas.crisp and len(scene):
         shapes = f'<g shape-rendering="crispEdges">{shapes}</g>'
     return (
@@ -294,15 +274,31 @@ def write_svg(
     )
 
 
+def _check_finite(scene: Scene) -> None:
+    """Raise ``UsageError`` for a number that is not finite; the message names its shape and attribute."""
+    background = scene.canvas.background
+    if background is not None and not np.isfinite(background).all():
+        raise UsageError("the background has a number that is not finite")
+    shapes = np.arange(len(scene))
+    owners = {"shape": shapes, "point": np.repeat(shapes, scene.point_counts())}
+    owners["stop"] = np.repeat(shapes, np.diff(scene.stop_first))
+    for attribute in ATTRIBUTES:
+        values = getattr(scene, attribute.name)
+        if not np.isfinite(values).all():
+            rows = np.isfinite(values).reshape(len(values), -1).all(axis=1)
+            shape = int(owners[attribute.per][np.flatnonzero(~rows)[0]])
+            raise UsageError(f"shape {shape}: {attribute.name} with a number that is not finite")
+
+
 MARK = "<!--warpsplat"
-"""How the comment begins by which a file is known to be written here."""
+"""The beginning of the comment that marks a file as written here."""
 
 UNPRINTABLE = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What XML cannot hold (XML 1.0, 2.2)."""
+"""Characters that XML cannot hold (XML 1.0, 2.2)."""
 
 
 def titled(title: str) -> str:
-    """A ``title`` element, or nothing."""
+    """Return a ``title`` element, or nothing for an empty title."""
     return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
 
 
@@ -310,16 +306,22 @@ HEAD = re.compile(
     rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)">'
 )
 OUR_HEAD = re.compile(HEAD.pattern + MARK)
-"""How a file written here begins: its size in pixels, and that in units of its view box."""
+"""The beginning of a file written here: its size in pixels, and in units of its view box."""
+
+
+def own_head(text: str) -> re.Match[str]:
+    """Return the match of ``HEAD`` in a file written here."""
+    found = HEAD.match(text)
+    assert found
+    return found
 
 
 def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> str:
-    """A file written here, ``scale`` px large for each pixel of its own, cut to the ``width`` x ``height`` px
-    from the left and from ``top`` on.
+    """Return a file written here magnified by ``scale``, cropped to ``width`` x ``height`` px from row
+    ``top``.
     """
     text = _plain(text)
-    found = HEAD.match(text)
-    assert found
+    found = own_head(text)
     unit = float(found[3]) / float(found[1]) / scale
     view = f"0 {top * unit:.9g} {width * unit:.9g} {height * unit:.9g}"
     head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">'
@@ -327,31 +329,29 @@ def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> s
 
 
 def read_metadata(text: str) -> str:
-    """The metadata text of a file written here; empty if there is none."""
+    """Return the metadata text of a file written here; empty: there is none."""
     found = re.search(rf"{MARK} (.*?)-->", text[:1000])
     return found.group(1) if found else ""
 
 
 def minified(text: str) -> str:
-    """A file written here without the mark and line breaks, which show nothing."""
+    """Return a file written here without its mark and line breaks."""
     head, found, rest = _plain(text).partition(MARK)
     return head + rest.partition("-->\n")[2].rstrip("\n") if found else text
 
 
 SHORT = 1500
-"""A file of fewer characters has no comment: the mark is the order of its attributes, which costs nothing
-(``files.output`` knows both)."""
+"""Files of fewer characters have no comment: the order of their attributes marks them (see ``files.output``).
+"""
 
 SHORT_HEAD = re.compile(
     rf'<svg viewBox="0 0 ([\d.]+) ([\d.]+)" xmlns="{re.escape(NAMESPACE)}" height="(\d+)" width="(\d+)">'
 )
-"""How a short file begins."""
+"""The beginning of a short file."""
 
 
 def shortened(text: str) -> str:
-    """A file written here, where it is short without the comment and line breaks; one whose comment says more
-    than the mark stays as it is.
-    """
+    """Return a short file written here without its comment and line breaks; others, and metadata, stay."""
     head = OUR_HEAD.match(text)
     if not head or not text.startswith("-->\n", head.end()) or len(text) >= SHORT:
         return text
@@ -361,7 +361,7 @@ def shortened(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """A short file with the comment again; any other as it is."""
+    """Return a short file with its comment again; any other as it is."""
     head = SHORT_HEAD.match(text)
     if not head:
         return text
