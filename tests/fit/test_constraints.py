@@ -9,7 +9,7 @@ import pytest
 
 from tests.drawing.drawings import drawing, logo, polygon, seam
 from tests.helpers import relative_error
-from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Joint, Keeper
+from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Joint, Projection
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
@@ -49,10 +49,10 @@ def projected(points: np.ndarray, c: Constraints) -> np.ndarray:
     return points
 
 
-def keeper_of(made: Drawing, device: str) -> tuple[Keeper, Parameters, Constraints]:
+def projection_of(made: Drawing, device: str) -> tuple[Projection, Parameters, Constraints]:
     parameters = Parameters(made.scene, Backend.on(device))
     constraints = Constraints.of(made)
-    return Keeper(constraints, parameters), parameters, constraints
+    return Projection(constraints, parameters), parameters, constraints
 
 
 def put(parameters: Parameters, what: str, values: np.ndarray) -> None:
@@ -62,15 +62,15 @@ def put(parameters: Parameters, what: str, values: np.ndarray) -> None:
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_points_are_brought_to_where_they_may_be(device: str, name: str) -> None:
     made = DRAWINGS[name]()
-    keeper, parameters, constraints = keeper_of(made, device)
+    projection, parameters, constraints = projection_of(made, device)
     np.testing.assert_allclose(
         projected(made.scene.points.astype(float), constraints), made.scene.points, atol=1e-4
     )
     off = made.scene.points + np.random.default_rng(1).normal(0, 0.7, made.scene.points.shape)
     put(parameters, "value", off)
-    keeper.project()
+    projection.project()
     np.testing.assert_allclose(parameters.scene().points, projected(off, constraints), atol=1e-4)
-    keeper.project()
+    projection.project()
     np.testing.assert_allclose(
         parameters.scene().points, projected(projected(off, constraints), constraints), atol=1e-4
     )
@@ -80,13 +80,13 @@ def test_points_are_brought_to_where_they_may_be(device: str, name: str) -> None
 def test_the_gradient_is_that_of_what_is_free(device: str, name: str) -> None:
     """Against central differences of the projection, along directions in which ties move as one."""
     made = DRAWINGS[name]()
-    keeper, parameters, constraints = keeper_of(made, device)
+    projection, parameters, constraints = projection_of(made, device)
     rng = np.random.default_rng(2)
     weights = rng.normal(size=made.scene.points.shape)
     at = projected(made.scene.points.astype(float), constraints)
     put(parameters, "grad", weights)
     program = parameters.backend.program()
-    keeper.record_adjoint(program)
+    projection.record_adjoint(program)
     program.run()
     got = parameters.gradients()["points"].reshape(-1)
     first = constraints.tie_first
@@ -99,7 +99,7 @@ def test_the_gradient_is_that_of_what_is_free(device: str, name: str) -> None:
         shift = 1e-4 * (leader == leader[i]).reshape(-1, 2) * (leader[i] not in pinned)
         ends = [projected(at + sign * shift, constraints) for sign in (1, -1)]
         want[i] = (weights * (ends[0] - ends[1])).sum() / 2e-4
-    laid = np.repeat(constraints.laid, 2)
+    laid = np.repeat(constraints.line_handles, 2)
     assert relative_error(got[~laid], want[~laid]) < 1e-4
     assert not want[laid].any()
     assert np.abs(want[~laid]).max() > 1

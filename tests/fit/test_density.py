@@ -5,11 +5,11 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
 
 from tests.fit.pictures import empty_scene
 from tests.scenes import mixed_scene, random_scene, with_points
 from warpsplat.fit import density
-from warpsplat.fit.density import PAIRS_AT_ONCE, densify, duplicates, least_seen, prune_mask
 from warpsplat.fit.place import circle_outlines
 from warpsplat.fit.settings import Density, make_settings
 from warpsplat.portable import filters

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from warpsplat.fit.density import densify
 
 from tests.fit.pictures import empty_scene, picture
-from warpsplat.fit.density import densify
-from warpsplat.fit.importance import LEAST, TEXTURE_NOISE, pixel_weights, weights_at
+from warpsplat.fit.importance import BLACK_WEIGHT, TEXTURE_NOISE, pixel_weights, weights_at
 from warpsplat.fit.loop import fit
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
@@ -21,7 +21,7 @@ def test_weights_are_linear_in_the_grey_of_any_size(size: tuple[int, int]) -> No
     weights = pixel_weights(np.zeros((size[1], size[0], 3), np.float32), mask, 0.0)
     assert weights is not None
     assert weights.shape == size[::-1]
-    assert weights[-1, 0] == pytest.approx(LEAST * weights[0, 0], rel=1e-5)
+    assert weights[-1, 0] == pytest.approx(BLACK_WEIGHT * weights[0, 0], rel=1e-5)
 
 
 @pytest.mark.parametrize("size", [(12, 8), (6, 4), (7, 5)])

@@ -5,12 +5,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from warpsplat.fit.density import densify
 
 from tests.fit.pictures import empty_scene
 from warpsplat.errors import UsageError
-from warpsplat.fit.density import densify
+from warpsplat.fit.elongated import ComponentBars
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.streaks import Streaks
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray, Kind
@@ -25,9 +25,9 @@ def bar_and_disc() -> FloatArray:
     return image
 
 
-def streaks_of(mask: np.ndarray) -> Streaks:
+def streaks_of(mask: np.ndarray) -> ComponentBars:
     row, column = np.nonzero(mask)
-    return Streaks.of(row, column, np.ones(len(row), np.intp), 2)
+    return ComponentBars.of(row, column, np.ones(len(row), np.intp), 2)
 
 
 def test_a_bar_is_measured() -> None:
@@ -39,14 +39,14 @@ def test_a_bar_is_measured() -> None:
     assert found.lengths[0] == pytest.approx(50, rel=0.06)
     assert found.widths[0] == pytest.approx(4.5, rel=0.2)
     assert found.shares[0] > 0.9
-    assert found.stand_for(np.array([0.05], np.float32))[0]
+    assert found.exceed(np.array([0.05], np.float32))[0]
 
 
 def test_an_arc_is_no_bar() -> None:
     """A straight stroke over it would cover what it is not."""
     mask = np.zeros((64, 96), np.uint8)
     cv2.ellipse(mask, (48, 32), (28, 28), 0, 0, 180, 1, 3)
-    assert not streaks_of(mask).stand_for(np.array([0.02], np.float32))[0]
+    assert not streaks_of(mask).exceed(np.array([0.02], np.float32))[0]
 
 
 def test_a_bar_gets_a_stroke_and_a_disc_a_fill() -> None:

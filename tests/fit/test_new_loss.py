@@ -22,7 +22,7 @@ def record_blue(program: Program, inputs: LossInputs) -> None:
         trials.blue_backward,
         inputs.renderer.viewport.tile_count,
         inputs.renderer.film.buffers,
-        inputs.aim,
+        inputs.loss_target,
         weight=2.0,
         split=True,
     )

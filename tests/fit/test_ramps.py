@@ -9,7 +9,7 @@ import pytest
 
 from tests.scenes import random_scene, with_two_stops
 from warpsplat.fit.paints import with_ramps, without_gradients
-from warpsplat.fit.ramps import Ramps, Survey
+from warpsplat.fit.ramps import Ramps, RampSolver
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
@@ -36,12 +36,12 @@ def square(margin: float = -20.0) -> Scene:
     )
 
 
-def survey_of(scene: Scene, target: FloatArray, device: str) -> Survey:
+def survey_of(scene: Scene, target: FloatArray, device: str) -> RampSolver:
     height, width = target.shape[:2]
     state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
     step = Step(state, make_settings(), Target(target, Phase(width, height)))
     step.renderer.forward_complete()
-    return Survey(step)
+    return RampSolver(step)
 
 
 def error(scene: Scene, target: FloatArray, device: str) -> float:

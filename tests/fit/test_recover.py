@@ -12,7 +12,7 @@ from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
-from warpsplat.fit.recover import mend
+from warpsplat.fit.recover import recover
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
@@ -78,8 +78,8 @@ def test_a_spoiled_shape_begins_anew(what: str, name: str, where: str) -> None:
     step = step_of(first)
     poison(step, name, where)
     step.advance()
-    assert mend(step, renews=False) is step
-    assert step.state.renewed == 1
+    assert recover(step, replaces=False) is step
+    assert step.state.recovered == 1
     assert all_finite(step)
     scene = step.state.scene()
     for attribute in ATTRIBUTES:
@@ -91,7 +91,7 @@ def test_a_spoiled_shape_begins_anew(what: str, name: str, where: str) -> None:
     if where == "grad":
         del step.programs[-1].launches[0]
     step.advance()
-    assert mend(step, renews=False) is step and step.state.renewed == 1, "it is over"
+    assert recover(step, replaces=False) is step and step.state.recovered == 1, "it is over"
     assert all_finite(step)
 
 
@@ -101,7 +101,7 @@ def test_what_is_spoiled_while_shapes_come_and_go_is_replaced() -> None:
     before = step.state.scene()
     poison(step, "colors", "value")
     step.advance()
-    after = mend(step, renews=True)
+    after = recover(step, replaces=True)
     assert after is not step and all_finite(after)
     scene = after.state.scene()
     assert len(scene) == 6
@@ -118,8 +118,8 @@ def test_twins_begin_anew_together() -> None:
     step = step_of(replace(scene, twin=np.array([0, 1, 0, 1], np.int32)))
     poison(step, "points", "value")
     step.advance()
-    mend(step, renews=False)
-    assert step.state.renewed == 2
+    recover(step, replaces=False)
+    assert step.state.recovered == 2
     made = step.state.scene()
     np.testing.assert_array_equal(made.points_of(2), made.points_of(3))
 
@@ -129,8 +129,8 @@ def test_what_is_held_is_looked_at_in_the_end() -> None:
     step.state.parameters.hold("opacities", np.ones(6, np.bool_))
     poison(step, "opacities", "value")
     step.advance()
-    mend(step, renews=False, last=True)
-    assert all_finite(step) and step.state.renewed >= 1
+    recover(step, replaces=False, last=True)
+    assert all_finite(step) and step.state.recovered >= 1
 
 
 @pytest.mark.parametrize("at", [10, 60, 90, 100])

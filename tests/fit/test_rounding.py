@@ -14,7 +14,7 @@ from warpsplat.fit import rounding
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.rate import DB_PER_DOUBLING, byte_worth
-from warpsplat.fit.rounding import STAGES, choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
+from warpsplat.fit.rounding import STAGES, choose_grid, freeze_opacities, freeze_stage, opacities_at, stage_at
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -55,7 +55,7 @@ def test_a_stage_rounds_and_holds_its_share(device: str, stage: int) -> None:
     state.per_pixel = 2.0
     before = state.scene()
     low = rounded(before, 2.0)
-    hold_stage(step, stage)
+    freeze_stage(step, stage)
     after = state.scene()
     number = np.concatenate([np.arange(n) for n in before.point_counts()])
     held = number % 3 < stage
@@ -93,7 +93,7 @@ def test_opacities_are_held_at_tenths_or_opaque(device: str) -> None:
     step = opacity_step(device)
     state = step.state
     before = state.scene()
-    hold_opacities(step)
+    freeze_opacities(step)
     after = state.scene()
     opaque = after.opacities == OPAQUE
     assert opaque[-1], "nobody sees it: it is worth no byte"
@@ -117,7 +117,7 @@ def test_the_worth_of_a_byte_decides_what_is_opaque(
     step = opacity_step(device)
     before = step.state.scene().opacities
     monkeypatch.setattr(rounding, "byte_worth", lambda square_error, size: worth)
-    hold_opacities(step)
+    freeze_opacities(step)
     opaque = step.state.scene().opacities == OPAQUE
     assert (opaque == (all_opaque | (before > 0.95))).all()
 
@@ -128,7 +128,7 @@ def test_no_opacity_is_rounded_away(device: str, opacity: float, monkeypatch: py
     step = opacity_step(device)
     scene = step.state.scene()
     step.state.parameters.assign(replace(scene, opacities=np.full(len(scene), opacity, np.float32)))
-    hold_opacities(step)
+    freeze_opacities(step)
     np.testing.assert_array_equal(step.state.scene().opacities, np.float32(max(0.1, round(opacity, 1))))
 
 
@@ -163,7 +163,7 @@ def test_the_coarsest_grid_within_the_loss(
     device: str, staged: bool, loss: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Measured anew, by renders of the rounded scene."""
-    monkeypatch.setattr(rounding, "LOSS", loss)
+    monkeypatch.setattr(rounding, "MAX_LOSS", loss)
     start = mixed_scene(64, 48, seed=1)
     noise = np.random.default_rng(0).normal(0, 0.1, (48, 64, 3))
     image = (render(start, backend=Backend.on(device)) + noise).astype(np.float32)
@@ -177,7 +177,7 @@ def test_the_coarsest_grid_within_the_loss(
         return float(((shown - image) ** 2).mean(dtype=np.float64))
 
     before = error(scene.points)
-    allowed = before * (10 ** (loss / 10) - 1) / (rounding.STAGED if staged else 1)
+    allowed = before * (10 ** (loss / 10) - 1) / (rounding.STAGED_COST if staged else 1)
     costs = {g: error(rounded(scene, g).points) - before for g in GRIDS}
     assert grid == next(g for g, cost in costs.items() if cost <= allowed)
     assert GRIDS[0] < grid < GRIDS[-1], "a loss that decides something"
@@ -191,9 +191,9 @@ def test_no_grid_is_finer_than_the_precision(
     """However little may be lost; where much may be, the precision does not matter."""
     settings = make_settings(iterations=100, precision=precision)
     step = step_for(mixed_scene(64, 48), device, settings)
-    monkeypatch.setattr(rounding, "LOSS", -1000.0)
+    monkeypatch.setattr(rounding, "MAX_LOSS", -1000.0)
     assert choose_grid(step, staged=False) == finest
-    monkeypatch.setattr(rounding, "LOSS", 1000.0)
+    monkeypatch.setattr(rounding, "MAX_LOSS", 1000.0)
     assert choose_grid(step, staged=False) == GRIDS[0]
 
 

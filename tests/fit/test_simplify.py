@@ -10,13 +10,13 @@ import pytest
 
 from tests.fit.pictures import picture
 from tests.scenes import canvas, mixed_scene, random_scene
+from warpsplat.fit.densification import densify
 from warpsplat.fit.place import circle_splines
 from warpsplat.fit.schedule import mean_points_at, phases
 from warpsplat.fit.settings import Density, make_settings
-from warpsplat.fit.simplify import APART, LEAST_POINTS, simplify, without
+from warpsplat.fit.simplify import MIN_POINTS_BETWEEN, MIN_SPLINE_POINTS, simplify, without
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.surgery import operate
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas, flatten
@@ -161,7 +161,7 @@ def test_the_cheapest_points_go_and_all_else_stays() -> None:
     costs = []
     for i in range(len(scene)):
         kind = Kind(int(scene.kind[i]))
-        if scene.basis[i] == Basis.SPLINE and scene.point_counts()[i] > LEAST_POINTS:
+        if scene.basis[i] == Basis.SPLINE and scene.point_counts()[i] > MIN_SPLINE_POINTS:
             moved, area = without(scene.points_of(i)[None], closed=kind == Kind.FILL)
             k = int(area[0].argmin())
             costs.append((area[0, k], scene.first[i] + k, removed(scene.points_of(i), k, moved[0, k]), i))
@@ -183,13 +183,13 @@ def test_what_is_worth_much_keeps_its_points() -> None:
 def test_points_removed_at_once_are_apart_and_enough_are_left(count: int) -> None:
     scene = random_scene(Kind.FILL, 5, basis=Basis.SPLINE, beziers=count, seed=count)
     thin, keep = simplify(scene, np.ones(5, np.float32), 10_000)
-    assert (thin.point_counts() >= min(count, LEAST_POINTS)).all()
-    if count > LEAST_POINTS:
+    assert (thin.point_counts() >= min(count, MIN_SPLINE_POINTS)).all()
+    if count > MIN_SPLINE_POINTS:
         assert (thin.point_counts() < count).all()
     for i in range(5):
         gone = np.setdiff1d(np.arange(count * i, count * (i + 1)), keep)
         apart = (gone[:, None] - gone[None, :]) % count
-        assert ((apart == 0) | ((apart > APART) & (apart < count - APART))).all()
+        assert ((apart == 0) | ((apart > MIN_POINTS_BETWEEN) & (apart < count - MIN_POINTS_BETWEEN))).all()
 
 
 @pytest.mark.parametrize("beziers", range(1, 16))
@@ -197,13 +197,13 @@ def test_strokes_lose_points_too(beziers: int) -> None:
     scene = random_scene(Kind.STROKE, 5, basis=Basis.SPLINE, beziers=beziers, seed=beziers)
     count = beziers + 2
     thin, keep = simplify(scene, np.ones(5, np.float32), 10_000)
-    assert (thin.point_counts() >= min(count, LEAST_POINTS)).all()
-    if count > LEAST_POINTS:
+    assert (thin.point_counts() >= min(count, MIN_SPLINE_POINTS)).all()
+    if count > MIN_SPLINE_POINTS:
         assert (thin.point_counts() < count).all()
     for i in range(5):
         np.testing.assert_array_equal(thin.points_of(i)[[0, -1]], scene.points_of(i)[[0, -1]])
         gone = np.setdiff1d(np.arange(count * i, count * (i + 1)), keep)
-        assert (np.diff(gone) > APART).all()
+        assert (np.diff(gone) > MIN_POINTS_BETWEEN).all()
 
 
 def test_nothing_to_simplify() -> None:
@@ -226,9 +226,9 @@ def test_turns_of_surgery_follow_the_schedule_of_points(device: str) -> None:
     while state.step < 56:
         for _ in range(4):
             step.advance()
-        step = operate(step, grows=True)
+        step = densify(step, grows=True)
         counts = state.scene().point_counts()
-        assert counts.min() >= LEAST_POINTS
+        assert counts.min() >= MIN_SPLINE_POINTS
         # New shapes come with all their points.
         assert counts.mean() < mean_points_at(settings, state.step) + 2
     assert len(counts) == 12
@@ -236,7 +236,7 @@ def test_turns_of_surgery_follow_the_schedule_of_points(device: str) -> None:
     assert len(set(counts.tolist())) > 1
     step.advance()
     assert np.isfinite(step.psnr())
-    same = operate(step, grows=False)
+    same = densify(step, grows=False)
     assert len(same.state.scene()) == 12
 
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from tests.fit.pictures import picture
 from tests.scenes import mixed_scene, points_by_shape, random_scene
+from warpsplat.fit.densification import densify
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.split import FADED, faded, opacities_by_third, split
+from warpsplat.fit.split import MIN_FADE, faded, opacities_by_third, split
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.surgery import operate
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Kind, Scene
@@ -27,8 +27,8 @@ def with_fades(scene: Scene, *fades: tuple[float, float, float]) -> Scene:
 def test_only_a_middle_that_fades_counts() -> None:
     scene = with_fades(
         random_scene(Kind.STROKE, 4),
-        (0, -FADED - 0.1, 0),
-        (0, -FADED + 0.1, 0),
+        (0, -MIN_FADE - 0.1, 0),
+        (0, -MIN_FADE + 0.1, 0),
         (-0.7, -0.7, 0),
         (0, -0.8, 0),
     )
@@ -65,7 +65,7 @@ def test_a_turn_splits_and_keeps_the_number(device: str) -> None:
     state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
     step = Step(state, settings, Target(target, phases(settings, *target.shape[1::-1])[-1]))
     last = scene.points_of(19)
-    operate(step, grows=True)
+    densify(step, grows=True)
     after = state.scene()
     assert len(after) == 20
     starts = np.stack([after.points_of(i)[[0, -1]] for i in range(20)])

@@ -13,14 +13,14 @@ from tests.fit.pictures import picture
 from tests.kernels.modules import kernel_modules, kernels_of
 from tests.scenes import mixed_scene, picture_scene, with_gradients
 from warpsplat.drawing.fit_outlines import Refinement, start
+from warpsplat.fit.densification import densify
+from warpsplat.fit.evaluate_file import evaluate_file
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases
 from warpsplat.fit.settings import Density, Renderer, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.surgery import operate
-from warpsplat.fit.viewer_shift import look_at_file
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
@@ -141,7 +141,7 @@ def test_recorded_steps_refuse_to_run_after_surgery(device: str) -> None:
     settings = make_settings(curves=12, iterations=100)
     old = step_for(picture(), settings, device)
     old.advance()
-    new = operate(old, grows=False)
+    new = densify(old, grows=False)
     for refused in (old.advance, lambda: old.configure(settings), old.render, lambda: old.time(1)):
         with pytest.raises(RuntimeError, match="surgery"):
             refused()
@@ -160,9 +160,9 @@ def test_surgery_keeps_the_number_or_follows_the_schedule(device: str, kind: Kin
     step = Step(state, settings, Target(image, phases(settings, 64, 48)[-1]))
     for _ in range(25):
         step.advance()
-    same = operate(step, grows=False)
+    same = densify(step, grows=False)
     assert same.state.parameters.shape_count == 10
-    more = operate(same, grows=True)
+    more = densify(same, grows=True)
     assert 10 < more.state.parameters.shape_count < 30
 
 
@@ -170,7 +170,7 @@ def test_small_in_front_with_area_order(device: str) -> None:
     settings = make_settings(curves=12, iterations=30, order="area", density=Density(interval=10, stop=1.0))
     step = step_for(picture(), settings, device)
     step.advance()
-    step = operate(step, grows=False)
+    step = densify(step, grows=False)
     sizes = areas(step.state.scene())
     assert sizes.max() > sizes.min()
     assert (np.diff(sizes) <= 1e-3).all()
@@ -182,7 +182,7 @@ def test_a_look_at_the_file_that_outgrows_the_arrays(device: str, renderer: Rend
     settings = make_settings(curves=20, iterations=100, renderer=renderer)
     step = step_for(picture(), settings, device, threads=1, capacity=Capacity(40, 9))
     before = step._graph
-    look_at_file(step)
+    evaluate_file(step)
     assert step._graph is not before
     assert step.renderer.capacity.slots > 9
     shown = on_white(render_svg(export(step.state.scene(), settings, step.state.per_pixel)))
@@ -195,9 +195,9 @@ def test_reduced_sizes_of_any_ratio(device: str, width: int, height: int) -> Non
     """The file is looked at in exactly the geometry of the render, whatever the sides are rounded to."""
     settings = make_settings(curves=6, iterations=100, coarse_pixels=900, fine_pixels=2000)
     step = step_for(picture(width, height), settings, device)
-    look_at_file(step)
+    evaluate_file(step)
     viewport = step.target.viewport
     assert viewport.pixel_count < width * height
-    shift = from_tiles(step.aim.target.numpy(), viewport.width, viewport.height)
+    shift = from_tiles(step.loss_target.target.numpy(), viewport.width, viewport.height)
     inner = (shift - step.target.image)[1:-1, 1:-1]
     assert np.abs(inner).mean() < 0.01

@@ -14,12 +14,12 @@ import pytest
 import warpsplat
 from tests.fit.pictures import picture
 from warpsplat.fit.budget import Budget
+from warpsplat.fit.densification import remove_surplus
 from warpsplat.fit.loop import fit
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.surgery import thin
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, Kind, Scene
@@ -108,7 +108,7 @@ def thinned(scene: Scene, count: int, base: int, device: str) -> Scene:
     backend, settings = Backend.on(device), make_settings(curves=count, iterations=10)
     state = FitState.start(scene, backend, np.random.default_rng(0), base=base)
     target = Target(render(scene, backend=backend), Phase(64, 48))
-    return thin(Step(state, settings, target), count).state.scene()
+    return remove_surplus(Step(state, settings, target), count).state.scene()
 
 
 def test_of_shapes_that_hide_each_other_one_stays(device: str) -> None:
