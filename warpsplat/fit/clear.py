@@ -34,9 +34,6 @@ PROBE_OPACITY = 0.02
 NEIGHBOUR_WEIGHT = 0.05
 """Weight of the pixels around one that should be empty: a viewer may show what has no coverage here."""
 
-OVERSHOOT = 1.5
-"""Move over the one that would remove all that spills, were coverage linear."""
-
 
 def clear_empty(
     scene: Scene, target: FloatArray, settings: Settings, backend: Backend, per_pixel: float
@@ -81,7 +78,8 @@ def _drawn_back(scene: Scene, spill: npt.NDArray[np.bool_], backend: Backend, re
     renderer.backward()
     slopes = renderer.parameters.gradients()["points"]
     spilt = float((renderer.read_image()[..., 3] * gradient[..., 3]).sum())
-    moved = OVERSHOOT * spilt * slopes / max(float((slopes**2).sum()), 1e-30)
+    # 1.5 times what would remove all that spills were coverage linear; a longer move would flip slivers.
+    moved = 1.5 * spilt * slopes / max(float((slopes**2).sum()), 1e-30)
     lengths = np.linalg.norm(moved, axis=1, keepdims=True)
-    moved *= np.minimum(1, reach / np.maximum(lengths, 1e-30))  # slivers would flip over
+    moved *= np.minimum(1, reach / np.maximum(lengths, 1e-30))
     return replace(scene, points=(scene.points - moved).astype(np.float32))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import squares, straight
 from warpsplat.fit.elongated import ComponentBars
-from warpsplat.fit.place import pixel_of, place, place_strokes, shape_angles
+from warpsplat.fit.place import ShapeFactory, pixel_of, shape_angles
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import FloatArray, Scene
@@ -24,12 +24,6 @@ TOP_QUANTILE = 0.995
 
 RADIUS_RATIO = 1.2
 """Radius of a new shape over that of the largest circle in its component of the error."""
-
-MIN_RADIUS = 1.5
-"""Of a new shape on a component [px]."""
-
-RANDOM_RADIUS = 2.0
-"""Of a new shape at a random pixel [px]."""
 
 
 @dataclass(frozen=True)
@@ -78,31 +72,25 @@ def new_shapes(
     error = np.asarray(filters.gaussian_blur(weighted, 1.0), np.float32)
     found = candidates(error, mixed=settings.mixed)
     chosen = _without_overlap(found, error.shape, count)
-    places, radii = found.centres[chosen], np.maximum(RADIUS_RATIO * found.radii[chosen], MIN_RADIUS)
+    places, radii = found.centres[chosen], np.maximum(RADIUS_RATIO * found.radii[chosen], 1.5)
     missing = count - len(chosen)
     if missing > 0:
         weight = error.ravel().astype(np.float64) + 1e-12
         picked = rng.choice(len(weight), missing, p=weight / weight.sum())
         row, column = np.divmod(picked, target.shape[1])
         places = np.concatenate([places, np.stack([column + 0.5, row + 0.5], axis=1)]).astype(np.float32)
-        radii = np.concatenate([radii, np.full(missing, RANDOM_RADIUS, np.float32)])
+        radii = np.concatenate([radii, np.full(missing, 2.0, np.float32)])
     column, row = pixel_of(places, target)
     colors = straight(np.asarray(filters.gaussian_blur(target, 1.0)[row, column], np.float32))
     angles = shape_angles(settings, target, places, 2.0)
-    shapes = place(settings, scene.canvas, places * unit, np.pi * (radii * unit) ** 2, angles, colors)
+    factory = ShapeFactory(settings, scene.canvas)
+    shapes = factory.place(places * unit, np.pi * (radii * unit) ** 2, angles, colors)
     long = np.flatnonzero(found.lengths[chosen])
     if not len(long):
         return shapes
     bars = np.array(chosen)[long]
-    strokes = place_strokes(
-        settings,
-        scene.canvas,
-        places[long] * unit,
-        found.lengths[bars] * unit,
-        np.maximum(found.widths[bars], 1.0) * unit,
-        found.angles[bars],
-        colors[long],
-    )
+    lengths, widths = found.lengths[bars] * unit, np.maximum(found.widths[bars], 1.0) * unit
+    strokes = factory.place_strokes(places[long] * unit, lengths, widths, found.angles[bars], colors[long])
     order = np.arange(count)
     order[long] = count + np.arange(len(long))
     return shapes.append(strokes).take(order)

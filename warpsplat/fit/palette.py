@@ -27,9 +27,6 @@ MIN_VISIBLE = 1e-6
 SOLID_OPACITY = 0.5
 """Least opacity of a pixel whose colour counts, and of a shape that is kept where all are made opaque."""
 
-MAJORITY = 0.5
-"""Share of a cluster's weight above which one colour of it becomes its centre."""
-
 Floats = npt.NDArray[np.floating]
 
 
@@ -176,7 +173,7 @@ def main_colors(colors: FloatArray, weights: IndexArray, count: int) -> FloatArr
     cluster = _distances(levels, centers).argmin(axis=1)
     for i in range(count):
         own = np.flatnonzero(cluster == i)
-        if len(own) and totals[own].max() > MAJORITY * totals[own].sum():
+        if len(own) and totals[own].max() > 0.5 * totals[own].sum():
             centers[i] = levels[own[totals[own].argmax()]]
     return np.asarray(np.round(centers) / 255, np.float32)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -27,9 +27,6 @@ MIXED_STROKE_POINTS = 6
 
 STROKE_ASPECT = 3.0
 """Length over width of a new stroke."""
-
-MIN_STROKE_LENGTH = 2.0
-"""[canvas units]"""
 
 REDUCED_PIXELS = 400_000
 """Largest image that colours and directions of the first shapes are taken from [pixels]."""
@@ -58,9 +55,6 @@ MIN_SIMPLE_CURVES = 32
 PIXELS_PER_CURVE = 8
 """Least pixels of an image for each shape: a shape has about as many numbers as these."""
 
-BORDER_TOLERANCE = 8 / 255
-"""Largest difference in a channel of border pixels that have one colour."""
-
 MIN_OCCUPIED_SHARE = 0.02
 """Least share of a transparent image that is taken as occupied: bounds the number of places tried."""
 
@@ -72,7 +66,6 @@ Floats = npt.NDArray[np.floating]
 
 def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.random.Generator) -> Scene:
     """Return ``count`` shapes on a jittered grid that covers the canvas, or its occupied part."""
-    canvas = canvas_for(settings, target)
     height, width = target.shape[:2]
     wanted = count
     if target.shape[2] == 4:  # so many places that enough are left once those where nothing is are dropped
@@ -91,7 +84,8 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     areas = np.full(count, GRID_COVER * cell * cell)
     angles = shape_angles(settings, small, centres / span, cell / span / 2)
     colors = blurred[row, column]
-    scene = place(settings, canvas, centres, areas, angles, straight(np.asarray(colors, np.float32)))
+    factory = ShapeFactory(settings, canvas_for(settings, target))
+    scene = factory.place(centres, areas, angles, straight(np.asarray(colors, np.float32)))
     order = rng.permutation(count)
     if target.shape[2] == 4:
         order = order[np.argsort(colors[order, 3] <= MIN_PLACE_OPACITY, kind="stable")][:wanted]
@@ -149,67 +143,54 @@ def background_color(target: FloatArray) -> FloatArray:
     """Return the colour of the border if most of it has one (a drawing on paper), else the mean colour."""
     border = np.concatenate([target[0], target[-1], target[:, 0], target[:, -1]])
     median = np.median(border, axis=0)
-    uniform = np.abs(border - median).max(axis=1) < BORDER_TOLERANCE
+    uniform = np.abs(border - median).max(axis=1) < 8 / 255
     color = median if uniform.mean() > 0.5 else reduced(target)[0].mean(axis=(0, 1))
     return np.asarray(np.round(color * 255) / 255, np.float32)  # as files have it
 
 
-def place(
-    settings: Settings,
-    canvas: Canvas,
-    centres: Floats,
-    areas: Floats,
-    angles: Floats,
-    colors: npt.NDArray[Any],
-) -> Scene:
-    """Return new shapes of the settings' kind: ``areas`` in px squared, ``angles`` of strokes in rad."""
-    if settings.kind == Kind.STROKE:
-        widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
-        return place_strokes(settings, canvas, centres, areas / widths, widths, angles, colors)
-    if settings.basis == Basis.CUBIC:
-        points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
-    else:
-        points = circle_splines(centres, np.sqrt(areas / np.pi), settings.spline_points)
-    return _uniform(settings, Kind.FILL, canvas, points, np.zeros(len(centres)), colors)
+@dataclass(frozen=True)
+class ShapeFactory:
+    """Makes new shapes as the settings ask for; lengths are in canvas units, angles in rad."""
 
+    settings: Settings
+    canvas: Canvas
 
-def place_strokes(
-    settings: Settings,
-    canvas: Canvas,
-    centres: Floats,
-    lengths: Floats,
-    widths: Floats,
-    angles: Floats,
-    colors: npt.NDArray[Any],
-) -> Scene:
-    """Return new straight strokes: ``lengths`` and ``widths`` in px, ``angles`` in rad."""
-    count = MIXED_STROKE_POINTS if settings.mixed else settings.spline_points
-    if settings.basis == Basis.CUBIC:
-        count = 3 * STROKE_CUBICS + 1
-    direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)
-    along = np.maximum(lengths, MIN_STROKE_LENGTH)[:, None] * np.linspace(-0.5, 0.5, count)
-    points = np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
-    return _uniform(settings, Kind.STROKE, canvas, points, widths, colors)
+    def place(self, centres: Floats, areas: Floats, angles: Floats, colors: FloatArray) -> Scene:
+        """Return shapes of the settings' kind: circles, or strokes along ``angles``."""
+        settings = self.settings
+        if settings.kind == Kind.STROKE:
+            widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
+            return self.place_strokes(centres, areas / widths, widths, angles, colors)
+        radii = np.sqrt(areas / np.pi)
+        if settings.basis == Basis.CUBIC:
+            points = circle_outlines(centres, radii, settings.chain_cubics)
+        else:
+            points = circle_splines(centres, radii, settings.spline_points)
+        return self._new(Kind.FILL, points, np.zeros(len(centres)), colors)
 
+    def place_strokes(
+        self, centres: Floats, lengths: Floats, widths: Floats, angles: Floats, colors: FloatArray
+    ) -> Scene:
+        """Return straight strokes."""
+        count = MIXED_STROKE_POINTS if self.settings.mixed else self.settings.spline_points
+        if self.settings.basis == Basis.CUBIC:
+            count = 3 * STROKE_CUBICS + 1
+        direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)
+        along = np.maximum(lengths, 2.0)[:, None] * np.linspace(-0.5, 0.5, count)
+        points = np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
+        return self._new(Kind.STROKE, points, widths, colors)
 
-def _uniform(
-    settings: Settings,
-    kind: Kind,
-    canvas: Canvas,
-    points: FloatArray,
-    widths: Floats,
-    colors: npt.NDArray[Any],
-) -> Scene:
-    """Return shapes of ``kind`` with the opacity of new ones."""
-    return Scene.uniform(
-        kind,
-        canvas,
-        points,
-        settings.basis,
-        colors=np.asarray(colors, np.float32).reshape(len(points), 3),
-        opacities=np.full(len(points), OPACITY_RANGE[1] if settings.opaque else settings.opacity, np.float32),
-        widths=np.asarray(widths, np.float32),
-    )
+    def _new(self, kind: Kind, points: FloatArray, widths: Floats, colors: FloatArray) -> Scene:
+        opacity = OPACITY_RANGE[1] if self.settings.opaque else self.settings.opacity
+        return Scene.uniform(
+            kind,
+            self.canvas,
+            points,
+            self.settings.basis,
+            colors=np.asarray(colors, np.float32).reshape(len(points), 3),
+            opacities=np.full(len(points), opacity, np.float32),
+            widths=np.asarray(widths, np.float32),
+        )
 
 
 def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatArray:

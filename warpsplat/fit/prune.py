@@ -15,15 +15,13 @@ BoolArray = npt.NDArray[np.bool_]
 PAIRS_PER_CHUNK = 1 << 18
 """Pairs of shapes that ``duplicates`` compares at once, to bound its memory."""
 
-MAX_MIN_AREA_SHARE = 0.1
-"""Bound of ``Density.area`` in canvas areas per shape: many shapes on a small canvas have to be tiny."""
-
 
 def prune_mask(scene: Scene, density: Density, progress: float) -> BoolArray:
     """Return which shapes are faint, tiny, not finite or duplicates, at ``progress`` (share of the run)."""
     pruned = scene.opacities + scene.fades.mean(axis=1) < opacity_threshold(density, progress)
+    # Many shapes on a small canvas have to be tiny.
     share = scene.canvas.width * scene.canvas.height / max(len(scene), 1)
-    pruned |= areas(scene) < min(density.area, MAX_MIN_AREA_SHARE * share)
+    pruned |= areas(scene) < min(density.area, 0.1 * share)
     broken = ~np.isfinite(scene.points).all(axis=1)
     pruned |= np.logical_or.reduceat(broken, scene.first[:-1]) if len(scene) else pruned
     return pruned | duplicates(scene, density)
