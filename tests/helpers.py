@@ -1,4 +1,4 @@
-"""Run the renderer and its reference on the same scene with the same plans; launch single kernels."""
+"""Compare the renderer with its reference on the same scene and plans; launch single kernels."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def renderer_for(
     lanes: int | None = None,
     capacity: Capacity | None = None,
 ) -> Renderer:
-    """After a complete forward pass. ``lanes``: other than is usual on the device."""
+    """Return a renderer after a complete forward pass. ``lanes``: default: as usual on the device."""
     backend = Backend.on(device, threads)
     backend = replace(backend, lanes=lanes or backend.lanes)
     viewport = Viewport(round(scene.canvas.width * scale), round(scene.canvas.height * scale), scale)
@@ -62,14 +62,14 @@ def plans_of(renderer: Renderer) -> list[Plan]:
 
 
 def pieces_of(renderer: Renderer) -> list[list[int]]:
-    """Of each shape's Béziers."""
+    """Return the number of pieces of each Bézier, by shape."""
     pieces = outline_of(renderer).bezier_pieces.numpy().tolist()
     first = renderer.parameters.arrays["bezier_first"].numpy()
     return [pieces[a:b] for a, b in itertools.pairwise(first)]
 
 
 def reference_image(scene: Scene, renderer: Renderer, detach: bool = False) -> tuple[Tensors, torch.Tensor]:
-    """The parameters and the image that the reference makes of them with the renderer's plans."""
+    """Return the parameters, and the image that the reference renders with the renderer's plans."""
     p, v = tensors(scene), renderer.viewport
     if isinstance(renderer.geometry, Grid):
         covers = splat.coverages(scene, p, plans_of(renderer), v.width, v.height, v.scale, detach)
@@ -87,7 +87,7 @@ def compare(
     model: Model = EXACT,
     lanes: int | None = None,
 ) -> None:
-    """Image and all gradients against the reference, for a random gradient of the image."""
+    """Compare image and all gradients with the reference, for a random gradient of the image."""
     renderer = renderer_for(scene, device, scale, model=model, lanes=lanes)
     splats = isinstance(model, SplatModel)
     detach = isinstance(model, SplatModel) and not model.through_scales
@@ -106,7 +106,7 @@ def compare(
 
 
 def coverage_images(renderer: Renderer) -> np.ndarray:
-    """Slots put together: [shape, padded height, padded width]; 0 where a shape has no slot."""
+    """Return coverage by shape, [shape, padded height, padded width]; 0 where it has no slot."""
     v, bins = renderer.viewport, renderer.bins.buffers
     images = np.zeros((renderer.parameters.shape_count, TILE * v.tiles_y, TILE * v.tiles_x), np.float32)
     shapes, tiles = bins.slot_shape.numpy(), bins.slot_tile.numpy()
@@ -126,5 +126,5 @@ def run(kernel: wp.Kernel, dim: int | tuple[int, ...], device: str, *sources: ob
 
 
 def relative_error(got: np.ndarray, want: np.ndarray) -> float:
-    """Largest difference over the largest magnitude."""
+    """Return the largest difference over the largest magnitude."""
     return float(np.abs(got - want).max(initial=0) / max(np.abs(want).max(initial=0), 1e-30))

@@ -17,7 +17,7 @@ from warpsplat.scene.scene import starts_of
 CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
 FILL_CUBICS, STROKE_CUBICS = 4, 3
 FILL_QUADRATICS, STROKE_QUADRATICS = 12, 5
-"""About as many as the shapes of a run have."""
+"""Béziers of a shape, about as many as in a run."""
 
 
 def canvas(width: int, height: int) -> Canvas:
@@ -34,14 +34,11 @@ def random_scene(
     basis: Basis = CUBIC,
     beziers: int | None = None,
 ) -> Scene:
-    """Wobbly blobs or strokes of so many Béziers each, some of them partly off the canvas."""
+    """Return wobbly blobs or strokes of ``beziers`` each, some of them partly off the canvas."""
     rng = np.random.default_rng(seed)
     centre = rng.uniform(0, 1, (count, 1, 2)) * np.array([width, height])
     outlines = _blobs if kind == Kind.FILL else _strokes
-    usual = {
-        CUBIC: (FILL_CUBICS, STROKE_CUBICS),
-        SPLINE: (FILL_QUADRATICS, STROKE_QUADRATICS),
-    }
+    usual = {CUBIC: (FILL_CUBICS, STROKE_CUBICS), SPLINE: (FILL_QUADRATICS, STROKE_QUADRATICS)}
     beziers = beziers or usual[basis][kind == Kind.STROKE]
     points = outlines(rng, centre, point_count(kind, basis, beziers))
     colors = rng.uniform(0.05, 0.95, (count, 3))
@@ -59,7 +56,7 @@ def random_scene(
 
 
 def point_count(kind: Kind, basis: Basis, beziers: int) -> int:
-    """Control points of a shape of so many Béziers."""
+    """Return the number of control points of a shape of ``beziers``."""
     if basis == CUBIC:
         return 3 * beziers + (kind == Kind.STROKE)
     return beziers + 2 * (kind == Kind.STROKE)
@@ -79,11 +76,11 @@ def _strokes(rng: np.random.Generator, centre: np.ndarray, count: int) -> np.nda
 
 
 Outline = tuple[Kind, Basis, int]
-"""Of one shape: what it is, and its number of Béziers."""
+"""Kind and basis of a shape, and its number of Béziers."""
 
 
 def ragged_scene(shapes: Sequence[Outline], width: int = 40, height: int = 36, *, seed: int = 0) -> Scene:
-    """One random shape for each outline, the first furthest back."""
+    """Return a random shape for each outline, the first one at the back."""
     scene = random_scene(Kind.FILL, 0, width, height)
     for i, (kind, basis, beziers) in enumerate(shapes):
         one = random_scene(kind, 1, width, height, seed=100 * seed + i, basis=basis, beziers=beziers)
@@ -101,7 +98,7 @@ MIXED_CUBICS: tuple[Outline, ...] = (
     (Kind.STROKE, CUBIC, 2),
     (Kind.FILL, CUBIC, 4),
 )
-"""Fills and strokes by turns, of different numbers of cubics; the fills' are even, as splats need."""
+"""Fills and strokes of different numbers of cubics, even ones for fills, as splats need."""
 
 MIXED: tuple[Outline, ...] = (
     (Kind.FILL, SPLINE, 12),
@@ -115,16 +112,16 @@ MIXED: tuple[Outline, ...] = (
     (Kind.FILL, SPLINE, 7),
     (Kind.STROKE, SPLINE, 2),
 )
-"""Of both bases as well, from the fewest points on."""
+"""Fills and strokes of both bases, from the fewest points on."""
 
 
 def mixed_scene(width: int = 40, height: int = 36, *, seed: int = 0, splines: bool = True) -> Scene:
-    """Of fills and strokes of different lengths; without splines, such as splats can show."""
+    """Return fills and strokes of different lengths; without splines, as splats need."""
     return ragged_scene(MIXED if splines else MIXED_CUBICS, width, height, seed=seed)
 
 
 def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> Scene:
-    """Shapes of several contours each, of both bases, closed and open, that overlap their own."""
+    """Return shapes of several contours each, of both bases, closed and open, that overlap themselves."""
     shapes = []
     for i, basis in enumerate((CUBIC, SPLINE, CUBIC)):
         parts = [
@@ -152,7 +149,7 @@ def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> S
 
 
 def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:
-    """Every shape but the last has a gradient: linear and radial by turns, of one to three stops."""
+    """Give every shape but the last a gradient of one to three stops, linear and radial in turn."""
     rng = np.random.default_rng(seed)
     count = len(scene)
     stops = np.arange(count) % 3 + 1
@@ -177,12 +174,12 @@ def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:
 
 
 def with_two_stops(scene: Scene, *, seed: int = 0) -> Scene:
-    """Every shape but the last has a gradient of two stops, padded, linear and radial by turns."""
+    """Give every shape but the last a padded gradient of two stops, linear and radial in turn."""
     return with_stops(scene, (0.1, 0.8), seed=seed)
 
 
 def with_stops(scene: Scene, offsets: Sequence[float], *, seed: int = 0) -> Scene:
-    """As ``with_two_stops``, with stops at ``offsets``."""
+    """Give every shape but the last a padded gradient with stops at ``offsets``, linear and radial in turn."""
     scene = with_gradients(scene, seed=seed)
     rng = np.random.default_rng(seed)
     stops = len(offsets) * (scene.paint != Paint.FLAT)
@@ -199,24 +196,22 @@ def with_stops(scene: Scene, offsets: Sequence[float], *, seed: int = 0) -> Scen
 
 
 def with_points(scene: Scene, points: FloatArray) -> FloatArray:
-    """Points of alike shapes (shape, point, 2), as the scene has them."""
+    """Return points of alike shapes, shape (shape, point, 2), as rows of the scene."""
     return np.ascontiguousarray(points, np.float32).reshape(scene.points.shape)
 
 
 def points_by_shape(scene: Scene) -> FloatArray:
-    """Of a scene of alike shapes: (shape, point, 2), a copy."""
+    """Return a copy of the points of alike shapes, shape (shape, point, 2)."""
     (group,) = scene.alike()
     return group.points.copy()
 
 
 RING_STEPS = {SPLINE: 1, CUBIC: 3}
-"""Points from one at which a ring may start to the next."""
+"""Points between two at which a ring may start."""
 
 
 def started_alike(scene: Scene, like: Scene) -> Scene:
-    """``scene`` with its rings rolled to start where those of ``like`` do: what a file says of a ring is not
-    where it starts.
-    """
+    """Return ``scene`` with its rings rolled to start as those of ``like``: files do not keep the start."""
     points = scene.points.copy()
     for i in np.flatnonzero(scene.kind == Kind.FILL):
         ring, other = scene.points_of(i), like.points_of(i)
@@ -226,7 +221,7 @@ def started_alike(scene: Scene, like: Scene) -> Scene:
 
 
 def picture_scene(canvas: Canvas, picture: Picture) -> Scene:
-    """A picture on all of a canvas."""
+    """Return a picture on all of a canvas."""
     return replace(
         disc(500, canvas.width, canvas.width / 2),
         canvas=canvas,
@@ -238,7 +233,7 @@ def picture_scene(canvas: Canvas, picture: Picture) -> Scene:
 
 
 def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> Scene:
-    """One white, opaque disc on black, a ring of cubics."""
+    """Return a white, opaque disc on black, a ring of cubics."""
     k = 4 / 3 * np.tan(np.pi / (2 * cubics))
     points = []
     for i in range(cubics):
@@ -260,11 +255,11 @@ DASHES = (
     (2.5, 0.0, 6.0),
     (1.0, 300.0, 5.0),
 )
-"""Patterns that begin anywhere, of several dashes, of dots, and longer than what they are on."""
+"""Patterns with offsets, of several dashes, of dots, and longer than their strokes."""
 
 
 def styled_scene(cap: Cap, join: Join, dash: int = NO_DASHES, *, seed: int = 0, limit: float = 4.0) -> Scene:
-    """Shapes of several contours, closed and open, smooth and with corners, drawn in a style."""
+    """Return strokes of several contours, closed and open, smooth and with corners."""
     scene = contours_scene(Kind.STROKE, seed=seed)
     count = len(scene)
     return replace(
@@ -288,7 +283,7 @@ def polyline_scene(
     dash: int = NO_DASHES,
     dashes: tuple[tuple[float, ...], ...] = (),
 ) -> Scene:
-    """A white stroke on black along straight lines, closed or not."""
+    """Return a white stroke on black along straight lines, closed or not."""
     points = []
     for corners, closed in contours:
         ring = np.array([*corners, corners[0]] if closed else corners, np.float64)

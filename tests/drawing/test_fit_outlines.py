@@ -47,7 +47,7 @@ def assert_clean(made: Drawing, scene: Scene) -> None:
     for axis in (0, 1):
         for edge in (0, size[axis]):
             here = made.scene.points[:, axis] == edge
-            assert (scene.points[here & ~constraints.laid, axis] == edge).all()
+            assert (scene.points[here & ~constraints.line_handles, axis] == edge).all()
 
 
 @pytest.mark.parametrize("background", [WHITE, None], ids=["opaque", "transparent"])
@@ -153,7 +153,7 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
         figures, states = [], []
         for _ in range(12):
             step.advance()
-            figures.append(step.aim.mean_square())
+            figures.append(step.loss_target.mean_square())
             states.append(step.renderer.bins.buffers.tile_still.numpy().copy())
         step.render()
         assert step.measured_error() == pytest.approx(step.square_error(), rel=1e-5)

@@ -1,5 +1,3 @@
-"""What is empty in the picture is empty in the file."""
-
 from __future__ import annotations
 
 from dataclasses import replace
@@ -22,17 +20,17 @@ def shown(scene: Scene) -> np.ndarray:
     return premultiplied(render_own(export(scene, SETTINGS, 10.0))) / 255
 
 
-def test_outlines_draw_back(device: str) -> None:
+def test_outlines_are_drawn_back_no_further_than_needed(device: str) -> None:
     scene = replace(disc(12, 40, 20), canvas=Canvas(40, 40, None))
     target = shown(replace(scene, points=20 + (scene.points - 20) * np.float32(11.3 / 12)))
     empty = target[..., 3] == 0
     assert shown(scene)[empty].any()
     clear = clear_empty(scene, target, SETTINGS, Backend.on(device), 10.0)
     assert not shown(clear)[empty].any()
-    assert np.abs(clear.points - scene.points).max() < 1.5, "and no further than they must"
+    assert np.abs(clear.points - scene.points).max() < 1.5
 
 
-def test_what_is_clear_stays_as_it_is(device: str) -> None:
+def test_a_clear_scene_stays_as_it_is(device: str) -> None:
     scene = random_scene(Kind.FILL, 5, basis=Basis.SPLINE)
     scene = replace(scene, canvas=Canvas(40, 36, None))
     clear = clear_empty(scene, shown(scene), SETTINGS, Backend.on(device), 10.0)

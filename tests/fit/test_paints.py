@@ -1,4 +1,4 @@
-"""Runs with gradients: where they are worth their bytes, and what their files hold."""
+"""Runs with gradients: where they are worth their bytes, and their files."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.fit.pictures import picture
+from tests.fit.pictures import picture, step_for
 from tests.scenes import random_scene, with_two_stops
 from warpsplat.errors import UsageError
 from warpsplat.fit.paints import choose_paints
-from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step, Target
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -33,7 +30,7 @@ def sky() -> FloatArray:
 
 
 def stripes(grey: float) -> Scene:
-    """The upper half of a picture in this grey, the lower half in so many stripes as make a usual file."""
+    """The upper half of an image in this grey, the lower half in as many stripes as make a usual file."""
     heights = np.array([32] + [2] * 16)
     x, y = np.array([(0, 0), (0, 1), (1, 1), (1, 0)]).T
     corners = np.stack([120 * x - 20 + 0 * heights[:, None], y * heights[:, None]], axis=2)
@@ -71,21 +68,20 @@ def test_auto_paints_a_sky_with_ramps(device: str) -> None:
 
 @pytest.mark.parametrize("ramp", [0.0, 0.3])
 def test_auto_paints_flat_what_is_flat(device: str, ramp: float) -> None:
-    """Shapes in their places, one of them in a wrong colour, or on what gets brighter to the right."""
+    """Shapes in their places, one of them in a wrong colour, or where the target brightens to the right."""
     settings = make_settings("draft", paint="auto", curves=17)
     scene = stripes(0.5)
     target = render(stripes(0.5 if ramp else 0.7), backend=Backend.on(device)).copy()
     target[:32] += np.float32(ramp) * np.linspace(-1, 1, 80, dtype=np.float32)[:, None]
-    state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
-    step = Step(state, settings, Target(target, Phase(80, 64)))
+    step = step_for(scene, target, device, settings)
     step.render()
     choose_paints(step)
-    assert (state.scene().paint != Paint.FLAT).tolist() == [ramp > 0] + [False] * 16
+    assert (step.state.scene().paint != Paint.FLAT).tolist() == [ramp > 0] + [False] * 16
 
 
 @pytest.mark.parametrize("kind", [Paint.LINEAR, Paint.RADIAL])
 def test_one_kind(device: str, kind: Paint) -> None:
-    """What is made is read back, and a viewer shows it as we do."""
+    """The file is read back, and a viewer shows it as we do."""
     result = run(picture(), device, paint=kind.name.lower(), iterations=80)
     scene = result.scene
     assert set(scene.paint.tolist()) <= {Paint.FLAT, kind}
@@ -104,11 +100,10 @@ def test_a_circle_stays_one_in_training(device: str) -> None:
     frames = scene.frames.copy()
     frames[:4, 4:] = np.stack([-frames[:4, 3], frames[:4, 2]], axis=1)
     scene = replace(scene, frames=frames)
-    state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
-    step = Step(state, make_settings(), Target(picture(), Phase(64, 48)))
+    step = step_for(scene, picture(), device)
     for _ in range(5):
         step.advance()
-    moved = state.scene().frames
+    moved = step.state.scene().frames
     round_ = (scene.paint == Paint.RADIAL) & (np.arange(6) < 4)
     assert round_.sum() == 2
     assert (np.abs(moved - frames)[round_, :4] > 0.1).all()

@@ -1,4 +1,4 @@
-"""Few colours: what shapes have, how they choose, what the file has."""
+"""Few colours: how shapes choose them, and the file."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fit.pictures import picture
+from tests.fit.pictures import picture, step_for
 from warpsplat.errors import UsageError
 from warpsplat.fit.palette import CHOICE_INTERVAL, Palette, best_colors, main_colors
-from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_palette
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.options import settings_from
@@ -26,14 +23,11 @@ COLOR = re.compile(r'(?:fill|stroke)="(#[0-9a-f]{3,6})"')
 
 
 def squares(colors: list[list[float]]) -> Scene:
-    points = (
-        np.array([[[8, 8], [24, 8], [24, 24], [8, 24]]], np.float32) + np.arange(len(colors))[:, None, None]
-    )
-
+    square = np.array([[[8, 8], [24, 8], [24, 24], [8, 24]]], np.float32)
     return Scene.uniform(
         Kind.FILL,
         Canvas(64, 48, np.zeros(3, np.float32)),
-        points,
+        square + np.arange(len(colors))[:, None, None],
         Basis.SPLINE,
         colors=np.array(colors, np.float32),
         opacities=np.ones(len(colors), np.float32),
@@ -54,22 +48,16 @@ def test_a_file_has_no_other_colours(device: str, kind: Kind, given: dict[str, o
     assert result.score.psnr > 12
 
 
-def chooser(target: FloatArray, scene: Scene) -> Step:
-    state = FitState.start(scene, Backend.on("cpu"), np.random.default_rng(0))
-    height, width = target.shape[:2]
-    return Step(state, make_settings(texture=0.0), Target(target, Phase(width, height)))
-
-
 @pytest.mark.parametrize("transparent", [False, True])
 @pytest.mark.parametrize("opacity", [1.0, 0.5])
 def test_the_error_is_least_at_the_best_colour(opacity: float, *, transparent: bool) -> None:
-    """Of one shape alone: in each channel it grows as much on one side as on the other."""
+    """For a single shape: in each channel it grows as much on one side as on the other."""
     scene, target = squares([[0.2, 0.9, 0.4]]), picture()
     scene = replace(scene, opacities=np.full(1, opacity, np.float32))
     if transparent:
         scene = replace(scene, canvas=replace(scene.canvas, background=None))
         target = np.concatenate([0.7 * target, np.full_like(target[..., :1], 0.7)], axis=2)
-    step = chooser(target, scene)
+    step = step_for(scene, target)
     best = best_colors(step, scene)
 
     def error(colors: FloatArray) -> float:
@@ -87,11 +75,11 @@ def test_the_error_is_least_at_the_best_colour(opacity: float, *, transparent: b
 
 
 def test_shapes_choose_the_colour_with_the_least_error() -> None:
-    """Of all, tried one by one; and no nearer one where most of a shape is hidden."""
+    """Against all of them, tried one by one."""
     rng = np.random.default_rng(3)
     colors = rng.random((4, 3)).astype(np.float32)
     scene = squares(rng.random((5, 3)).tolist())
-    step = chooser(picture(), scene)
+    step = step_for(scene, picture())
     palette = Palette(colors)
     palette.choose(step)
     chosen = step.state.scene().colors
@@ -107,16 +95,16 @@ def test_shapes_choose_the_colour_with_the_least_error() -> None:
         assert (chosen[i] == colors[int(np.argmin(errors))]).all()
 
 
-def test_what_is_hidden_keeps_its_colour() -> None:
+def test_hidden_shapes_keep_their_colour() -> None:
     scene = squares([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     points = np.concatenate([scene.points[:4], scene.points[:4] * [2, 2] - [16, 16]])
     scene = replace(scene, points=np.asarray(points, np.float32))
-    assert (best_colors(chooser(picture(), scene), scene)[0] == scene.colors[0]).all()
+    assert (best_colors(step_for(scene, picture()), scene)[0] == scene.colors[0]).all()
 
 
 def test_new_shapes_choose_at_once() -> None:
     scene = squares([[0.0, 0.0, 0.0]])
-    step = chooser(picture(), scene)
+    step = step_for(scene, picture())
     palette = Palette(np.array([[0, 0, 0], [1, 1, 1]], np.float32))
     palette.choose(step)
     step.state.step = CHOICE_INTERVAL + 1

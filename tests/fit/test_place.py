@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from warpsplat.fit import place
-from warpsplat.fit.place import background_color, contour_angles, grid_scene, simple_curves, survey
+from warpsplat.fit.place import background_color, contour_angles, grid_scene, reduced, simple_curves
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Kind
 from warpsplat.scene.geometry import areas
@@ -13,7 +13,7 @@ from warpsplat.scene.geometry import areas
 
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("count", [1, 7, 50])
-def test_first_curves_cover_the_canvas(kind: Kind, count: int) -> None:
+def test_first_shapes_cover_the_canvas(kind: Kind, count: int) -> None:
     target = np.random.default_rng(0).uniform(size=(40, 70, 3)).astype(np.float32)
     scene = grid_scene(make_settings(kind=kind), target, count, np.random.default_rng(0))
     assert len(scene) == count
@@ -21,43 +21,43 @@ def test_first_curves_cover_the_canvas(kind: Kind, count: int) -> None:
     assert np.isfinite(scene.points).all()
 
 
-def picture(height: int, width: int) -> np.ndarray:
-    """Smooth blobs: a reduced copy has the same colours."""
+def blobs(height: int, width: int) -> np.ndarray:
+    """Smooth, so that a reduced copy has the same colours."""
     rng = np.random.default_rng(0)
     small = rng.uniform(0, 1, (6, 8, 3)).astype(np.float32)
     return np.clip(cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC), 0, 1)
 
 
-def test_small_images_are_surveyed_as_they_are() -> None:
-    target = picture(60, 80)
-    same, span = survey(target, 30.0)
+def test_small_images_are_not_reduced() -> None:
+    target = blobs(60, 80)
+    same, span = reduced(target, 30.0)
     assert same is target
     assert span == 1.0
-    assert survey(np.zeros((512, 768, 3), np.float32), 120.0)[1] == 1.0, "photographs of the Kodak set"
+    assert reduced(np.zeros((512, 768, 3), np.float32), 120.0)[1] == 1.0, "photographs of the Kodak set"
 
 
 @pytest.mark.parametrize(("shape", "sigma"), [((3000, 4000), 5.0), ((60, 80), 1000.0), ((2, 9000), 500.0)])
-def test_what_is_surveyed_is_bounded(shape: tuple[int, int], sigma: float) -> None:
-    small, span = survey(np.zeros((*shape, 1), np.float32), sigma)
-    assert small.shape[0] * small.shape[1] <= 1.01 * place.SURVEY_PIXELS
-    assert sigma / span <= place.SURVEY_SIGMA * 1.001
+def test_reduced_images_are_bounded(shape: tuple[int, int], sigma: float) -> None:
+    small, span = reduced(np.zeros((*shape, 1), np.float32), sigma)
+    assert small.shape[0] * small.shape[1] <= 1.01 * place.REDUCED_PIXELS
+    assert sigma / span <= place.REDUCED_SIGMA * 1.001
 
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_reduced_colours_and_directions_are_those_of_the_image(
     kind: Kind, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    target = picture(192, 256)
+    target = blobs(192, 256)
     settings = make_settings(kind=kind)
     whole = grid_scene(settings, target, 12, np.random.default_rng(1))
-    monkeypatch.setattr(place, "SURVEY_PIXELS", 128 * 96)
+    monkeypatch.setattr(place, "REDUCED_PIXELS", 128 * 96)
     reduced = grid_scene(settings, target, 12, np.random.default_rng(1))
     np.testing.assert_allclose(reduced.colors, whole.colors, atol=0.03)
     np.testing.assert_allclose(reduced.points, whole.points, atol=5 if kind == Kind.STROKE else 0)
 
 
 def test_the_mean_of_many_pixels_is_their_mean() -> None:
-    """A sum of 32 bits over all pixels stops growing long before their end."""
+    """A sum of 32 bits over all pixels would stop growing long before their end."""
     target = np.full((3000, 4000, 3), 0.5, np.float32)
     target[:, ::2] = [0.2, 0.3, 0.4]
     np.testing.assert_allclose(background_color(target), [0.35, 0.4, 0.45], atol=0.004)
@@ -76,8 +76,8 @@ def flag(bands: int) -> np.ndarray:
 
 
 def test_few_flat_regions_need_few_curves() -> None:
-    assert simple_curves(flag(2)) == place.LEAST_CURVES
-    assert simple_curves(flag(10)) == 10 * place.SHAPES_A_REGION
+    assert simple_curves(flag(2)) == place.MIN_SIMPLE_CURVES
+    assert simple_curves(flag(10)) == 10 * place.SHAPES_PER_REGION
 
 
 def test_photographs_and_soft_pictures_get_the_default() -> None:
@@ -85,10 +85,10 @@ def test_photographs_and_soft_pictures_get_the_default() -> None:
     noise = np.random.default_rng(0).uniform(0, 1, (400, 300, 3)).astype(np.float32)
     moon = np.zeros((400, 300, 3), np.float32)
     moon[:120, :100] = soft[:120, ::3]
-    for target in (soft, noise, moon, picture(400, 300)):
+    for target in (soft, noise, moon, blobs(400, 300)):
         assert simple_curves(target) >= make_settings().curves
 
 
 def test_tiny_images_have_room_for_few_curves() -> None:
-    assert simple_curves(picture(16, 16)) == 256 // place.PIXELS_A_CURVE
-    assert simple_curves(picture(2, 2)) == 1
+    assert simple_curves(blobs(16, 16)) == 256 // place.PIXELS_PER_CURVE
+    assert simple_curves(blobs(2, 2)) == 1

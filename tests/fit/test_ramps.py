@@ -1,4 +1,4 @@
-"""Ramps that the error asks for: found where they are, worth what they are said to be worth."""
+"""Ramps fitted to the error, and their gains."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.fit.pictures import step_for
 from tests.scenes import random_scene, with_two_stops
 from warpsplat.fit.paints import with_ramps, without_gradients
-from warpsplat.fit.ramps import Ramps, Survey
-from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import make_settings
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step, Target
+from warpsplat.fit.ramps import Ramps, RampSolver
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
@@ -36,12 +33,10 @@ def square(margin: float = -20.0) -> Scene:
     )
 
 
-def survey_of(scene: Scene, target: FloatArray, device: str) -> Survey:
-    height, width = target.shape[:2]
-    state = FitState.start(scene, Backend.on(device), np.random.default_rng(0))
-    step = Step(state, make_settings(), Target(target, Phase(width, height)))
+def solver_of(scene: Scene, target: FloatArray, device: str) -> RampSolver:
+    step = step_for(scene, target, device)
     step.renderer.forward_complete()
-    return Survey(step)
+    return RampSolver(step)
 
 
 def error(scene: Scene, target: FloatArray, device: str) -> float:
@@ -53,7 +48,7 @@ def error(scene: Scene, target: FloatArray, device: str) -> float:
 
 
 def only(ramps: Ramps, kind: Paint, scene: Scene, shape: int = 0) -> Scene:
-    """``scene`` with one shape's ramp in place of its colour."""
+    """Return ``scene`` with one shape's ramp in place of its colour."""
     chosen = np.arange(len(scene)) == shape
     return with_ramps(scene, chosen, np.full(len(scene), kind, np.int32), ramps)
 
@@ -68,7 +63,7 @@ def test_a_linear_ramp_is_found(device: str) -> None:
     t = ((0.8 * x + 0.6 * y) / 80)[..., None]
     target = ((1 - t) * [0.1, 0.8, 0.3] + t * [0.9, 0.2, 0.5]).astype(np.float32)
     scene = square()
-    painted = only(survey_of(scene, target, device).linear(), Paint.LINEAR, scene)
+    painted = only(solver_of(scene, target, device).linear(), Paint.LINEAR, scene)
     # The picture's corners lie beyond the ends.
     assert error(painted, target, device) < 1e-3 * error(scene, target, device)
 
@@ -78,17 +73,17 @@ def test_a_radial_ramp_is_found(device: str) -> None:
     t = (np.hypot(x - 30, y - 18) / 60)[..., None]
     target = ((1 - t) * [0.9, 0.8, 0.2] + t * [0.4, 0.1, 0.6]).astype(np.float32)
     scene = square()
-    survey = survey_of(scene, target, device)
-    ramps = survey.radial(0.0)
+    solver = solver_of(scene, target, device)
+    ramps = solver.radial(0.0)
     # The centre is that of the best parabola, which is not quite the cone's.
     np.testing.assert_allclose(ramps.frames[0, :2], [30, 18], atol=1.5)
     found = error(only(ramps, Paint.RADIAL, scene), target, device)
-    assert found < 0.05 * error(only(survey.linear(), Paint.LINEAR, scene), target, device)
+    assert found < 0.05 * error(only(solver.linear(), Paint.LINEAR, scene), target, device)
 
 
 @pytest.mark.parametrize("clear", [False, True])
-def test_gains_are_what_the_error_falls_by(device: str, clear: bool) -> None:
-    """Beyond that of the best flat colour, of translucent shapes behind others."""
+def test_gains_are_decreases_of_the_error(device: str, clear: bool) -> None:
+    """Beyond the best flat colour, for translucent shapes behind others."""
     scene = random_scene(Kind.FILL, 5, SIZE, SIZE, seed=2)
     scene = replace(
         scene,
@@ -101,13 +96,13 @@ def test_gains_are_what_the_error_falls_by(device: str, clear: bool) -> None:
     wave = 0.05 * np.stack([x / SIZE, y / SIZE, np.hypot(x, y) / SIZE], axis=2)
     target = image.copy()
     target[..., :3] += wave.astype(np.float32) * (image[..., 3:] if clear else 1)
-    survey = survey_of(scene, target, device)
+    solver = solver_of(scene, target, device)
     seen = 0
-    for kind, ramps in ((Paint.LINEAR, survey.linear()), (Paint.RADIAL, survey.radial(0.0))):
+    for kind, ramps in ((Paint.LINEAR, solver.linear()), (Paint.RADIAL, solver.radial(0.0))):
         counted = np.flatnonzero(ramps.gain > 0.05 * ramps.gain.max())
         for shape in counted:
             own = np.arange(len(scene)) == shape
-            flat = without_gradients(scene, own, survey.flat)
+            flat = without_gradients(scene, own, solver.flat)
             fall = error(flat, target, device) - error(only(ramps, kind, scene, shape), target, device)
             # Ends that a shape hides in part take up to a quarter off, over five scenes.
             assert fall == pytest.approx(ramps.gain[shape], rel=0.5)
@@ -115,14 +110,14 @@ def test_gains_are_what_the_error_falls_by(device: str, clear: bool) -> None:
     assert seen > 2
 
 
-def test_flattening_costs_what_is_said(device: str) -> None:
+def test_flattening_increases_the_error_as_predicted(device: str) -> None:
     scene = with_two_stops(random_scene(Kind.FILL, 5, SIZE, SIZE, seed=3), seed=4)
     scene.stop_opacities[:] = 1
     target = np.random.default_rng(0).uniform(0.3, 0.7, (SIZE, SIZE, 3)).astype(np.float32)
-    survey = survey_of(scene, target, device)
+    solver = solver_of(scene, target, device)
     before = error(scene, target, device)
     bent = np.flatnonzero(scene.paint != Paint.FLAT)
     for shape in bent:
-        flat = without_gradients(scene, np.arange(len(scene)) == shape, survey.flat)
-        assert error(flat, target, device) - before == pytest.approx(survey.flattening[shape], rel=0.02)
-    assert (survey.flattening[bent] != 0).all()
+        flat = without_gradients(scene, np.arange(len(scene)) == shape, solver.flat)
+        assert error(flat, target, device) - before == pytest.approx(solver.flattening[shape], rel=0.02)
+    assert (solver.flattening[bent] != 0).all()

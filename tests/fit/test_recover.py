@@ -1,4 +1,4 @@
-"""Numbers that are not finite, put into a run: they are found, and nothing of them is left."""
+"""Numbers that are not finite are found in a run, and their shapes reset or replaced."""
 
 from __future__ import annotations
 
@@ -7,17 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.fit.pictures import picture
+from tests.fit.pictures import picture, step_for
 from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
-from warpsplat.fit.recover import mend
-from warpsplat.fit.schedule import Phase
+from warpsplat.fit.recover import recover
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step, Target
-from warpsplat.fit.work import Progress
+from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.program import Launch
 from warpsplat.scene import ATTRIBUTES, Kind, Scene
@@ -25,7 +22,7 @@ from warpsplat.svg.write import write_svg
 
 SETTINGS = make_settings(curves=6, iterations=100)
 BROKEN = 2
-"""The shape that is spoiled."""
+"""The shape whose numbers are spoiled."""
 
 
 def scene_of(what: str) -> Scene:
@@ -34,10 +31,8 @@ def scene_of(what: str) -> Scene:
 
 
 def step_of(scene: Scene) -> Step:
-    """Two threads, so that the step is replayed launch by launch."""
-    backend = Backend.on("cpu", 2)
-    state = FitState.start(scene, backend, np.random.default_rng(0))
-    step = Step(state, SETTINGS, Target(picture(), Phase(64, 48)))
+    """Return an advanced step of two threads, which is replayed launch by launch."""
+    step = step_for(scene, picture(), settings=SETTINGS, threads=2)
     step.advance()
     return step
 
@@ -73,13 +68,13 @@ CASES = [
 
 @pytest.mark.parametrize("where", ["value", "moment1", "moment2", "grad"])
 @pytest.mark.parametrize(("what", "name"), CASES)
-def test_a_spoiled_shape_begins_anew(what: str, name: str, where: str) -> None:
+def test_a_spoiled_shape_is_reset(what: str, name: str, where: str) -> None:
     first = scene_of(what)
     step = step_of(first)
     poison(step, name, where)
     step.advance()
-    assert mend(step, renews=False) is step
-    assert step.state.renewed == 1
+    assert recover(step, replaces=False) is step
+    assert step.state.recovered == 1
     assert all_finite(step)
     scene = step.state.scene()
     for attribute in ATTRIBUTES:
@@ -91,17 +86,17 @@ def test_a_spoiled_shape_begins_anew(what: str, name: str, where: str) -> None:
     if where == "grad":
         del step.programs[-1].launches[0]
     step.advance()
-    assert mend(step, renews=False) is step and step.state.renewed == 1, "it is over"
+    assert recover(step, replaces=False) is step and step.state.recovered == 1, "it is over"
     assert all_finite(step)
 
 
-def test_what_is_spoiled_while_shapes_come_and_go_is_replaced() -> None:
+def test_a_spoiled_shape_is_replaced_during_densification() -> None:
     image = picture()
     step = step_of(grid_scene(SETTINGS, image, 6, np.random.default_rng(0)))
     before = step.state.scene()
     poison(step, "colors", "value")
     step.advance()
-    after = mend(step, renews=True)
+    after = recover(step, replaces=True)
     assert after is not step and all_finite(after)
     scene = after.state.scene()
     assert len(scene) == 6
@@ -111,31 +106,31 @@ def test_what_is_spoiled_while_shapes_come_and_go_is_replaced() -> None:
     assert all_finite(after)
 
 
-def test_twins_begin_anew_together() -> None:
+def test_twins_are_reset_together() -> None:
     fill = random_scene(Kind.FILL, 2, width=64, height=48, seed=5)
     stroke = replace(fill, kind=np.ones(2, np.int32), widths=np.full(2, 3, np.float32))
     scene = fill.append(stroke).take(np.array([0, 2, 1, 3]))
     step = step_of(replace(scene, twin=np.array([0, 1, 0, 1], np.int32)))
     poison(step, "points", "value")
     step.advance()
-    mend(step, renews=False)
-    assert step.state.renewed == 2
+    recover(step, replaces=False)
+    assert step.state.recovered == 2
     made = step.state.scene()
     np.testing.assert_array_equal(made.points_of(2), made.points_of(3))
 
 
-def test_what_is_held_is_looked_at_in_the_end() -> None:
+def test_frozen_values_are_checked_in_the_end() -> None:
     step = step_of(scene_of("fills"))
     step.state.parameters.hold("opacities", np.ones(6, np.bool_))
     poison(step, "opacities", "value")
     step.advance()
-    mend(step, renews=False, last=True)
-    assert all_finite(step) and step.state.renewed >= 1
+    recover(step, replaces=False, last=True)
+    assert all_finite(step) and step.state.recovered >= 1
 
 
 @pytest.mark.parametrize("at", [10, 60, 90, 100])
 def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the growing part, in the part in which coordinates are rounded, and at the last step."""
+    """While the number of shapes grows, while coordinates are rounded, and at the last step."""
     advance = Step.advance
     image = picture()
 
@@ -145,8 +140,7 @@ def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> 
             poison(self, "colors", "value")
 
     monkeypatch.setattr(Step, "advance", spoiled)
-    told: list[Progress] = []
-    made = fit(image, replace(SETTINGS, curves=9), Backend.on("cpu", 1), report=told.append)
+    made = fit(image, replace(SETTINGS, curves=9), Backend.on("cpu", 1))
     assert made.renewed == 1
     assert np.isfinite([made.render_psnr, made.estimated_psnr]).all()
     assert write_svg(made.scene, per_pixel=made.per_pixel)
@@ -154,7 +148,7 @@ def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 @pytest.mark.parametrize("name", ["points", "colors", "opacities", "stop_colors"])
-def test_no_file_is_made_of_it(name: str, bad: float) -> None:
+def test_no_file_is_written_of_it(name: str, bad: float) -> None:
     scene = scene_of("gradients")
     values = getattr(scene, name).copy()
     values[-1] = bad

@@ -16,16 +16,18 @@ from warpsplat.fit.schedule import (
 )
 from warpsplat.fit.settings import QUALITIES, Density, Quality, Settings, make_settings
 
-DENSITY = Density()
+DENSITY = Density(start=1 / 3, grown=0.5, surplus=1.5, thin=0.6, stop=0.8, mean_points=8.0)
+SETTINGS = make_settings(curves=90, iterations=1000, density=DENSITY, spline_points=12)
 
 
 def test_phases() -> None:
-    settings = make_settings(iterations=100)
-    coarse, fine = phases(settings, 768, 512)
+    settings = make_settings(iterations=100, coarse=0.4)
+    coarse, fine = plan = phases(settings, 768, 512)
     assert coarse.width * coarse.height <= 1.01 * settings.coarse_pixels
     assert (fine.width, fine.height) == (768, 512)
-    apart = [phase.slack / phase.width for phase in (coarse, fine)]
-    assert apart[0] > apart[1] > 0, "the last steps see the curves of the file more closely"
+    tolerances = [phase.slack / phase.width for phase in plan]
+    assert tolerances[0] > tolerances[1] > 0, "the last steps see the curves of the file more closely"
+    assert [plan.index(phase_at(settings, plan, step)) for step in range(100)] == [0] * 40 + [1] * 60
     assert len(phases(settings, 100, 80)) == 1
     large = phases(settings, 8000, 6000)[-1]
     assert large.width * large.height <= 1.01 * settings.fine_pixels
@@ -35,53 +37,45 @@ def test_phases() -> None:
     ("width", "height"),
     [(1080, 2400), (3000, 4000), (2480, 3508), (1920, 1080), (1200, 1600), (600, 8000), (8, 40000)],
 )
-def test_one_scale_serves_both_sides(width: int, height: int) -> None:
-    for quality in QUALITIES:
-        for phase in phases(make_settings(quality), width, height):
-            scale = phase.width / width
-            assert abs(height * scale - phase.height) < 0.5
-            assert phase.width * phase.height <= width * height
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_one_scale_serves_both_sides(width: int, height: int, quality: Quality) -> None:
+    for phase in phases(make_settings(quality), width, height):
+        scale = phase.width / width
+        assert abs(height * scale - phase.height) < 0.5
+        assert phase.width * phase.height <= width * height
 
 
-def test_threshold_falls() -> None:
+def test_the_opacity_threshold_falls() -> None:
     values = [opacity_threshold(DENSITY, t) for t in (0, 0.3, DENSITY.stop, 1)]
-    assert values[0] == DENSITY.opacity_start
-    assert values[0] > values[1] > values[2]
+    assert values[0] == DENSITY.opacity_start > values[1] > values[2]
     assert values[2] == values[3] == pytest.approx(DENSITY.opacity_end)
 
 
-SURPLUS = Density(start=1 / 3, grown=0.5, surplus=1.5, thin=0.6, stop=0.8)
-
-
-def turns_of(settings: Settings) -> list[int]:
-    """Steps after which there is a turn; 0 for the start."""
+def densification_steps(settings: Settings) -> list[int]:
+    """Return the steps after which there is densification; 0 for the start."""
     density = settings.density
     return list(range(0, math.ceil(density.stop * settings.iterations), density.interval))
 
 
-def test_the_number_of_curves_grows_to_a_surplus_that_is_thinned() -> None:
-    """It grows until ``grown``, stays until ``thin``, falls until ``stop``."""
-    settings = make_settings(curves=90, iterations=1000, density=SURPLUS)
-    counts = {step: shapes_at(settings, step) for step in turns_of(settings)}
+def test_the_number_of_shapes_grows_to_a_surplus_and_falls() -> None:
+    """It grows until ``grown``, stays until ``thin``, falls until ``stop`` by equal shares."""
+    counts = {step: shapes_at(SETTINGS, step) for step in densification_steps(SETTINGS)}
     assert counts[0] == 30
     growing = [counts[s] for s in counts if s <= 500]
-    assert growing == sorted(set(growing)), "more at every turn"
+    assert growing == sorted(set(growing)), "more at every step"
     assert {counts[s] for s in counts if 500 <= s <= 600} == {135}
     falling = [counts[s] for s in counts if s >= 600]
-    assert falling == sorted(set(falling), reverse=True), "fewer at every turn"
+    assert falling == sorted(set(falling), reverse=True), "fewer at every step"
     assert falling[-1] == 90
-
-
-def test_thinning_takes_like_shares() -> None:
-    settings = make_settings(curves=9000, iterations=1000, density=SURPLUS)
-    counts = np.array([shapes_at(settings, step) for step in turns_of(settings) if step >= 600])
-    shares = counts[1:] / counts[:-1]
+    many = replace(SETTINGS, curves=9000)
+    exact = np.array([shapes_at(many, step) for step in counts if step >= 600])
+    shares = exact[1:] / exact[:-1]
     np.testing.assert_allclose(shares, shares[0], rtol=1e-3)
 
 
 def test_without_a_surplus_the_number_grows_to_all_and_stays() -> None:
-    settings = make_settings(curves=90, iterations=1000, density=replace(SURPLUS, surplus=1.0))
-    counts = [shapes_at(settings, step) for step in turns_of(settings)]
+    settings = replace(SETTINGS, density=replace(DENSITY, surplus=1.0))
+    counts = [shapes_at(settings, step) for step in densification_steps(settings)]
     assert counts == sorted(counts)
     assert counts[19] < 90
     assert set(counts[20:]) == {90}
@@ -89,28 +83,19 @@ def test_without_a_surplus_the_number_grows_to_all_and_stays() -> None:
 
 @pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("iterations", [1, 26, 30, 60, 100, 101, 333, 1000])
-def test_all_shapes_and_no_more_are_there_after_the_last_turn(quality: Quality, iterations: int) -> None:
+def test_all_shapes_and_no_more_are_there_in_the_end(quality: Quality, iterations: int) -> None:
     settings = make_settings(quality, curves=90, iterations=iterations)
-    assert shapes_at(settings, turns_of(settings)[-1]) == 90
+    assert shapes_at(settings, densification_steps(settings)[-1]) == 90
     without = replace(settings, density=replace(settings.density, interval=0))
     assert shapes_at(without, 0) == 90
 
 
 def test_splines_lose_points_once_all_shapes_are_there() -> None:
-    density = replace(SURPLUS, mean_points=8.0)
-    settings = make_settings(curves=90, iterations=1000, density=density, spline_points=12)
-    means = {step: mean_points_at(settings, step) for step in turns_of(settings)}
+    means = {step: mean_points_at(SETTINGS, step) for step in densification_steps(SETTINGS)}
     assert {means[s] for s in means if s <= 500} == {12}
     falling = [means[s] for s in means if s >= 500]
     assert falling == sorted(set(falling), reverse=True)
     assert falling[-1] == 8
-
-
-def test_coarse_first_then_fine() -> None:
-    settings = make_settings(iterations=100, coarse=0.4)
-    plan = phases(settings, 768, 512)
-    found = [plan.index(phase_at(settings, plan, step)) for step in range(100)]
-    assert found == [0] * 40 + [1] * 60
 
 
 def test_the_fold_weight_grows_geometrically() -> None:

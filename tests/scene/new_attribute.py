@@ -16,7 +16,7 @@ from tests.scenes import mixed_scene, random_scene
 from warpsplat.fit import losses
 from warpsplat.fit.loop import fit
 from warpsplat.fit.schedule import phases
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.rendering.backend import Backend
@@ -31,7 +31,8 @@ AIM = np.array([0.3, 2.0, -1.0], np.float32)
 """The latter two are out of bounds."""
 
 
-def record_glow(program: Program, parameters: Parameters, settings: Settings) -> None:
+def launch_glow(program: Program, inputs: losses.LossInputs, weight: float) -> None:
+    parameters = inputs.renderer.parameters
     program.launch(
         trials.glow_backward,
         parameters.shape_count,
@@ -72,7 +73,7 @@ def check_surgery(scene: Scene) -> None:
 
 def check_training(scene: Scene) -> None:
     """Gradients bind by name; Adam moves what has the attribute, at its rate, within its bounds."""
-    losses.SHAPE_LOSSES = (*losses.SHAPE_LOSSES, record_glow)
+    losses.SHAPE_LOSSES = (*losses.SHAPE_LOSSES, losses.Loss(lambda *_: 1.0, launch_glow, "a trial"))
     image = picture()
     settings = make_settings(iterations=200)
     state = FitState.start(scene, Backend.on("cpu"), np.random.default_rng(0))

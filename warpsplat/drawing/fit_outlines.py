@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.fit.constraints import Constraints, Drawing, Ints, Keeper
-from warpsplat.fit.recover import mend
+from warpsplat.fit.constraints import Constraints, Drawing, Ints, Projection
+from warpsplat.fit.recover import recover
 from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -109,7 +109,7 @@ def refine_drawing(
     for done in range(1, how.steps + 1):
         step.advance()
         if done % CHECK_INTERVAL == 0 or done == how.steps:
-            mend(step, renews=False)
+            recover(step, replaces=False)
             found, error = _look(step)
             if error < (1 - GAIN) * least:
                 gained = done
@@ -146,9 +146,9 @@ def start(
     ``capacity``: to begin with; the first look makes room where it is not enough.
     """
     state = FitState.start(drawing.scene, backend, np.random.default_rng(0))
-    keeper = Keeper(Constraints.of(drawing), state.parameters, held)
-    keeper.project()
-    state.keeper = keeper
+    projection = Projection(Constraints.of(drawing), state.parameters, held)
+    projection.project()
+    state.projection = projection
     every = np.ones(len(drawing.scene), np.bool_)
     state.parameters.hold("opacities", every)
     state.parameters.hold("stop_opacities", np.ones(len(drawing.scene.stop_opacities), np.bool_))

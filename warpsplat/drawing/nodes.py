@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined
 from warpsplat.drawing.merge import handles_through, points_at
-from warpsplat.fit.constraints import EQUAL, Drawing, Joint
+from warpsplat.fit.constraints import SAME_COORDINATE, Drawing, Joint
 
 Floats = npt.NDArray[np.float64]
 
@@ -253,7 +253,7 @@ class Outlines:
         ways = np.abs(self.points[[self.next[a] for a in starts.tolist()]] - self.points[starts])
         axes = ways.argmin(axis=1)
         off, along = ways.min(axis=1), ways.max(axis=1)
-        near = (off >= EQUAL) & (off <= np.minimum(STEEP * along, self._reach))
+        near = (off >= SAME_COORDINATE) & (off <= np.minimum(STEEP * along, self._reach))
         return _picked(near, starts, axes, off)
 
     def _level_line(self, a: int, axis: int, off: float) -> Iterator[Edit]:
@@ -278,11 +278,11 @@ class Outlines:
     def _is_bound(self, p: int, axis: int) -> bool:
         """Whether a level or upright line, or the border, holds a coordinate of ``p``."""
         size = (self.drawing.scene.canvas.width, self.drawing.scene.canvas.height)[axis]
-        if min(abs(self.points[p, axis]), abs(self.points[p, axis] - size)) < EQUAL:
+        if min(abs(self.points[p, axis]), abs(self.points[p, axis] - size)) < SAME_COORDINATE:
             return True
         for m in self.members(p):
             for a, end in ((m, self.next[m]), (self.previous[m], self.previous[m])):
-                if self.is_line[a] and abs(self.points[end, axis] - self.points[m, axis]) < EQUAL:
+                if self.is_line[a] and abs(self.points[end, axis] - self.points[m, axis]) < SAME_COORDINATE:
                     return True
         return False
 
@@ -298,7 +298,7 @@ class Outlines:
         across = np.take_along_axis(ways, axes[:, None, None], axis=2)[..., 0]
         along = np.take_along_axis(ways, 1 - axes[:, None, None], axis=2)[..., 0]
         off = across.max(axis=1)
-        near = (off >= EQUAL) & (across <= STEEP * along).all(axis=1)
+        near = (off >= SAME_COORDINATE) & (across <= STEEP * along).all(axis=1)
         return _picked(near, joints, axes, off)
 
     def _level_tangent(self, p: int, axis: int, off: float) -> Iterator[Edit]:

@@ -15,9 +15,9 @@ from warpsplat.drawing.cells import by_cell, first_apart, sum_within
 from warpsplat.drawing.costs import DONE, Costs, Ending, RoundsWatch
 from warpsplat.drawing.fit_outlines import Refinement, matching, refine_drawing
 from warpsplat.drawing.nodes import MOST_OFF, Edit, Key, Outlines, applied, turned
-from warpsplat.fit.constraints import Constraints, Drawing, Keeper
+from warpsplat.fit.constraints import Constraints, Drawing, Projection
 from warpsplat.fit.rate import byte_worth
-from warpsplat.fit.rounding import STAGED
+from warpsplat.fit.rounding import STAGED_COST
 from warpsplat.fit.work import Meter, Report
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
@@ -219,7 +219,7 @@ class Judge:
     def errors(self, drawing: Drawing) -> Floats:
         """What each cell adds to the mean squared error, as ``by_cell``."""
         parameters = Parameters(drawing.scene, self._backend)
-        Keeper(Constraints.of(drawing), parameters).project()
+        Projection(Constraints.of(drawing), parameters).project()
         renderer = Renderer(parameters, self._viewport, model=EXACT, capacity=self.capacity)
         renderer.forward_complete()
         self.capacity = renderer.capacity
@@ -250,5 +250,5 @@ def drawing_grid(
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(drawing, scene=rounded(drawing.scene, grid))
         loss = float(judge.errors(low).sum() - errors.sum())
-        costs[grid] = 2 * STAGED * loss + worth * len(write_svg(low.scene, per_pixel=grid))
+        costs[grid] = 2 * STAGED_COST * loss + worth * len(write_svg(low.scene, per_pixel=grid))
     return min(costs, key=costs.__getitem__)

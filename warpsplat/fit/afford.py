@@ -54,7 +54,9 @@ def affordable(step: Step) -> Settings:
         return settings
     scene = state.scene()
     coarse = state.step < settings.coarse * settings.iterations
-    grid = min(USUAL_GRID, finest(settings)) if coarse else choose_grid(step, staged=True, thrifty=True)
+    grid = (
+        min(USUAL_GRID, finest(settings)) if coarse else choose_grid(step, staged=True, rate_distortion=True)
+    )
     per_shape = (len(export(scene, settings, grid)) - HEAD_BYTES) / max(len(scene), 1)
     splines = scene.basis == Basis.SPLINE
     if splines.any():

@@ -1,4 +1,4 @@
-"""What a fit keeps of a drawing's outlines: corners, straight lines, smooth joints, seams and borders."""
+"""Constraints of a drawing's outlines in a fit: corners, straight lines, smooth joints, seams and borders."""
 
 from __future__ import annotations
 
@@ -20,47 +20,46 @@ from warpsplat.scene.scene import ranges
 Ints = npt.NDArray[np.int32]
 Links = npt.NDArray[np.intp]
 
-EQUAL = 1e-3
-"""Coordinates that differ by less [canvas units] are one, as those of the ends of an upright line."""
+SAME_COORDINATE = 1e-3
+"""Difference [canvas units] below which coordinates are equal, like those of the ends of an upright line."""
 
-LEVER = 8.0
-"""Length of a handle over that of a line up to which the line says where it points: the rounding of its ends
-turns a shorter one."""
+MAX_LEVERAGE = 8.0
+"""Longest handle that a line directs, in lengths of the line: rounding its ends would turn longer ones."""
 
 BEFORE, AFTER = 1, 2
-"""Which neighbours of a smooth joint are free handles; the other one is the far end of a line."""
+"""Flags of the neighbours of a smooth joint that are free handles; another one is the far end of a line."""
 
 
 class Joint(IntEnum):
-    """What a control point of a drawing's outline is."""
+    """Kind of a control point of a drawing's outline."""
 
     FREE = 0
-    """A handle, or a point without conditions."""
+    """A handle, or a point without constraints."""
     CORNER = 1
     """On the outline, which may turn there."""
     SMOOTH = 2
-    """On the outline, which goes straight on there: both handles lie on one line through it."""
+    """On the outline, collinear with both handles."""
     LINE_HANDLE = 3
     """At a third of a straight line."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """Shapes whose outlines have conditions."""
+    """Shapes whose outlines have constraints."""
 
     scene: Scene
     """Fills of cubics."""
     joints: Ints
     """``Joint`` of each point, shape (point,)."""
     same: Ints
-    """Points with the same number, 0 or more, are one place in several shapes; NONE: the point is alone.
-    Shape (point,)."""
+    """Points with the same number, 0 or more, are one place in several shapes; NONE for others. Shape
+    (point,)."""
 
     def __post_init__(self) -> None:
-        """Check that the arrays fit one another.
+        """Check the arrays.
 
         Raises:
-            ValueError: they do not, or the shapes are others than fills of cubics.
+            ValueError: their shapes differ, or the scene has other shapes than fills of cubics.
         """
         count = len(self.scene.points)
         for name, values in (("joints", self.joints), ("same", self.same)):
@@ -70,12 +69,12 @@ class Drawing:
             raise ValueError("a drawing has closed outlines of cubics")
 
     def take(self, index: IndexArray) -> Drawing:
-        """The shapes ``index``, in that order."""
+        """Return the shapes ``index``, in that order."""
         points = ranges(self.scene.first[:-1][index], self.scene.point_counts()[index])
         return Drawing(self.scene.take(index), self.joints[points], self.same[points])
 
     def links(self) -> tuple[Links, Links]:
-        """The points on the outlines, in order, and for each the next one of its contour; shape (cubic,)."""
+        """Return the points on the outlines, in order, and the next one of each contour; shape (cubic,)."""
         starts = self.scene.starts.astype(np.intp)
         on = np.concatenate([np.arange(a, b, 3) for a, b in pairwise(starts)])
         following = on + 3
@@ -84,8 +83,9 @@ class Drawing:
         return on, following
 
     def lines(self) -> npt.NDArray[np.bool_]:
-        """Which cubics are straight lines, in the order of ``links``, shape (cubic,): those whose handles lie
-        on one, in any of the shapes.
+        """Return which cubics are straight lines, in the order of ``links``, shape (cubic,).
+
+        The handles of a line are marked as such in at least one of the shapes that share it.
         """
         on, _ = self.links()
         marked = self.joints == Joint.LINE_HANDLE
@@ -95,14 +95,17 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Constraints:
-    """A drawing's conditions, as ``kernels.constraints`` takes them."""
+    """A drawing's constraints, in arrays named as the parameters of ``kernels.constraints``.
+
+    A tie is a set of coordinates that are equal.
+    """
 
     line_end: Ints
-    """Where the line that begins at each point ends, or NONE, shape (point,)."""
+    """End of the line that begins at each point, or NONE, shape (point,)."""
     line_start: Ints
-    """Where the line that ends at each point begins, or NONE, shape (point,)."""
+    """Start of the line that ends at each point, or NONE, shape (point,)."""
     joint_point: Ints
-    """Smooth joints that bind handles, shape (joint,); others do so by ties."""
+    """Smooth joints that direct handles, shape (joint,); at level and upright tangents ties do."""
     joint_before: Ints
     joint_after: Ints
     joint_free: Ints
@@ -111,14 +114,16 @@ class Constraints:
     tie_first: Ints
     """First member of each tie and, last, the number of members, shape (tie + 1,)."""
     tie_member: Ints
-    """Coordinates, 2 x point + axis, of each tie, shape (member,)."""
+    """Coordinates of each tie as 2 x point + axis, shape (member,)."""
     tie_pinned: Ints
     """1 for ties that stay as they are, shape (tie,)."""
 
     @staticmethod
     def of(drawing: Drawing) -> Constraints:
-        """The conditions of ``drawing``: coordinates that are equal along a line or a tangent stay so, and
-        those on the border. Of smooth joints that would bind one handle twice the first one does.
+        """Return the constraints of ``drawing``.
+
+        Coordinates that are equal along a line or a tangent stay equal, those on the border stay. Of several
+        smooth joints that could direct a handle, the first one does.
         """
         points, canvas = drawing.scene.points, drawing.scene.canvas
         count = len(points)
@@ -138,14 +143,14 @@ class Constraints:
             elif side == BEFORE:
                 turned[end, 1] = number
         leaders = {handle for joint in joints for handle in _handles(*joint[1:])}
-        laid = set(np.concatenate([on[straight] + 1, on[straight] + 2]).tolist())
+        of_lines = set(np.concatenate([on[straight] + 1, on[straight] + 2]).tolist())
         point, before, after, free = np.asarray(joints, np.int32).reshape(-1, 4).T
-        first, member, pinned = ties.groups(leaders, set(on.tolist()), laid, _on_border(points, canvas))
+        first, member, pinned = ties.groups(leaders, set(on.tolist()), of_lines, _on_border(points, canvas))
         return Constraints(line_end, line_start, point, before, after, free, turned, first, member, pinned)
 
     @property
-    def laid(self) -> npt.NDArray[np.bool_]:
-        """Handles of lines, shape (point,)."""
+    def line_handles(self) -> npt.NDArray[np.bool_]:
+        """Return which points are handles of lines, shape (point,)."""
         found = np.zeros(len(self.line_end), np.bool_)
         starts = np.flatnonzero(self.line_end != NONE)
         found[starts + 1] = found[starts + 2] = True
@@ -153,21 +158,22 @@ class Constraints:
 
 
 def _equal(points: FloatArray, a: Links, b: Links) -> npt.NDArray[np.bool_]:
-    """In which axes points ``a`` and ``b`` have the same coordinate, shape (pair, 2)."""
-    return np.asarray(np.abs(points[a] - points[b]) < EQUAL)
+    """Return in which axes points ``a`` and ``b`` have equal coordinates, shape (pair, 2)."""
+    return np.asarray(np.abs(points[a] - points[b]) < SAME_COORDINATE)
 
 
 def _on_border(points: FloatArray, canvas: Canvas) -> npt.NDArray[np.bool_]:
-    """Which coordinates lie on the border of the canvas, shape (point, 2)."""
+    """Return which coordinates lie on the border of the canvas, shape (point, 2)."""
     size = np.array([canvas.width, canvas.height])
-    return np.asarray((np.abs(points) < EQUAL) | (np.abs(points - size) < EQUAL))
+    return np.asarray(np.minimum(np.abs(points), np.abs(points - size)) < SAME_COORDINATE)
 
 
 def _smooth_joints(
     drawing: Drawing, line_start: Ints, line_end: Ints, ties: _Ties
 ) -> list[tuple[int, int, int, int]]:
-    """Point, before, after and what is free of each smooth joint that binds handles. Where its tangent is
-    level or upright, ties do that.
+    """Return point, neighbours and flags of the smooth joints that direct handles.
+
+    Where the tangent is level or upright, ``ties`` get the handles instead.
     """
     points = drawing.scene.points
     on, following = drawing.links()
@@ -180,7 +186,7 @@ def _smooth_joints(
     free = np.stack([starts == NONE, ends == NONE], axis=1)
     reach = _reach(points, smooth, handles, free)
     lines = np.stack([starts, ends], axis=1)
-    turned = ~free.all(axis=1) & (reach > LEVER * _reach(points, smooth, lines, ~free))
+    turned = ~free.all(axis=1) & (reach > MAX_LEVERAGE * _reach(points, smooth, lines, ~free))
     around = np.where(free, handles, lines)
     flat = _equal(points, around[:, 0], smooth) & _equal(points, smooth, around[:, 1])
     bound: set[int] = set()
@@ -201,32 +207,33 @@ def _smooth_joints(
 
 
 def _reach(points: FloatArray, on: Links, others: Links, counted: npt.NDArray[np.bool_]) -> FloatArray:
-    """How far from each point ``on`` the further of two ``others``, (point, 2), lies that is ``counted``."""
-    way = np.linalg.norm(points[others] - points[on][:, None], axis=2)
-    return np.asarray(np.where(counted, way, 0).max(axis=1, initial=0))
+    """Return the distance from points ``on`` to the farther ``counted`` one of two ``others``, (point, 2)."""
+    distance = np.linalg.norm(points[others] - points[on][:, None], axis=2)
+    return np.asarray(np.where(counted, distance, 0).max(axis=1, initial=0))
 
 
 def _handles(before: int, after: int, free: int) -> list[int]:
-    """Those of a smooth joint that are no lines."""
+    """Return the neighbours of a smooth joint that are free handles."""
     return [before] * bool(free & BEFORE) + [after] * bool(free & AFTER)
 
 
 class _Ties:
-    """Coordinates that are one, by union and find."""
+    """Sets of equal coordinates, by union-find."""
 
     def __init__(self, count: int) -> None:
         self._parent = list(range(count))
         self._joined: set[int] = set()
-        """All that is one with others: few of them all."""
+        """Coordinates that are equal to others: few of them all."""
 
     def root(self, i: int) -> int:
+        """Return the representative of a coordinate."""
         while self._parent[i] != i:
             self._parent[i] = self._parent[self._parent[i]]
             i = self._parent[i]
         return i
 
     def join_where(self, axes: npt.NDArray[np.bool_], a: Links, b: Links) -> None:
-        """Two points' coordinates along ``axes``, shape (pair, 2), for each pair of ``a`` and ``b``."""
+        """Join the coordinates of each pair of points ``a`` and ``b`` along ``axes``, shape (pair, 2)."""
         pairs, which = np.nonzero(axes)
         for first, second in zip(
             (2 * a[pairs] + which).tolist(), (2 * b[pairs] + which).tolist(), strict=True
@@ -236,26 +243,26 @@ class _Ties:
             self._joined |= {first, second}
 
     def join_same(self, same: Ints) -> None:
-        """All points with the same number."""
+        """Join the points with the same number."""
         points = np.flatnonzero(same >= 0)
         _, first, number = np.unique(same[points], return_index=True, return_inverse=True)
         self.join_where(np.ones((len(points), 2), np.bool_), points[first][number], points)
 
     def groups(
-        self, leaders: set[int], on: set[int], laid: set[int], border: npt.NDArray[np.bool_]
+        self, leaders: set[int], on: set[int], of_lines: set[int], border: npt.NDArray[np.bool_]
     ) -> tuple[Ints, Ints, Ints]:
-        """First members, members and pins of the ties: those of several coordinates, and of pinned ones.
+        """Return first members, members and pins of the ties of several coordinates or of pinned ones.
 
         Args:
             leaders: points that come first in their ties ...
             on: ... and after these, those on the outlines.
-            laid: points that are in none.
+            of_lines: handles of lines, which follow from the ends of these and are in no tie.
             border: coordinates that are pinned, with their ties, shape (point, 2).
         """
         pinned = border.reshape(-1)
         members: dict[int, list[int]] = {}
         for i in sorted(self._joined.union(np.flatnonzero(pinned).tolist())):
-            if i // 2 not in laid:
+            if i // 2 not in of_lines:
                 members.setdefault(self.root(i), []).append(i)
         kept = [m for m in members.values() if len(m) > 1 or pinned[m].any()]
         ordered = [sorted(m, key=lambda i: (i // 2 not in leaders, i // 2 not in on)) for m in kept]
@@ -264,16 +271,16 @@ class _Ties:
         return first, flat, np.array([pinned[m].any() for m in ordered], np.int32)
 
 
-class Keeper:
-    """The conditions of a drawing on a device."""
+class Projection:
+    """Projection of a drawing's points, on a device, onto those that satisfy its constraints."""
 
     def __init__(
         self,
         constraints: Constraints,
         parameters: Parameters,
-        held: npt.NDArray[np.bool_] | None = None,
+        frozen: npt.NDArray[np.bool_] | None = None,
     ) -> None:
-        """Of the drawing whose scene ``parameters`` are; ``held``: points that stay, shape (point,)."""
+        """Copy constraints of the scene in ``parameters``; ``frozen``: points that stay, shape (point,)."""
         device = parameters.backend.device
         self._parameters = parameters
         self._joints, self._ties = len(constraints.joint_point), len(constraints.tie_pinned)
@@ -282,17 +289,18 @@ class Keeper:
             for f in fields(constraints)
         }
         self._arrays["joint_turn"] = parameters.backend.array(wp.vec2, self._joints)
-        parameters.hold("points", constraints.laid if held is None else constraints.laid | held)
+        handles = constraints.line_handles
+        parameters.hold("points", handles if frozen is None else handles | frozen)
 
-    def record_project(self, program: Program) -> None:
-        """Record what brings the points back to where they may be."""
+    def record(self, program: Program) -> None:
+        """Record the projection of the points."""
         p, group = self._parameters, self._parameters.groups["points"]
         program.launch(kernels.align, self._joints, p.arrays, self._arrays)
         program.launch(kernels.spread, self._ties, self._arrays, value=group.value)
         program.launch(kernels.lay, p.point_count, p.arrays, self._arrays)
 
     def record_adjoint(self, program: Program) -> None:
-        """Record what makes the gradient of the points that of what is free."""
+        """Record the adjoint of the projection, which turns gradients into those of the free coordinates."""
         p, group = self._parameters, self._parameters.groups["points"]
         program.launch(kernels.lay_backward, p.point_count, p.arrays, self._arrays)
         program.launch(kernels.spread_backward, self._ties, self._arrays, grad=group.grad)
@@ -302,7 +310,7 @@ class Keeper:
         program.launch(kernels.share, self._ties, self._arrays, grad=group.grad)
 
     def project(self) -> None:
-        """Bring the points to where they may be."""
+        """Project the points now."""
         program = self._parameters.backend.program()
-        self.record_project(program)
+        self.record(program)
         program.run()

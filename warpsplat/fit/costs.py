@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpsplat.fit.rounding import STAGES, stage_steps
-from warpsplat.fit.schedule import LOOK_FROM, LOOK_INTERVAL, Phase, phases, shapes_at
+from warpsplat.fit.schedule import EVALUATE_FROM, EVALUATE_INTERVAL, Phase, phases, shapes_at
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Kind
@@ -155,8 +155,8 @@ class Course:
         rounded = settings.iterations - STAGES * stage_steps(settings)
         total = 0.0
         if settings.viewer:
-            first = max(fine, LOOK_FROM * settings.iterations, self.begin)
-            looks = _multiples(first, min(until, rounded), LOOK_INTERVAL)
+            first = max(fine, EVALUATE_FROM * settings.iterations, self.begin)
+            looks = _multiples(first, min(until, rounded), EVALUATE_INTERVAL)
             total += looks * file_cost(phase.width * phase.height, shapes)
         if until > rounded:
             factor = 1.0 if law_of(settings) is FILLS else GRID_OTHERS

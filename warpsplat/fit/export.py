@@ -1,4 +1,4 @@
-"""The file that settings ask for."""
+"""Export of a scene as the settings ask for."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpsplat.svg.write import minified, shortened, write_svg
 
 
 def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
-    """The file that ``settings`` ask for, with ``per_pixel`` units of its view box a pixel."""
+    """Return the SVG of ``scene``, with ``per_pixel`` units of its view box per pixel."""
     if settings.renderer == "gaussian":
         scene = as_paths(scene, settings.softness)
     return write_svg(
@@ -29,31 +29,31 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
     )
 
 
+def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
+    """Return ``export``'s SVG, as short as the settings allow."""
+    text = export(scene, settings, per_pixel, metadata)
+    if settings.minify:
+        return minified(text)
+    # Sheets are built from the usual head.
+    return text if settings.size or settings.page or settings.units else shortened(text)
+
+
 def shown_paths(scene: Scene, settings: Settings) -> Scene:
-    """The paths of the file of ``scene``, with the opacities that they have there; nothing is rounded."""
+    """Return the paths of ``scene``'s file with their opacities there; nothing is rounded."""
     if settings.renderer == "gaussian":
         return as_paths(scene, settings.softness)
     return replace(scene, opacities=scene.opacities * np.float32(_opacity_scale(settings)))
 
 
 def _opacity_scale(settings: Settings) -> float:
-    """Opacity of a path over that of its shape."""
+    """Return the opacity of a path over that of its shape."""
     return constants.PLATEAU if settings.renderer == "splat" else 1.0
 
 
-def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
-    """As ``export``, as short as the settings allow."""
-    text = export(scene, settings, per_pixel, metadata)
-    if settings.minify:
-        return minified(text)
-    # A sheet is made of the usual head.
-    return text if settings.size or settings.page or settings.units else shortened(text)
-
-
 def show(text: str, scene: Scene) -> Image.Image:
-    """The file ``text`` of a scene, as a viewer draws it; what it keeps of other files with precautions.
+    """Draw the file ``text`` of ``scene`` as a viewer does, with precautions if it embeds foreign markup.
 
     Raises:
-        ImageError: what it keeps cannot be drawn.
+        ImageError: the embedded markup cannot be drawn.
     """
     return render_svg(text) if scene.pictures else render_own(text)

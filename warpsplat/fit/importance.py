@@ -1,4 +1,4 @@
-"""How much the error of each pixel counts."""
+"""Weights of the pixels' errors."""
 
 from __future__ import annotations
 
@@ -8,57 +8,56 @@ from warpsplat.alpha import on
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import FloatArray
 
-LEAST = 0.05
-"""Weight of a black pixel of a mask over that of a white one. Not 0: shapes that nothing holds would grow
-over what is black, and the picture around a face is still to be a picture."""
+BLACK_WEIGHT = 0.05
+"""Weight of a black pixel of a mask over that of a white one. Not 0: shapes would grow unchecked over black
+parts, and the surroundings of a face should still be recognisable."""
 
-EMPTY = 8.0
-"""Weight of a pixel where nothing is, over others: what spills over an edge is seen on other backgrounds."""
+EMPTY_WEIGHT = 8.0
+"""Weight of an empty pixel over others: what spills over an edge is visible on other backgrounds."""
 
 TEXTURE_SIGMA = 8.0
 """Standard deviation of the window in which texture is measured [px]."""
 
-AT_ONCE = 1 << 16
-"""Pixels whose weights are found in one go: bounds the memory."""
-
 TEXTURE_NOISE = 4 / 255
-"""Standard deviation of what counts as plain."""
+"""Standard deviation of colours below which an area counts as plain."""
+
+PIXELS_PER_CHUNK = 1 << 16
+"""Pixels whose weights are computed at once, to bound the memory."""
 
 
 def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) -> FloatArray | None:
-    """Weights of the pixels of ``image``, shape (height, width); None where all are alike.
+    """Return weights of the pixels of ``image``, shape (height, width); None if all are equal.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, (height, width, 4).
-        mask: grey in [0, 1], of any size: a weight grows linearly with it from ``LEAST`` of white's.
-        texture: power of the local variance by which a weight falls. An eye sees an error in what is plain
-            sooner than in foliage (masking), and the shapes that foliage takes are worth more elsewhere.
+        mask: grey in [0, 1], of any size; weights grow linearly with it from ``BLACK_WEIGHT`` of white's.
+        texture: power of the local variance by which weights fall. Errors are seen sooner in plain areas than
+            in foliage (masking), and the shapes that foliage takes are worth more elsewhere.
     """
     height, width = image.shape[:2]
     weights: FloatArray | None = None
     if texture > 0:
         grey = filters.grey(np.asarray(on(image, 1.0), np.float32))
-        grey = grey - np.float32(0.5)  # about which 32 bits are enough
+        grey = grey - np.float32(0.5)  # so that 32 bits are enough for the squares
         mean, squares = (filters.gaussian_blur(x, TEXTURE_SIGMA) for x in (grey, grey * grey))
-        variance = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE * TEXTURE_NOISE)
-        weights = variance
-        for rows in np.array_split(weights, weights.size // AT_ONCE + 1):
+        weights = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE * TEXTURE_NOISE)
+        for rows in np.array_split(weights, weights.size // PIXELS_PER_CHUNK + 1):
             rows[:] = elementary.power(rows, -texture)
     if mask is not None:
         shrinks = mask.shape[1] >= width and mask.shape[0] >= height
         resize = filters.resize_area if shrinks else filters.resize_linear
-        shares = LEAST + (1 - LEAST) * np.clip(resize(mask, (width, height)), 0, 1)
-        # So that a mask of one grey is exactly none.
-        counts = np.asarray(shares / shares.mean(dtype=np.float64), np.float32)
-        weights = counts if weights is None else weights * counts
+        shares = BLACK_WEIGHT + (1 - BLACK_WEIGHT) * np.clip(resize(mask, (width, height)), 0, 1)
+        # Divided by the mean, so that a mask of one grey is exactly none.
+        factors = np.asarray(shares / shares.mean(dtype=np.float64), np.float32)
+        weights = factors if weights is None else weights * factors
     if image.shape[2] == 4:
-        counts = np.where(image[..., 3] == 0, np.float32(EMPTY), np.float32(1))
-        weights = counts if weights is None else weights * counts
+        factors = np.where(image[..., 3] == 0, np.float32(EMPTY_WEIGHT), np.float32(1))
+        weights = factors if weights is None else weights * factors
     return weights
 
 
 def weights_at(weights: FloatArray, width: int, height: int) -> FloatArray:
-    """``weights`` at another size, of mean 1: learning rates and other losses mean what they do without."""
+    """Return ``weights`` at another size, with mean 1, as learning rates and other losses assume."""
     resized = weights
     if weights.shape != (height, width):
         resized = filters.resize_area(weights, (width, height))

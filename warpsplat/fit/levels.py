@@ -1,11 +1,11 @@
-"""Levels: the first shapes of a scene as pictures of their own, in the loss beside the whole one."""
+"""Levels of detail: the first shapes of a scene, rendered alone and compared with the image as well."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from warpsplat.fit import losses
-from warpsplat.fit.losses import Aim, LossInputs
+from warpsplat.fit.losses import LossInputs, LossTarget
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.kernels import levels
@@ -17,25 +17,26 @@ from warpsplat.rendering.renderer import Renderer
 
 @dataclass(frozen=True)
 class Level:
-    """The first shapes of a state's scene, rendered without the others and compared with the image."""
+    """The first shapes of a state's scene with a renderer of their own."""
 
     state: FitState
     renderer: Renderer
-    aim: Aim
+    target: LossTarget
 
     @staticmethod
-    def of(state: FitState, count: int, viewport: Viewport, model: Model, aim: Aim) -> Level:
-        """Of the first ``count`` shapes, as they are until the next surgery."""
+    def of(state: FitState, count: int, viewport: Viewport, model: Model, target: LossTarget) -> Level:
+        """Return the level of the first ``count`` shapes; valid until the next densification step."""
         renderer = Renderer(state.parameters.prefix(count), viewport, model=model)
         renderer.forward_complete()
-        return Level(state, renderer, aim)
+        return Level(state, renderer, target)
 
     def programs(self, settings: Settings) -> tuple[Program, ...]:
-        """Render, compare, adjoint, and add the gradients to those of the whole picture."""
+        """Return programs that render, compare, back-propagate and add the gradients to the scene's."""
         renderer = self.renderer
         measure = renderer.backend.program("loss")
-        for record in losses.IMAGE_LOSSES:
-            record(measure, LossInputs(renderer, self.aim, settings, self.state.clock))
+        inputs = LossInputs(renderer, self.target, settings, self.state.clock)
+        for loss in losses.IMAGE_LOSSES:
+            loss.record(measure, inputs)
         add = renderer.backend.program("levels")
         for name, group in renderer.parameters.groups.items():
             if group.value.shape[0] > 0:

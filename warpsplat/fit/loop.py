@@ -12,16 +12,18 @@ import numpy as np
 from warpsplat.fit.afford import affordable
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.costs import Course, serial
+from warpsplat.fit.densification import densify, remove_surplus
+from warpsplat.fit.evaluate_file import evaluate_file
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
-from warpsplat.fit.recover import mend
-from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
+from warpsplat.fit.recover import recover
+from warpsplat.fit.rounding import choose_grid, freeze_opacities, freeze_stage, opacities_at, stage_at
 from warpsplat.fit.saved import step_content, step_from
 from warpsplat.fit.schedule import (
     CHECK_INTERVAL,
-    LOOK_FROM,
-    LOOK_INTERVAL,
+    EVALUATE_FROM,
+    EVALUATE_INTERVAL,
     Phase,
     phase_at,
     phases,
@@ -31,8 +33,6 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Content, Stages, real, whole
 from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.surgery import operate, thin
-from warpsplat.fit.viewer_shift import look_at_file
 from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, Scene
@@ -139,7 +139,7 @@ def fit(
             settings = budget.measure(state, settings, image)
         task = replace(task, started=time.monotonic())
         step = Step(state, settings, task.target(settings, begin))
-        run = _Run(task, operate(step, grows=True) if below is not None else step, budget)
+        run = _Run(task, densify(step, grows=True) if below is not None else step, budget)
         run.advance()
     while True:
         interrupted = bool(stop and stop())
@@ -204,7 +204,7 @@ class _Run:
         step.advance()
         self._mend()
         if state.step % CHECK_INTERVAL == 0 or state.step == settings.iterations:
-            self.step.make_room()
+            self.step.ensure_capacity()
             if task.report:
                 task.report(self.progress())
 
@@ -213,7 +213,7 @@ class _Run:
         step, settings, done = self.step, self.step.settings, self.step.state.step
         if self._is_due() or done % CHECK_INTERVAL == 0 or stage_at(settings, done) is not None:
             surgical = done < settings.density.stop * settings.iterations
-            self.step = mend(step, renews=self.task.grows and surgical)
+            self.step = recover(step, replaces=self.task.grows and surgical)
 
     def _is_due(self) -> bool:
         """Whether it is time for surgery."""
@@ -245,10 +245,10 @@ class _Run:
         if task.finish:
             self._round()
         # What is kept may show other than over what lies below.
-        late = done >= LOOK_FROM * settings.iterations or bool(task.start.pictures)
+        late = done >= EVALUATE_FROM * settings.iterations or bool(task.start.pictures)
         looks = settings.viewer and task.finish and step.target.phase is task.plan[-1] and late
-        if looks and not state.rounding and done % LOOK_INTERVAL == 0:
-            look_at_file(step)
+        if looks and not state.rounding and done % EVALUATE_INTERVAL == 0:
+            evaluate_file(step)
         due = self._is_due()
         if due:
             self._fit_goals()
@@ -256,7 +256,7 @@ class _Run:
         missing = task.grows and state.parameters.shape_count != state.base + settings.curves
         surgical = missing or done < settings.density.stop * settings.iterations
         if due and done < settings.iterations and surgical:
-            self.step = operate(step, grows=task.grows)
+            self.step = densify(step, grows=task.grows)
 
     def _round(self) -> None:
         """Round and hold what the steps so far ask for."""
@@ -265,13 +265,15 @@ class _Run:
         stage = stage_at(settings, state.step)
         if stage is not None:
             if not state.rounding:
-                state.per_pixel = task.per_pixel or choose_grid(step, staged=True, thrifty=task.thrifty)
+                state.per_pixel = task.per_pixel or choose_grid(
+                    step, staged=True, rate_distortion=task.thrifty
+                )
                 state.rounding = True
-            hold_stage(step, stage)
-        settles = settings.renderer == "exact" and not state.settled
+            freeze_stage(step, stage)
+        settles = settings.renderer == "exact" and not state.opacities_frozen
         if settles and state.step >= max(opacities_at(settings), task.begin + 1):
-            hold_opacities(step)
-            state.settled = True
+            freeze_opacities(step)
+            state.opacities_frozen = True
 
     def _fit_goals(self) -> None:
         """Settings by the time that is left, and by the bytes that the shapes take, until they stay."""
@@ -287,10 +289,10 @@ class _Run:
 
     def result(self) -> Fit:
         """What there is now, as that of a run that was not interrupted."""
-        self.step = step = mend(self.step, renews=False, last=True)
+        self.step = step = recover(self.step, replaces=False, last=True)
         state, most = step.state, step.state.base + step.settings.curves
         if self.task.grows and state.parameters.shape_count > most:  # it was ended while it had a surplus
-            self.step = step = thin(step, most)
+            self.step = step = remove_surplus(step, most)
         if self.task.finish and not state.rounding:
             state.per_pixel = choose_grid(step, staged=False)
         done, render_psnr, estimated = state.step - self.task.begin, step.render_psnr(), step.psnr()
@@ -303,7 +305,7 @@ class _Run:
             estimated,
             done,
             interrupted=False,
-            renewed=state.renewed,
+            renewed=state.recovered,
         )
 
 

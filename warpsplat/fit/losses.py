@@ -1,6 +1,6 @@
-"""Losses as launches: those of the image write or add to its gradient, those of the shapes add to theirs.
+"""Losses: terms for the image write or add to its gradient, terms for the shapes add to theirs.
 
-A further loss is a function in one of the two tuples.
+A further loss is a ``Loss`` in one of the two lists at the end.
 """
 
 from __future__ import annotations
@@ -15,38 +15,36 @@ from warpsplat.fit.settings import Settings
 from warpsplat.kernels.loss import alpha, image, shape
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.tiles import to_tiles
-from warpsplat.scene import FloatArray
+from warpsplat.scene import Canvas, FloatArray
 
 
 @dataclass
 class LossBuffers:
-    """Sums that the losses leave, by tile and channel."""
+    """Sums that the image losses write, by tile and channel."""
 
     loss: wp.array = buffer(wp.float32, "tiles", 3)
-    """Squared errors, each of the same weight; below 0 where they are not known yet."""
+    """Squared errors, unweighted; negative until they have been computed."""
     similarity: wp.array = buffer(wp.float32, "tiles", 3)
     """SSIM x weight."""
 
 
-class Aim:
-    """What the image is compared with, and how far it is from that."""
+class LossTarget:
+    """The image that a render is compared with, and the result of the last comparison."""
 
     def __init__(
         self, target: FloatArray, backend: Backend, viewport: Viewport, importance: FloatArray | None = None
     ) -> None:
-        """What a step is to come near to.
+        """Copy the target to the device.
 
         Args:
             target: sRGB in [0, 1], shape (height, width, 3), of the viewport's size; or premultiplied with
                 opacity, shape (height, width, 4).
             backend: where to compute.
             viewport: of the render.
-            importance: how much the error of a pixel counts, shape (height, width), mean 1; without, all do
-                alike.
+            importance: weight of each pixel's error, shape (height, width), mean 1; default: all equal.
         """
         self.target: wp.array = wp.array(to_tiles(target), dtype=column, device=backend.device)
         self.weighted = importance is not None
@@ -54,96 +52,103 @@ class Aim:
         self.importance: wp.array = wp.array(
             to_tiles(weights[..., None])[:, 0], dtype=column, device=backend.device
         )
-        self.moved = False
-        """Whether it is at another target than at first."""
+        self.changed = False
+        """Whether ``assign`` has replaced the first target."""
         self.buffers = backend.allocate(LossBuffers, {"tiles": viewport.tile_count})
         self.buffers.loss.fill_(-1.0)
         self.value_count = 3 * viewport.pixel_count
 
-    def at(self, target: FloatArray) -> None:
-        """Another target from now on."""
+    def assign(self, target: FloatArray) -> None:
+        """Replace the target by another one of the same shape."""
         self.target.assign(to_tiles(target))
         self.buffers.loss.fill_(-1.0)
-        self.moved = True
+        self.changed = True
 
     def mean_square(self) -> float:
-        """Mean squared error of the last step, unweighted. Reads a number a tile back from the device."""
+        """Return the unweighted mean squared error of the last step. Reads a number per tile back."""
         return float(self.buffers.loss.numpy().sum(dtype="float64")) / self.value_count
 
 
 @dataclass(frozen=True)
 class LossInputs:
-    """What a loss of the image may read."""
+    """What a loss may read."""
 
     renderer: Renderer
-    aim: Aim
+    target: LossTarget
     settings: Settings
     clock: wp.array
     """Steps done, on the device, shape (1,)."""
 
 
-def record_error(program: Program, inputs: LossInputs) -> None:
-    """Mean squared error (paper eq. 12, first term), and as the settings weigh it 1 - SSIM of small windows.
+@dataclass(frozen=True)
+class Loss:
+    """A term of the loss."""
 
-    The first loss, which writes the gradient; both in one, since what they wait for is memory.
-    """
-    viewport = inputs.renderer.viewport
-    if inputs.renderer.film.planes == 4:
-        record_alpha(program, inputs)
+    weight: Callable[[Settings, Canvas], float]
+    launch: Callable[[Program, LossInputs, float], None]
+    """Records the launches for a weight."""
+    reason: str
+
+    def record(self, program: Program, inputs: LossInputs) -> None:
+        """Record the launches, unless the weight is 0."""
+        weight = self.weight(inputs.settings, inputs.renderer.parameters.canvas)
+        if weight > 0:
+            self.launch(program, inputs, weight)
+
+
+def _launch_image_error(program: Program, inputs: LossInputs, weight: float) -> None:
+    """Write the gradient of the squared error and of 1 - SSIM in one kernel, which is bound by memory."""
+    renderer, target = inputs.renderer, inputs.target
+    film, viewport = renderer.film, renderer.viewport
+    arrays = (film.buffers, target, target.buffers)
+    still = renderer.bins.buffers.tile_still
+    if film.planes == 4:
+        program.launch(alpha.alpha_loss, viewport.tile_count, *arrays, tile_still=still, split=True)
         return
     program.launch(
         image.image_loss,
         (viewport.tile_count, 3),
-        inputs.renderer.film.buffers,
-        inputs.aim,
-        inputs.aim.buffers,
+        *arrays,
         viewport,
-        tile_still=inputs.renderer.bins.buffers.tile_still,
+        tile_still=still,
         clock=inputs.clock,
         similarity_weight=inputs.settings.ssim,
         split=True,
     )
 
 
-def record_alpha(program: Program, inputs: LossInputs) -> None:
-    """Mean squared error of a transparent picture, on black and on white: what is right on both is right on
-    anything. Writes the gradient.
-    """
-    program.launch(
-        alpha.alpha_loss,
-        inputs.renderer.viewport.tile_count,
-        inputs.renderer.film.buffers,
-        inputs.aim,
-        inputs.aim.buffers,
-        tile_still=inputs.renderer.bins.buffers.tile_still,
-        split=True,
-    )
+def _launch_by_contour(kernel: wp.Kernel) -> Callable[[Program, LossInputs, float], None]:
+    """Return a function that launches ``kernel`` with one thread per contour."""
+
+    def launch(program: Program, inputs: LossInputs, weight: float) -> None:
+        parameters = inputs.renderer.parameters
+        count = parameters.contour_count
+        losses = parameters.backend.array(wp.float32, count)
+        program.launch(kernel, count, parameters.arrays, weight=weight, contour_loss=losses)
+
+    return launch
 
 
-def record_xing(program: Program, parameters: Parameters, settings: Settings) -> None:
-    """Shapes that do not cross themselves (LIVE), where the settings weigh it."""
-    if settings.xing > 0:
-        program.launch(
-            shape.xing_backward,
-            parameters.contour_count,
-            parameters.arrays,
-            weight=settings.xing,
-            contour_loss=parameters.backend.array(wp.float32, parameters.contour_count),
-        )
+IMAGE_LOSSES: tuple[Loss, ...] = (
+    Loss(
+        weight=lambda settings, canvas: 1.0,
+        launch=_launch_image_error,
+        reason="Mean squared error (paper eq. 12, first term) and, by ``Settings.ssim``, 1 - SSIM of small "
+        "windows. On a transparent canvas the mean of the errors on black and on white: an image that is "
+        "right on both is right on any background.",
+    ),
+)
+"""The first one writes the gradient of the image, further ones add to it."""
 
-
-def record_bending(program: Program, parameters: Parameters, settings: Settings) -> None:
-    """Cubics that bend little, where the settings weigh it."""
-    if settings.bending > 0:
-        canvas = parameters.canvas
-        program.launch(
-            shape.bending_backward,
-            parameters.contour_count,
-            parameters.arrays,
-            weight=settings.bending / (3 * canvas.width * canvas.height),
-            contour_loss=parameters.backend.array(wp.float32, parameters.contour_count),
-        )
-
-
-IMAGE_LOSSES: tuple[Callable[[Program, LossInputs], None], ...] = (record_error,)
-SHAPE_LOSSES: tuple[Callable[[Program, Parameters, Settings], None], ...] = (record_xing, record_bending)
+SHAPE_LOSSES: tuple[Loss, ...] = (
+    Loss(
+        weight=lambda settings, canvas: settings.xing,
+        launch=_launch_by_contour(shape.xing_backward),
+        reason="Keeps outlines from crossing themselves (LIVE).",
+    ),
+    Loss(
+        weight=lambda settings, canvas: settings.bending / (3 * canvas.width * canvas.height),
+        launch=_launch_by_contour(shape.bending_backward),
+        reason="Straightens burrs and loops too small for the image error to remove.",
+    ),
+)

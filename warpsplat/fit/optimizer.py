@@ -17,21 +17,22 @@ from warpsplat.rendering.program import Program
 
 @dataclass
 class AdamBuffers:
-    """What a step's updates share."""
+    """Values that the updates of a step share."""
 
     bias1: wp.array = buffer(wp.float32, "shapes")
-    """What the first moments of each shape fall short of at its age."""
+    """Bias correction of each shape's first moments at its age."""
     bias2: wp.array = buffer(wp.float32, "shapes")
+    """Likewise of the second moments."""
     decay: wp.array = buffer(wp.float32, 1)
-    """Fraction of the learning rates at this step."""
+    """Factor of the learning rates at this step."""
 
 
 def record_adam(
     program: Program, parameters: Parameters, clock: wp.array, settings: Settings, units: Units
 ) -> None:
-    """Record the count of the step and the update of every attribute that some shape has.
+    """Record the step's advance of the clock and the update of every attribute that some shape has.
 
-    ``clock``: steps so far, on the device, shape (1,).
+    ``clock``: steps done, on the device, shape (1,).
     """
     if parameters.has_twins:
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)

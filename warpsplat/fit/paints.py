@@ -1,4 +1,4 @@
-"""Which shapes have gradients: those where they save more error than the bytes of further shapes would."""
+"""Repainting: shapes get gradients where these save more error than their bytes are worth, or lose them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.export import export
-from warpsplat.fit.ramps import Bools, Ramps, Survey
+from warpsplat.fit.ramps import Bools, Ramps, RampSolver
 from warpsplat.fit.rate import byte_worth
 from warpsplat.fit.rounding import USUAL_GRID, finest
 from warpsplat.fit.settings import Settings
@@ -18,20 +18,19 @@ from warpsplat.scene import GRADIENTS, FloatArray, Paint, Scene, Spread
 from warpsplat.scene.scene import IntArray, starts_of
 
 GRADIENT_BYTES = 185
-"""Of a gradient of two stops in a file, and of the link to it."""
+"""Bytes of a gradient of two stops in a file, with the reference to it."""
 
-PROMISE = 1.0
-"""Gain of a new ramp over the price of its bytes from which on it is tried."""
+GAIN_TO_TRY = 1.0
+"""Least gain of a ramp over the worth of its bytes while shapes are still added."""
 
-KEEP = 4.0
-"""The same once the surplus is thinned, and of gradients that are to stay: the shapes that are removed then
-save about as much."""
+GAIN_TO_KEEP = 4.0
+"""The same while the surplus is removed: the shapes removed then save about as much."""
 
-ROUND = 1.05
-"""Gain of a radial ramp over that of the linear one from which on it is preferred."""
+RADIAL_ADVANTAGE = 1.05
+"""Gain of a radial ramp over that of the linear one above which it is preferred."""
 
-ALIKE = 2 / 255
-"""Colours of stops that differ less are one."""
+SAME_COLOR = 2 / 255
+"""Difference in each channel below which the colours of two stops are one."""
 
 
 def choose_paints(step: Step) -> None:
@@ -40,85 +39,75 @@ def choose_paints(step: Step) -> None:
     The state's arrays are replaced; the step's buffers stay as they are.
     """
     settings, state = step.settings, step.state
-    survey = Survey(step)
-    least = _price(step, survey.scene) if settings.paint == "auto" else 0.0
-    least *= KEEP if state.step > settings.density.thin * settings.iterations else PROMISE
-    kind, ramps = _best(settings, survey, least)
-    # What earlier levels show stays as it is.
-    mine = np.arange(len(survey.scene)) >= state.base
-    flat, bent = survey.scene.paint == Paint.FLAT, np.isin(survey.scene.paint, GRADIENTS)
-    new = mine & flat & (ramps.gain > least) & ~_alike(ramps.colors)
-    old = mine & bent & ((survey.flattening <= least) | _alike(_ends(survey.scene)))
-    scene = without_gradients(with_ramps(survey.scene, new, kind, ramps), old, survey.flat)
-    if (scene.paint != survey.scene.paint).any():
-        state.parameters.repaint(scene)
+    solver = RampSolver(step)
+    scene = solver.scene
+    least = 0.0
+    if settings.paint == "auto":
+        size = len(export(scene, settings, min(USUAL_GRID, finest(settings))))
+        least = GRADIENT_BYTES * byte_worth(step.square_error(), size)
+    surplus = state.step > settings.density.thin * settings.iterations
+    least *= GAIN_TO_KEEP if surplus else GAIN_TO_TRY
+    kind, ramps = _best_ramps(settings, solver, least)
+    trained = np.arange(len(scene)) >= state.base  # shapes of earlier levels stay as they are
+    flat, gradient = scene.paint == Paint.FLAT, np.isin(scene.paint, GRADIENTS)
+    gained = trained & flat & (ramps.gain > least) & ~_are_same(ramps.colors)
+    lost = trained & gradient & ((solver.flattening <= least) | _are_same(_end_colors(scene)))
+    repainted = without_gradients(with_ramps(scene, gained, kind, ramps), lost, solver.flat)
+    if (repainted.paint != scene.paint).any():
+        state.parameters.repaint(repainted)
 
 
-def _price(step: Step, scene: Scene) -> float:
-    """What a gradient has to save [mean squared error]."""
-    size = len(export(scene, step.settings, min(USUAL_GRID, finest(step.settings))))
-    return GRADIENT_BYTES * byte_worth(step.square_error(), size)
-
-
-def _best(settings: Settings, survey: Survey, least: float) -> tuple[IntArray, Ramps]:
-    """The kind and the ramp that the settings allow each shape; where the gain is less than ``least``, not
-    always the best.
-    """
-    count = len(survey.scene)
-    linear = survey.linear()
+def _best_ramps(settings: Settings, solver: RampSolver, least: float) -> tuple[IntArray, Ramps]:
+    """Return the kind and the best ramp of each shape; where the gain is below ``least``, any."""
+    count = len(solver.scene)
+    linear = solver.linear()
     if settings.paint == "linear":
         return np.full(count, Paint.LINEAR, np.int32), linear
-    radial = survey.radial(least)
-    round_ = np.ones(count, np.bool_) if settings.paint == "radial" else radial.gain > ROUND * linear.gain
-    both = {
-        field.name: np.where(_rows(round_, one), one, getattr(linear, field.name))
-        for field in fields(Ramps)
-        for one in [getattr(radial, field.name)]
-    }
-    return np.where(round_, Paint.RADIAL, Paint.LINEAR).astype(np.int32), Ramps(**both)
+    radial = solver.radial(least)
+    if settings.paint == "radial":
+        return np.full(count, Paint.RADIAL, np.int32), radial
+    chosen = radial.gain > RADIAL_ADVANTAGE * linear.gain
+    both = [(getattr(radial, f.name), getattr(linear, f.name)) for f in fields(Ramps)]
+    ramps = Ramps(*(np.where(chosen.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in both))
+    return np.where(chosen, Paint.RADIAL, Paint.LINEAR).astype(np.int32), ramps
 
 
-def _rows(mask: Bools, values: npt.NDArray[Any]) -> Bools:
-    """``mask`` of rows in a shape that broadcasts with ``values``."""
-    return mask.reshape(-1, *[1] * (values.ndim - 1))
+def _are_same(colors: FloatArray) -> Bools:
+    """Return which pairs of colours, shape (shape, 2, 3), are the same for a viewer."""
+    return np.asarray(np.abs(colors[:, 0] - colors[:, 1]).max(axis=1) < SAME_COLOR)
 
 
-def _alike(colors: FloatArray) -> Bools:
-    """Whether two colours each, shape (shape, 2, 3), are one."""
-    return np.asarray(np.abs(colors[:, 0] - colors[:, 1]).max(axis=1) < ALIKE)
-
-
-def _ends(scene: Scene) -> FloatArray:
-    """Colours of the first and last stop, 0 and 0 of flat shapes; shape (shape, 2, 3)."""
+def _end_colors(scene: Scene) -> FloatArray:
+    """Return the colours of each gradient's first and last stop, 0 for flat shapes; shape (shape, 2, 3)."""
     ends = np.zeros((len(scene), 2, 3), np.float32)
-    bent = np.flatnonzero(np.isin(scene.paint, GRADIENTS))
-    ends[bent, 0] = scene.stop_colors[scene.stop_first[bent]]
-    ends[bent, 1] = scene.stop_colors[scene.stop_first[bent + 1] - 1]
+    shapes = np.flatnonzero(np.isin(scene.paint, GRADIENTS))
+    ends[shapes, 0] = scene.stop_colors[scene.stop_first[shapes]]
+    ends[shapes, 1] = scene.stop_colors[scene.stop_first[shapes + 1] - 1]
     return ends
 
 
 def with_ramps(scene: Scene, shapes: Bools, kind: IntArray, ramps: Ramps) -> Scene:
-    """The scene with gradients ``ramps`` of the kinds ``kind`` in place of the colours of ``shapes``."""
+    """Return the scene with gradients ``ramps`` of kinds ``kind`` in place of the colours of ``shapes``."""
     counts = np.where(shapes, 2, np.diff(scene.stop_first))
-    fresh = {
+    is_new = np.repeat(shapes, counts)
+    added = {
         "stop_offsets": ramps.offsets,
         "stop_colors": ramps.colors,
         "stop_opacities": np.ones_like(ramps.offsets),
     }
     stops: dict[str, Any] = {}
-    for name, values in fresh.items():
+    for name, values in added.items():
         old = getattr(scene, name)
-        stops[name] = np.empty((int(counts.sum()), *old.shape[1:]), np.float32)
-        of_new = np.repeat(shapes, counts)
-        stops[name][of_new] = values[shapes].reshape(-1, *old.shape[1:])
-        stops[name][~of_new] = old[np.repeat(~shapes, np.diff(scene.stop_first))]
+        stops[name] = np.empty((len(is_new), *old.shape[1:]), np.float32)
+        stops[name][is_new] = values[shapes].reshape(-1, *old.shape[1:])
+        stops[name][~is_new] = old[np.repeat(~shapes, np.diff(scene.stop_first))]
     return replace(
         scene,
         paint=np.where(shapes, kind, scene.paint).astype(np.int32),
         spread=np.where(shapes, Spread.PAD, scene.spread).astype(np.int32),
         focus=np.where(shapes[:, None], 0, scene.focus).astype(np.float32),
         frames=np.where(shapes[:, None], ramps.frames, scene.frames),
-        # By which doubles are found.
+        # By which duplicates are found.
         colors=np.where(shapes[:, None], ramps.colors.mean(axis=1), scene.colors),
         stop_first=starts_of(counts),
         **stops,
@@ -126,7 +115,7 @@ def with_ramps(scene: Scene, shapes: Bools, kind: IntArray, ramps: Ramps) -> Sce
 
 
 def without_gradients(scene: Scene, shapes: Bools, colors: npt.NDArray[Any]) -> Scene:
-    """The scene with flat ``colors``, shape (shape, 3), in place of the gradients of ``shapes``."""
+    """Return the scene with flat ``colors``, shape (shape, 3), in place of the gradients of ``shapes``."""
     counts = np.diff(scene.stop_first)
     keep = np.repeat(~shapes, counts)
     chosen = np.where(shapes[:, None], np.clip(colors, 0, 1), scene.colors)

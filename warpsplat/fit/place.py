@@ -1,8 +1,8 @@
-"""First shapes: small circles or strokes on a jittered grid, with the colours of the image."""
+"""Placement of new shapes: small circles or strokes with the colours of the image, the first on a grid."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -13,62 +13,94 @@ from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
-COVER = 1.3
-"""Area of the first shapes over the area of the canvas: circles on a grid that leave few gaps."""
+GRID_COVER = 1.3
+"""Area of the first shapes over that of the canvas: circles on a grid then leave few gaps."""
+
+JITTER = 0.25
+"""Farthest offset of a first shape along each axis, in cells of the grid."""
 
 STROKE_CUBICS = 3
 """Cubics in a new stroke (paper section 3.2, as in DiffVG)."""
 
-MIXED_POINTS = 6
-"""Points of a new stroke among fills: a bar needs few, and more of them shake."""
+MIXED_STROKE_POINTS = 6
+"""Points of a new stroke among fills: a bar needs few, and with more of them it wobbles."""
 
 STROKE_ASPECT = 3.0
 """Length over width of a new stroke."""
 
-SURVEY_PIXELS = 400_000
+REDUCED_PIXELS = 400_000
 """Largest image that colours and directions of the first shapes are taken from [pixels]."""
 
-SURVEY_SIGMA = 128.0
-"""Widest blur of that image [px]: its cost grows with the width."""
+REDUCED_SIGMA = 128.0
+"""Widest blur of that image [px], whose cost grows with the width."""
 
-LEVELS = 32
-"""Of a channel, to tell a drawing's colours."""
+COLOR_LEVELS = 32
+"""Levels of a channel by which flat colours are told apart."""
 
 FLAT_SHARE = 0.98
-"""Share of a drawing's pixels that its few colours hold; the rest are the soft pixels of outlines."""
+"""Least share of a flat image's pixels that have one of its few colours; the others antialias outlines."""
 
-FLAT_COLORS = 12
-"""Most colours of a drawing whose shapes are counted."""
+MAX_FLAT_COLORS = 12
+"""Most colours of an image whose regions are counted."""
 
-LEAST_REGION = 1e-4
+MIN_REGION_SHARE = 1e-4
 """Least area of a region that counts, over the area of the image."""
 
-SHAPES_A_REGION = 8
-"""Curves for a region of one colour: an outline has corners and holes."""
+SHAPES_PER_REGION = 8
+"""Shapes for a region of one colour: an outline has corners and holes."""
 
-LEAST_CURVES = 32
-"""For the simplest of drawings."""
+MIN_SIMPLE_CURVES = 32
+"""Shapes for the simplest of flat images."""
 
-PIXELS_A_CURVE = 8
-"""Least pixels of an image for each shape: a shape has about as many numbers as these have."""
+PIXELS_PER_CURVE = 8
+"""Least pixels of an image for each shape: a shape has about as many numbers as these."""
 
-LEAST_SHARE = 0.02
-"""Of a picture that is not empty, as far as the places of first shapes are made denser for it."""
+MIN_OCCUPIED_SHARE = 0.02
+"""Least share of a transparent image that is taken as occupied: bounds the number of places tried."""
 
-SOME = 0.05
-"""Least opacity of a picture around the place of a first shape."""
+MIN_PLACE_OPACITY = 0.05
+"""Least opacity of a transparent image around a first shape."""
 
 Floats = npt.NDArray[np.floating]
 
 
-def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
-    """``target`` so small that a blur by ``sigma`` [px of ``target``] takes no time.
+def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.random.Generator) -> Scene:
+    """Return ``count`` shapes on a jittered grid that covers the canvas, or its occupied part."""
+    height, width = target.shape[:2]
+    wanted = count
+    if target.shape[2] == 4:  # so many places that enough are left once those where nothing is are dropped
+        count = round(count / max(float((target[..., 3] > CLEAR).mean()), MIN_OCCUPIED_SHARE))
+    rows = max(1, min(count, round(np.sqrt(count * height / width))))
+    per_row = np.full(rows, count // rows)
+    per_row[: count % rows] += 1
+    x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
+    y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
+    cell = np.sqrt(width * height / count)
+    centres = np.stack([x, y], axis=1) + rng.uniform(-JITTER, JITTER, (count, 2)) * cell
+    centres = np.clip(centres, 0, [width, height])
+    small, span = reduced(target, cell / 2)
+    blurred = filters.gaussian_blur(small, max(cell / span / 4, 0.5))
+    column, row = pixel_of(centres / span, small)
+    areas = np.full(count, GRID_COVER * cell * cell)
+    angles = shape_angles(settings, small, centres / span, cell / span / 2)
+    colors = blurred[row, column]
+    factory = ShapeFactory(settings, canvas_for(settings, target))
+    scene = factory.place(centres, areas, angles, straight(np.asarray(colors, np.float32)))
+    order = rng.permutation(count)
+    if target.shape[2] == 4:
+        order = order[np.argsort(colors[order, 3] <= MIN_PLACE_OPACITY, kind="stable")][:wanted]
+        rng.shuffle(order)
+    return scene.take(order)
+
+
+def reduced(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
+    """Return ``target`` so small that a blur by ``sigma`` [px of ``target``] takes no time.
 
     Returns:
-        the image, ``target`` itself if it is small enough, and how many of ``target``'s pixels a pixel spans.
+        the image, ``target`` itself if it is small enough, and the pixels of ``target`` that a pixel spans.
     """
     height, width = target.shape[:2]
-    span = max(np.sqrt(width * height / SURVEY_PIXELS), sigma / SURVEY_SIGMA)
+    span = max(np.sqrt(width * height / REDUCED_PIXELS), sigma / REDUCED_SIGMA)
     if span <= 1:
         return target, 1.0
     size = (max(1, round(width / span)), max(1, round(height / span)))
@@ -76,125 +108,29 @@ def survey(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
 
 
 def simple_curves(target: FloatArray) -> int:
-    """The most shapes that make sense: few for a drawing in a few flat colours, or for a tiny image.
+    """Return the largest useful number of shapes: small for images of few flat colours and for tiny ones.
 
-    A drawing gets ``SHAPES_A_REGION`` shapes for each region of one colour, any image at the most one for
-    ``PIXELS_A_CURVE`` of its pixels.
+    A flat image gets ``SHAPES_PER_REGION`` for each region of one colour, any image at most one for each
+    ``PIXELS_PER_CURVE`` pixels.
     """
     height, width = target.shape[:2]
-    room = max(1, width * height // PIXELS_A_CURVE)
-    steps = np.round(on(survey(target)[0], 0.5) * (LEVELS - 1)).astype(np.int32)
-    codes = (steps * [LEVELS * LEVELS, LEVELS, 1]).sum(axis=2)
+    most = max(1, width * height // PIXELS_PER_CURVE)
+    levels = np.round(on(reduced(target)[0], 0.5) * (COLOR_LEVELS - 1)).astype(np.int32)
+    codes = (levels * [COLOR_LEVELS * COLOR_LEVELS, COLOR_LEVELS, 1]).sum(axis=2)
     counts = np.bincount(codes.ravel())
-    colors = np.argsort(-counts, kind="stable")[:FLAT_COLORS]
+    colors = np.argsort(-counts, kind="stable")[:MAX_FLAT_COLORS]
     if counts[colors].sum() < FLAT_SHARE * codes.size:
-        return room
+        return most
     regions = 0
     for color in colors[counts[colors] > 0]:
         _, _, stats, _ = cv2.connectedComponentsWithStats((codes == color).astype(np.uint8), connectivity=4)
-        regions += int((stats[1:, cv2.CC_STAT_AREA] >= LEAST_REGION * codes.size).sum())
-    return min(room, max(LEAST_CURVES, SHAPES_A_REGION * regions))
-
-
-def background_color(target: FloatArray) -> FloatArray:
-    """The border's colour where most of the border is alike (a drawing on paper), else the mean."""
-    border = np.concatenate([target[0], target[-1], target[:, 0], target[:, -1]])
-    median = np.median(border, axis=0)
-    alike = np.abs(border - median).max(axis=1) < 8 / 255
-    color = median if alike.mean() > 0.5 else survey(target)[0].mean(axis=(0, 1))
-    # As the file will have it.
-    return np.asarray(np.round(color * 255) / 255, np.float32)
-
-
-def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatArray:
-    """Circles as rings of ``2 * chain_cubics`` cubics, shape (shape, 6 * chain_cubics, 2)."""
-    count = 2 * chain_cubics
-    handle = 4 / 3 * elementary.tan(np.pi / (2 * count))
-    angle = 2 * np.pi * np.arange(count) / count
-    on = np.stack([elementary.cos(angle), elementary.sin(angle)], axis=1)
-    turn = np.stack([-on[:, 1], on[:, 0]], axis=1)
-    following, following_turn = np.roll(on, -1, axis=0), np.roll(turn, -1, axis=0)
-    ring = np.stack([on, on + handle * turn, following - handle * following_turn], axis=1).reshape(-1, 2)
-    return np.asarray(centres[:, None] + radii[:, None, None] * ring[None], np.float32)
-
-
-def circle_splines(centres: Floats, radii: Floats, count: int) -> FloatArray:
-    """Circles as splines of ``count`` points, shape (shape, count, 2)."""
-    angle = 2 * np.pi * np.arange(count) / count
-    on = np.stack([elementary.cos(angle), elementary.sin(angle)], axis=1)
-    # Where quadratics meet and in the middle of each, the outline lies this much nearer than the points.
-    nearer = (elementary.cos(np.pi / count) + (3 + elementary.cos(2 * np.pi / count)) / 4) / 2
-    reach = 1 / nearer
-    return np.asarray(centres[:, None] + radii[:, None, None] * reach * on, np.float32)
-
-
-def stroke_outlines(centres: Floats, lengths: Floats, angles: Floats, count: int) -> FloatArray:
-    """Straight strokes of ``count`` points, shape (shape, count, 2)."""
-    t = np.linspace(-0.5, 0.5, count)
-    direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)
-    along = lengths[:, None] * t[None, :]
-    return np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
-
-
-def place(
-    settings: Settings,
-    canvas: Canvas,
-    centres: Floats,
-    areas: Floats,
-    angles: Floats,
-    colors: npt.NDArray[Any],
-) -> Scene:
-    """New shapes of the settings' kind: ``areas`` in px squared, ``angles`` (strokes) in rad."""
-    if settings.kind == Kind.STROKE:
-        widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
-        return place_strokes(settings, canvas, centres, areas / widths, widths, angles, colors)
-    if settings.basis == Basis.CUBIC:
-        points = circle_outlines(centres, np.sqrt(areas / np.pi), settings.chain_cubics)
-    else:
-        points = circle_splines(centres, np.sqrt(areas / np.pi), settings.spline_points)
-    return _new(settings, Kind.FILL, canvas, points, np.zeros(len(centres)), colors)
-
-
-def place_strokes(
-    settings: Settings,
-    canvas: Canvas,
-    centres: Floats,
-    lengths: Floats,
-    widths: Floats,
-    angles: Floats,
-    colors: npt.NDArray[Any],
-) -> Scene:
-    """New straight strokes: ``lengths`` and ``widths`` in px, ``angles`` in rad."""
-    count = MIXED_POINTS if settings.mixed else settings.spline_points
-    if settings.basis == Basis.CUBIC:
-        count = 3 * STROKE_CUBICS + 1
-    points = stroke_outlines(centres, np.maximum(lengths, 2.0), angles, count)
-    return _new(settings, Kind.STROKE, canvas, points, widths, colors)
-
-
-def _new(
-    settings: Settings,
-    kind: Kind,
-    canvas: Canvas,
-    points: FloatArray,
-    widths: Floats,
-    colors: npt.NDArray[Any],
-) -> Scene:
-    """New shapes, opaque or nearly so."""
-    return Scene.uniform(
-        kind,
-        canvas,
-        points,
-        settings.basis,
-        colors=np.asarray(colors, np.float32).reshape(len(points), 3),
-        opacities=np.full(len(points), OPACITY_RANGE[1] if settings.opaque else settings.opacity, np.float32),
-        widths=np.asarray(widths, np.float32),
-    )
+        regions += int((stats[1:, cv2.CC_STAT_AREA] >= MIN_REGION_SHARE * codes.size).sum())
+    return min(most, max(MIN_SIMPLE_CURVES, SHAPES_PER_REGION * regions))
 
 
 def canvas_for(settings: Settings, target: FloatArray) -> Canvas:
-    """A canvas of ``target``'s size: transparent if it has opacity, else with the settings' background or a
-    colour of its own.
+    """Return a canvas of ``target``'s size: transparent if it has opacity, else with the settings' background
+    or that of the image.
     """
     background = None
     if target.shape[2] == 3:
@@ -203,8 +139,94 @@ def canvas_for(settings: Settings, target: FloatArray) -> Canvas:
     return Canvas(target.shape[1], target.shape[0], background)
 
 
+def background_color(target: FloatArray) -> FloatArray:
+    """Return the colour of the border if most of it has one (a drawing on paper), else the mean colour."""
+    border = np.concatenate([target[0], target[-1], target[:, 0], target[:, -1]])
+    median = np.median(border, axis=0)
+    uniform = np.abs(border - median).max(axis=1) < 8 / 255
+    color = median if uniform.mean() > 0.5 else reduced(target)[0].mean(axis=(0, 1))
+    return np.asarray(np.round(color * 255) / 255, np.float32)  # as files have it
+
+
+@dataclass(frozen=True)
+class ShapeFactory:
+    """Makes new shapes as the settings ask for; lengths are in canvas units, angles in rad."""
+
+    settings: Settings
+    canvas: Canvas
+
+    def place(self, centres: Floats, areas: Floats, angles: Floats, colors: FloatArray) -> Scene:
+        """Return shapes of the settings' kind: circles, or strokes along ``angles``."""
+        settings = self.settings
+        if settings.kind == Kind.STROKE:
+            widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
+            return self.place_strokes(centres, areas / widths, widths, angles, colors)
+        radii = np.sqrt(areas / np.pi)
+        if settings.basis == Basis.CUBIC:
+            points = circle_outlines(centres, radii, settings.chain_cubics)
+        else:
+            points = circle_splines(centres, radii, settings.spline_points)
+        return self._new(Kind.FILL, points, np.zeros(len(centres)), colors)
+
+    def place_strokes(
+        self, centres: Floats, lengths: Floats, widths: Floats, angles: Floats, colors: FloatArray
+    ) -> Scene:
+        """Return straight strokes."""
+        count = MIXED_STROKE_POINTS if self.settings.mixed else self.settings.spline_points
+        if self.settings.basis == Basis.CUBIC:
+            count = 3 * STROKE_CUBICS + 1
+        direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)
+        along = np.maximum(lengths, 2.0)[:, None] * np.linspace(-0.5, 0.5, count)
+        points = np.asarray(centres[:, None] + along[..., None] * direction[:, None], np.float32)
+        return self._new(Kind.STROKE, points, widths, colors)
+
+    def _new(self, kind: Kind, points: FloatArray, widths: Floats, colors: FloatArray) -> Scene:
+        opacity = OPACITY_RANGE[1] if self.settings.opaque else self.settings.opacity
+        return Scene.uniform(
+            kind,
+            self.canvas,
+            points,
+            self.settings.basis,
+            colors=np.asarray(colors, np.float32).reshape(len(points), 3),
+            opacities=np.full(len(points), opacity, np.float32),
+            widths=np.asarray(widths, np.float32),
+        )
+
+
+def circle_outlines(centres: Floats, radii: Floats, chain_cubics: int) -> FloatArray:
+    """Return circles as rings of ``2 * chain_cubics`` cubics, shape (shape, 6 * chain_cubics, 2)."""
+    count = 2 * chain_cubics
+    handle = 4 / 3 * elementary.tan(np.pi / (2 * count))
+    on_circle = _unit_circle(count)
+    tangent = np.stack([-on_circle[:, 1], on_circle[:, 0]], axis=1)
+    following, following_tangent = np.roll(on_circle, -1, axis=0), np.roll(tangent, -1, axis=0)
+    cubics = [on_circle, on_circle + handle * tangent, following - handle * following_tangent]
+    ring = np.stack(cubics, axis=1).reshape(-1, 2)
+    return np.asarray(centres[:, None] + radii[:, None, None] * ring[None], np.float32)
+
+
+def circle_splines(centres: Floats, radii: Floats, count: int) -> FloatArray:
+    """Return circles as splines of ``count`` points, shape (shape, count, 2)."""
+    # Radius of the outline over that of its points: the mean at the joints and in the middles of quadratics.
+    ratio = (elementary.cos(np.pi / count) + (3 + elementary.cos(2 * np.pi / count)) / 4) / 2
+    return np.asarray(centres[:, None] + radii[:, None, None] * (1 / ratio) * _unit_circle(count), np.float32)
+
+
+def _unit_circle(count: int) -> Floats:
+    """Return ``count`` points of the unit circle, shape (point, 2)."""
+    angle = 2 * np.pi * np.arange(count) / count
+    return np.stack([elementary.cos(angle), elementary.sin(angle)], axis=1)
+
+
+def shape_angles(settings: Settings, target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
+    """Return ``contour_angles`` for strokes, 0 for fills, which start as circles."""
+    if settings.kind == Kind.FILL:
+        return np.zeros(len(centres), np.float32)
+    return contour_angles(target, centres, sigma)
+
+
 def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
-    """Direction along the contours at ``centres`` [rad]: the structure tensor's lesser eigenvector."""
+    """Return the direction of contours at ``centres`` [rad]: the structure tensor's lesser eigenvector."""
     grey = target.mean(axis=2)
     gx, gy = filters.sobel(grey)
     xx, yy, xy = (filters.gaussian_blur(g, max(sigma, 0.5)) for g in (gx * gx, gy * gy, gx * gy))
@@ -213,46 +235,8 @@ def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatAr
     return np.asarray(gradient + np.pi / 2, np.float32)
 
 
-def shape_angles(settings: Settings, target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
-    """``contour_angles`` for strokes; 0 for filled shapes, which start as circles."""
-    if settings.kind == Kind.FILL:
-        return np.zeros(len(centres), np.float32)
-    return contour_angles(target, centres, sigma)
-
-
 def pixel_of(centres: Floats, target: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Column and row of the pixels that hold ``centres``, clamped to the image."""
+    """Return column and row of the pixels that contain ``centres``, clamped to the image."""
     column = np.clip(centres[:, 0].astype(np.intp), 0, target.shape[1] - 1)
     row = np.clip(centres[:, 1].astype(np.intp), 0, target.shape[0] - 1)
     return column, row
-
-
-def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.random.Generator) -> Scene:
-    """``count`` shapes that cover the canvas."""
-    canvas = canvas_for(settings, target)
-    height, width = target.shape[:2]
-    wanted = count
-    if target.shape[2] == 4:  # where nothing is, nothing is placed: more places then, so that enough are left
-        count = round(count / max(float((target[..., 3] > CLEAR).mean()), LEAST_SHARE))
-    rows = max(1, min(count, round(np.sqrt(count * height / width))))
-    per_row = np.full(rows, count // rows)
-    per_row[: count % rows] += 1
-    x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
-    y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
-    cell = np.sqrt(width * height / count)
-    centres = np.stack([x, y], axis=1) + rng.uniform(-0.25, 0.25, (count, 2)) * cell
-    centres = np.clip(centres, 0, [width, height])
-    small, span = survey(target, cell / 2)
-    blurred = filters.gaussian_blur(small, max(cell / span / 4, 0.5))
-    column, row = pixel_of(centres / span, small)
-    areas = np.full(count, COVER * cell * cell)
-    angles = shape_angles(settings, small, centres / span, cell / span / 2)
-    tones = blurred[row, column]
-    scene = place(
-        settings, canvas, centres, areas, angles, np.asarray(straight(np.asarray(tones, np.float32)))
-    )
-    order = rng.permutation(count)
-    if target.shape[2] == 4:
-        order = order[np.argsort(tones[order, 3] <= SOME, kind="stable")][:wanted]
-        rng.shuffle(order)
-    return scene.take(order)

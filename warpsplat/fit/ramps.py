@@ -1,9 +1,10 @@
-"""Linear and radial ramps that the error asks for: least squares on what is seen of each shape.
+"""Fitting of gradients: the linear or radial ramp of each shape that lowers the squared error most.
 
-Where d(p) is added to a shape's colour, the image changes by seen(p) d(p), so that the squared error is
-quadratic in the numbers of d. Of all d in the span of 1, x, y and x^2 + y^2 that go along one line of
-colours, the best is a singular vector of moments, sums over pixels. Without the square it is a linear ramp;
-with it, it says around which point a radial one lies, whose colours are then found by sums along the radius.
+Let v(p) be the visibility of a shape at pixel p: coverage x opacity x transmittance of the shapes in front.
+Adding d(p) to its colour changes the image by v(p) d(p): the squared error is quadratic in the coefficients
+of d. Of all d along one line of colours in the span of 1, x, y and x^2 + y^2, the best one is a singular
+vector of moments, sums over pixels. Without the square it is a linear ramp; with it, it gives the centre of a
+radial one, whose colours are then found by sums along the radius.
 """
 
 from __future__ import annotations
@@ -25,19 +26,19 @@ Bools = npt.NDArray[np.bool_]
 
 TILE = constants.TILE
 
-REACH = 2.0
-"""From the middle of a ramp to its ends, over the standard deviation of what is seen along it: what is spread
-evenly ends at sqrt(3)."""
+HALF_LENGTH = 2.0
+"""Half the length of a ramp, in standard deviations of the visible pixels along it: evenly spread ones end at
+sqrt(3)."""
 
-FAR = 4.0
-"""A radial ramp's centre is no further from the middle of its shape's box than this, in halves of the box's
-longer side: beyond, a linear one does."""
+MAX_CENTRE_DISTANCE = 4.0
+"""Farthest centre of a radial ramp from the middle of its shape's box, in halves of the box's longer side:
+beyond, a linear ramp does as well."""
 
 RIDGE = 1e-6
-"""Added to variances in the same unit: a shape of one pixel has no ramp."""
+"""Added to variances, in the same unit: a shape of one pixel has no ramp."""
 
-SLOTS_AT_ONCE = 4096
-"""Bounds the memory to some 40 MB."""
+SLOTS_PER_CHUNK = 4096
+"""Slots that are summed over at once: bounds the memory to some 40 MB."""
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,18 @@ class Ramps:
     """A ramp of two stops for each shape."""
 
     gain: Floats
-    """What the mean squared error falls by, beyond what the best flat colour does, shape (shape,)."""
+    """Decrease of the mean squared error beyond that by the best flat colour, shape (shape,)."""
     frames: FloatArray
-    """As ``Scene.frames``, shape (shape, 6)."""
+    """See ``Scene.frames``, shape (shape, 6)."""
     offsets: FloatArray
-    """Of the stops, shape (shape, 2)."""
+    """Offsets of the stops, shape (shape, 2)."""
     colors: FloatArray
-    """Of the stops, sRGB in [0, 1], shape (shape, 2, 3)."""
+    """Colours of the stops, sRGB in [0, 1], shape (shape, 2, 3)."""
 
 
 @dataclass(frozen=True)
 class Slots:
-    """What the sums are taken over: pixels of slots, by column and row of the tile."""
+    """Pixels of slots, by column and row of the tile, which the sums are over."""
 
     shape: npt.NDArray[np.int32]
     """Shape (slot,)."""
@@ -65,27 +66,28 @@ class Slots:
     y: Floats
     """Of the rows, likewise."""
     weight: FloatArray
-    """Importance x seen^2, shape (slot, TILE, TILE)."""
+    """Importance x visibility^2, shape (slot, TILE, TILE)."""
     pull: FloatArray
-    """Importance x seen x what the image lacks, shape (slot, 3, TILE, TILE)."""
+    """Importance x visibility x residual, shape (slot, 3, TILE, TILE)."""
     color: FloatArray
-    """Of gradients, shape (slot, 3, TILE, TILE); 0 of flat shapes."""
+    """Colours of gradients, 0 for flat shapes; shape (slot, 3, TILE, TILE)."""
 
 
-class Survey:
-    """What is seen of each shape of a step's scene, and what the image lacks there.
+class RampSolver:
+    """Sums over the visible pixels of each shape of a step's scene, and the ramps that follow from them.
 
-    Everything counts as if each gradient had its mean colour, so that flat shapes and gradients compare.
+    Residuals are those with each gradient replaced by its mean colour, so that flat shapes and gradients
+    compare.
     """
 
     def __init__(self, step: Step) -> None:
-        """Right after ``forward_complete`` of the step's renderer."""
+        """Sum up; call it right after ``forward_complete`` of the step's renderer."""
         renderer = step.renderer
         self.scene = step.state.scene()
         self._viewport = renderer.viewport
         self._visible = renderer.visible()
         self._gradient = np.isin(self.scene.paint, GRADIENTS)
-        self._lacking = step.lacking()
+        self._residual = step.residual()
         self._importance = step.weights()
         boxes = bounds(self.scene).astype(np.float64)
         self._middle = 0.5 * (boxes[:, :2] + boxes[:, 2:])
@@ -94,11 +96,11 @@ class Survey:
         self._measure()
 
     def _slots(self, shapes: Bools) -> Iterator[Slots]:
-        """Those of ``shapes``, some at a time."""
+        """Yield the slots of ``shapes``, some at a time."""
         seen, scale = self._visible, self._viewport.scale
         at = np.arange(TILE) + 0.5
         chosen = np.flatnonzero(shapes[seen.shape])
-        for rows in np.split(chosen, range(SLOTS_AT_ONCE, len(chosen), SLOTS_AT_ONCE)):
+        for rows in np.split(chosen, range(SLOTS_PER_CHUNK, len(chosen), SLOTS_PER_CHUNK)):
             shape, tile = seen.shape[rows], seen.tile[rows]
             across, down = tile % self._viewport.tiles_x, tile // self._viewport.tiles_x
             x, y = (
@@ -108,13 +110,13 @@ class Survey:
             )
             share, importance = seen.share[rows], self._importance[tile]
             color = np.zeros((len(rows), 3, TILE, TILE), np.float32)
-            bent = self._gradient[shape]
-            color[bent] = seen.color[np.searchsorted(seen.colored, rows[bent])]
+            gradient = self._gradient[shape]
+            color[gradient] = seen.color[np.searchsorted(seen.colored, rows[gradient])]
             weighted = importance * share
-            yield Slots(shape, x, y, weighted * share, weighted[:, None] * self._lacking[tile], color)
+            yield Slots(shape, x, y, weighted * share, weighted[:, None] * self._residual[tile], color)
 
     def _measure(self) -> None:
-        """Moments of what is seen, by powers of x and y, and of what pulls at it."""
+        """Compute moments of visibility and of residuals by powers of x and y, and what follows from them."""
         count = len(self.scene)
         moments = np.zeros((count, 5, 5))
         pulls, colors = np.zeros((count, 3, 3, 3)), np.zeros((count, 3, 3, 3))
@@ -133,12 +135,12 @@ class Survey:
         weight = np.maximum(gram[:, 0, :1], 1e-12)
         gradient = self._gradient[:, None]
         self.mean: Floats = np.where(gradient, colored[:, 0] / weight, self.scene.colors)
-        """Mean colour of what is seen of each shape, (shape, 3)."""
-        # With the mean m in place of c, the image lacks seen (c - m) more.
+        """Mean colour of each shape's visible pixels, (shape, 3)."""
+        # With the mean m in place of c, the residual grows by v (c - m).
         lost += (squares - self.mean**2 * weight - 2 * self.mean * pull[:, 0]).sum(axis=1)
         lost -= (pull[:, 0] ** 2 / weight).sum(axis=1)
         self.flattening: Floats = np.where(self._gradient, lost, 0) / self._values
-        """What the mean squared error grows by where a gradient becomes its best flat colour, (shape,)."""
+        """Increase of the mean squared error where a gradient becomes its best flat colour, (shape,)."""
         missing = colored - gram[:, 0, :, None] * self.mean[:, None]
         pull += np.where(gradient[..., None], missing, 0)
         self._weight, self._pull = weight[:, 0], pull[:, 0]
@@ -151,11 +153,12 @@ class Survey:
         """Best flat colour, (shape, 3)."""
 
     def _steepest(self, size: int) -> tuple[Floats, Floats, Floats]:
-        """The best change of colour along one line of them, of the first ``size`` of x, y, x^2 + y^2.
+        """Return the best change of colour along one line that is linear in the first ``size`` of x, y,
+        x^2 + y^2.
 
         Returns:
-            how the way along the line depends on these, shape (shape, size), in units of its standard
-            deviation; the colours of such a unit, shape (shape, 3); the gain, shape (shape,).
+            coefficients of the position along the line, shape (shape, size), in units of its standard
+            deviation; the colour of such a unit, shape (shape, 3); the gain, shape (shape,).
         """
         lower = linear.cholesky(self._spread[:, :size, :size])
         left, sizes, right = linear.svd(linear.solve(lower, self._slope[:, :size]))
@@ -164,21 +167,27 @@ class Survey:
         return along, tints, sizes[:, 0] ** 2 / (self._weight * self._values)
 
     def linear(self) -> Ramps:
-        """The best linear ramp of each shape."""
+        """Return the best linear ramp of each shape."""
         along, tints, gain = self._steepest(2)
-        # The axis goes through the middle of what is seen, REACH units of the way to either side.
+        # The axis goes through the mean of the visible pixels, HALF_LENGTH units to either side.
         unit = along / np.maximum((along**2).sum(axis=1), 1e-12)[:, None]
-        start = self._middle + self._half[:, None] * (self._place[:, :2] - REACH * unit)
-        axis = self._half[:, None] * 2 * REACH * unit
+        start = self._middle + self._half[:, None] * (self._place[:, :2] - HALF_LENGTH * unit)
+        axis = self._half[:, None] * 2 * HALF_LENGTH * unit
         frames = np.concatenate([start, axis, _turned(axis)], axis=1)
-        return _ramps(gain, frames, np.zeros(len(gain)), self.flat - REACH * tints, self.flat + REACH * tints)
+        return _ramps(
+            gain,
+            frames,
+            np.zeros(len(gain)),
+            self.flat - HALF_LENGTH * tints,
+            self.flat + HALF_LENGTH * tints,
+        )
 
     def radial(self, least: float) -> Ramps:
-        """The best radial ramp of each shape where its gain may be over ``least``; other gains are 0."""
-        along, _, promise = self._steepest(3)
+        """Return the best radial ramp of each shape if its gain may exceed ``least``; other gains are 0."""
+        along, _, bound = self._steepest(3)
         bend = np.where(np.abs(along[:, 2]) > 1e-9, along[:, 2], 1e-9)
         centre = -along[:, :2] / (2 * bend[:, None])
-        chosen = (np.linalg.norm(centre, axis=1) < FAR) & (promise > least)
+        chosen = (np.linalg.norm(centre, axis=1) < MAX_CENTRE_DISTANCE) & (bound > least)
         count = len(chosen)
         gain, radii, slope = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
         for slots in self._slots(chosen):
@@ -187,14 +196,16 @@ class Survey:
             weighted = slots.weight * r
             sums = [weighted.sum(axis=(1, 2)), (weighted * r).sum(axis=(1, 2))]
             np.add.at(radii, slots.shape, np.stack(sums, axis=1))
-            lacking = slots.pull + slots.weight[:, None] * _off(slots, self._gradient, self.mean)
-            np.add.at(slope, slots.shape, (lacking * r[:, None]).sum(axis=(2, 3)))
+            away = slots.color - self.mean[slots.shape][:, :, None, None]
+            away = np.where(self._gradient[slots.shape][:, None, None, None], away, 0)
+            pull = slots.pull + slots.weight[:, None] * away
+            np.add.at(slope, slots.shape, (pull * r[:, None]).sum(axis=(2, 3)))
         middle = radii[:, 0] / self._weight
         spread = np.maximum(radii[:, 1] / self._weight - middle**2, 0) + RIDGE
         slope -= middle[:, None] * self._pull
         gain[chosen] = ((slope**2).sum(axis=1) / (self._weight * spread * self._values))[chosen]
         slope /= (self._weight * spread)[:, None]
-        reach = REACH * np.sqrt(spread)
+        reach = HALF_LENGTH * np.sqrt(spread)
         first, last = np.maximum(middle - reach, 0), middle + reach
         ends = (self.flat + (end - middle)[:, None] * slope for end in (first, last))
         axis = np.stack([self._half * last, np.zeros(count)], axis=1)
@@ -203,28 +214,23 @@ class Survey:
 
 
 def _powers(places: Floats) -> Floats:
-    """The powers 0 to 4 of places (slot, place), shape (slot, power, place)."""
+    """Return the powers 0 to 4 of places (slot, place), shape (slot, power, place)."""
     squares = places * places
     return np.stack([np.ones_like(places), places, squares, squares * places, squares * squares], axis=1)
 
 
 def _summed(x: Floats, values: FloatArray, y: Floats) -> Floats:
-    """Sums of values (..., k, m) with weights x (..., i, k) and y (..., j, m), shape (..., i, j)."""
+    """Return sums of values (..., k, m) with weights x (..., i, k) and y (..., j, m), shape (..., i, j)."""
     return linear.product(linear.product(x, values), np.swapaxes(y, -2, -1))
 
 
-def _off(slots: Slots, gradient: Bools, mean: Floats) -> Floats:
-    """Colours of gradients less their mean, else 0; (slot, 3, TILE, TILE)."""
-    away = slots.color - mean[slots.shape][:, :, None, None]
-    return np.where(gradient[slots.shape][:, None, None, None], away, 0)
-
-
 def _turned(axis: Floats) -> Floats:
+    """Return axes turned by a right angle, which gives frames of circles."""
     return np.stack([-axis[:, 1], axis[:, 0]], axis=1)
 
 
 def _ramps(gain: Floats, frames: Floats, first: Floats, low: Floats, high: Floats) -> Ramps:
-    """``first``: offset of the first stop, shape (shape,); the other is at 1."""
+    """Return ramps with stops at ``first``, shape (shape,), and at 1, of the colours ``low`` and ``high``."""
     offsets = np.stack([first, np.ones(len(first))], axis=1)
     colors = np.clip(np.stack([low, high], axis=1), 0, 1)
     return Ramps(gain, *(np.asarray(values, np.float32) for values in (frames, offsets, colors)))
@@ -235,12 +241,12 @@ BASIS = (((0, 0),), ((1, 0),), ((0, 1),), ((2, 0), (0, 2)))
 
 
 def _by_basis(sums: Floats) -> Floats:
-    """Sums by colour and powers, (shape, 3, power, power) -> by basis and colour, (shape, 4, 3)."""
+    """Return sums by colour and powers, (shape, 3, power, power), by basis and colour, (shape, 4, 3)."""
     return np.stack([sum(sums[:, :, i, j] for i, j in terms) for terms in BASIS], axis=1)
 
 
 def _gram(moments: Floats) -> Floats:
-    """Sums by powers, (shape, power, power) -> of products of the basis, (shape, 4, 4)."""
+    """Return sums by powers, (shape, power, power), as those of products of the basis, (shape, 4, 4)."""
     products = [
         sum(moments[:, i + k, j + m] for i, j in one for k, m in other) for one in BASIS for other in BASIS
     ]

@@ -1,16 +1,16 @@
-"""What a byte is worth: the exchange rate of error and file size."""
+"""Exchange rate between error and file size."""
 
 from __future__ import annotations
 
 from warpsplat.portable import elementary
 
 DB_PER_DOUBLING = 1.8
-"""What twice the shapes, and so twice the bytes, gain on photographs [dB] (docs/experiments.md)."""
+"""Gain from twice the shapes, and so twice the bytes, on photographs [dB] (docs/experiments.md)."""
 
 
 def byte_worth(square_error: float, size: int) -> float:
-    """What the mean squared error may grow by for each byte saved of a file with ``size`` bytes.
+    """Return by how much the mean squared error may grow for each byte saved of a file with ``size`` bytes.
 
-    Shapes bought with the byte would lower it by as much: d error / d size at ``DB_PER_DOUBLING``.
+    Shapes bought with that byte would lower the error as much: -d error / d size at ``DB_PER_DOUBLING``.
     """
     return square_error * DB_PER_DOUBLING * elementary.LN10 / (10 * elementary.LN2 * size)

@@ -43,17 +43,17 @@ def step_content(step: Step) -> Content:
         "began": step.began,
         "curves": step.settings.curves,
         "per_pixel": state.per_pixel,
-        "settled": state.settled,
+        "settled": state.opacities_frozen,
         "rounding": state.rounding,
-        "renewed": state.renewed,
+        "renewed": state.recovered,
         "colored": state.colored == state.parameters.revision,
         "generator": state.rng.bit_generator.state,
         "room": [_room(renderer) for renderer in step.renderers],
     }
     arrays = parameter_arrays(state.parameters)
-    if step.aim.moved:
+    if step.loss_target.changed:
         viewport = step.target.viewport
-        arrays["target"] = from_tiles(step.aim.target.numpy(), viewport.width, viewport.height)
+        arrays["target"] = from_tiles(step.loss_target.target.numpy(), viewport.width, viewport.height)
     return Content(numbers, arrays)
 
 
@@ -95,9 +95,9 @@ def step_from(
         done,
         real(numbers, "per_pixel", 1e-3, FINEST),
         base=base,
-        settled=flag(numbers, "settled"),
+        opacities_frozen=flag(numbers, "settled"),
         rounding=flag(numbers, "rounding"),
-        renewed=whole(numbers, "renewed", 0, MOST_RENEWED),
+        recovered=whole(numbers, "renewed", 0, MOST_RENEWED),
         colored=parameters.revision if flag(numbers, "colored") else -1,
     )
     step = Step(state, settings, target(settings, done - 1), began=whole(numbers, "began", 0, done))
@@ -107,7 +107,7 @@ def step_from(
     for renderer, room in zip(step.renderers, rooms, strict=True):
         _take_room(renderer, room)
     if "target" in content.arrays:
-        step.aim.at(_target(content.arrays, step.target.image))
+        step.loss_target.assign(_target(content.arrays, step.target.image))
     step.record()
     return step
 

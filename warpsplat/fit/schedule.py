@@ -1,4 +1,4 @@
-"""What happens when: image sizes, number of shapes, thresholds, turns."""
+"""Schedules over a run: image sizes, number of shapes and points, thresholds."""
 
 from __future__ import annotations
 
@@ -9,74 +9,79 @@ from warpsplat.fit.settings import Density, Settings
 from warpsplat.portable import elementary
 
 SIZE_CHOICES = 12
-"""How many lengths of the shorter side are tried for a reduced image."""
+"""Lengths of the shorter side that are tried for a reduced image."""
 
-SLACK = 2.0
-"""``Phase.slack`` of a run: a fifth fewer edges, and 0.08 px cost no more than what a viewer rounds."""
+TRAINING_SLACK = 2.0
+"""``Phase.slack`` of a run: saves a fifth of the edges; 0.08 px is no more than what a viewer rounds."""
 
 CHECK_INTERVAL = 10
-"""Steps between two looks at the loss and the counters of the device."""
+"""Steps between two reads of the loss and of the device's counters."""
 
-LOOK_FROM = 0.75
-"""Fraction of a run from which on the file is looked at."""
+EVALUATE_FROM = 0.75
+"""Share of the run after which the file is evaluated."""
 
-LOOK_INTERVAL = 50
-"""Steps between two looks at the file as a viewer shows it."""
+EVALUATE_INTERVAL = 50
+"""Steps between two evaluations of the file as a viewer shows it."""
 
 REPAINT_SHARE = 0.1
-"""Of a run, from one look for gradients to the next: a look takes as long as several steps."""
+"""Share of the run between two searches for gradients, which take as long as several steps."""
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of steps at one image size."""
+    """Consecutive steps at one image size."""
 
     width: int
     height: int
-    slack: float = SLACK
-    """How much further from the curves their polylines may be than in the file."""
+    slack: float = TRAINING_SLACK
+    """Tolerance of the polylines that stand for curves, over that of the file."""
 
 
 def phases(settings: Settings, width: int, height: int) -> list[Phase]:
-    """Coarse, then fine, from ``settings.coarse`` of the iterations on; one where both are the same size."""
-
-    def fit(pixels: int) -> tuple[int, int]:
-        if pixels >= width * height:
-            return width, height
-        # One scale serves both sides, so that of the sizes a little smaller the one is taken where the longer
-        # side is the nearest to a whole number: the largest of those that are equally near.
-        short, long = min(width, height), max(width, height)
-        most = max(1, round(short * math.sqrt(pixels / (width * height))))
-        choices = range(most, max(0, most - SIZE_CHOICES), -1)
-        best = min(choices, key=lambda n: round(abs(long * n / short - round(long * n / short)), 2))
-        other = round(long * best / short)
-        return (best, other) if width <= height else (other, best)
-
-    coarse, fine = fit(settings.coarse_pixels), fit(settings.fine_pixels)
+    """Return the coarse and, from ``settings.coarse`` of the run on, the fine phase; one if they agree."""
+    coarse = _reduced_size(width, height, settings.coarse_pixels)
+    fine = _reduced_size(width, height, settings.fine_pixels)
     return [Phase(*fine)] if coarse == fine else [Phase(*coarse), Phase(*fine)]
 
 
+def _reduced_size(width: int, height: int, pixels: int) -> tuple[int, int]:
+    """Return the size of an image reduced to about ``pixels``.
+
+    One scale serves both sides, so of several lengths of the shorter side the one is taken for which the
+    longer one is nearest to a whole number; of equally near ones the largest.
+    """
+    if pixels >= width * height:
+        return width, height
+    short, long = min(width, height), max(width, height)
+    most = max(1, round(short * math.sqrt(pixels / (width * height))))
+    choices = range(most, max(0, most - SIZE_CHOICES), -1)
+    best = min(choices, key=lambda n: round(abs(long * n / short - round(long * n / short)), 2))
+    other = round(long * best / short)
+    return (best, other) if width <= height else (other, best)
+
+
 def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
-    """The phase that the step after ``step`` steps belongs to."""
+    """Return the phase of the step after ``step`` steps."""
     return plan[0] if step < settings.coarse * settings.iterations else plan[-1]
 
 
 def fold_weight(settings: Settings, step: int) -> float:
-    """Weight of the fold loss; it grows geometrically over the run."""
+    """Return the weight of the fold loss, which grows geometrically over the run."""
     growth = settings.fold_end / settings.fold_start
     return float(settings.fold_start * elementary.power(growth, step / settings.iterations))
 
 
 def opacity_threshold(density: Density, progress: float) -> float:
-    """Falls linearly with ``progress`` (fraction of the run) until the set of shapes is fixed."""
+    """Return the opacity below which shapes are pruned after ``progress`` (share of the run)."""
     t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0
     return density.opacity_start + t * (density.opacity_end - density.opacity_start)
 
 
 def shapes_at(settings: Settings, step: int) -> int:
-    """Shapes that a run should have after the turn at ``step``; at 0, those to start with.
+    """Return the number of shapes after the densification step at ``step``; at 0, the number to start with.
 
-    All of them from ``grown`` on, and at the last turn in any case.
+    It grows to a surplus until ``density.grown`` and falls from ``density.thin`` on; after the last
+    densification step it is ``settings.curves`` in any case.
     """
     density, steps = settings.density, settings.iterations
     if density.interval <= 0 or step + density.interval >= min(density.stop, 1.0) * steps:
@@ -91,7 +96,7 @@ def shapes_at(settings: Settings, step: int) -> int:
 
 
 def repaints_at(settings: Settings, step: int) -> bool:
-    """Whether the turn at ``step`` looks for gradients: one each REPAINT_SHARE of the run, and the last."""
+    """Return whether the densification step at ``step`` searches for gradients; the last one does."""
     density = settings.density
     if step + density.interval >= density.stop * settings.iterations:
         return True
@@ -100,8 +105,9 @@ def repaints_at(settings: Settings, step: int) -> bool:
 
 
 def mean_points_at(settings: Settings, step: int) -> float:
-    """Points that splines should have in the mean after the turn at ``step``: those of a new one until all
-    shapes are there, then fewer, down to ``density.mean_points`` at the last turn.
+    """Return the mean number of points of splines after the densification step at ``step``.
+
+    It is that of new splines until all shapes exist, then falls to ``density.mean_points``.
     """
     density, steps = settings.density, settings.iterations
     last = min(density.stop, 1.0) * steps - density.interval

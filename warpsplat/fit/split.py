@@ -1,4 +1,4 @@
-"""Strokes whose middle fades become two: one curve that spans what two should show (paper section 3.4)."""
+"""Splitting: a stroke that fades in the middle becomes two, as it spans two objects (paper section 3.4)."""
 
 from __future__ import annotations
 
@@ -7,47 +7,44 @@ import numpy.typing as npt
 
 from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Scene
 
-FADED = 0.5
-"""How much fainter than both ends a middle is that gives a stroke up."""
+MIN_FADE = 0.5
+"""Least difference in opacity between a stroke's middle and both ends at which it is split."""
 
-POINTS = 10
-"""Control points of the strokes that are split: of three cubics, each with an opacity of its own."""
+STROKE_POINTS = 10
+"""Control points of strokes that are split: of three cubics, each with an opacity of its own."""
 
 
 def opacities_by_third(scene: Scene) -> FloatArray:
-    """Opacity of each third of each shape, shape (shape, 3)."""
+    """Return the opacity of each third of each shape, shape (shape, 3)."""
     return np.clip(scene.opacities[:, None] + scene.fades, 0, 1)
 
 
 def faded(scene: Scene) -> IndexArray:
-    """Strokes of three cubics of which the middle one is much fainter than both others."""
+    """Return the strokes of three cubics whose middle one is much fainter than both others."""
     first, middle, last = opacities_by_third(scene).T
-    strokes = (scene.kind == Kind.STROKE) & (scene.basis == Basis.CUBIC) & (scene.point_counts() == POINTS)
-    return np.flatnonzero(strokes & (middle < np.minimum(first, last) - FADED))
+    strokes = (scene.kind == Kind.STROKE) & (scene.basis == Basis.CUBIC)
+    strokes &= scene.point_counts() == STROKE_POINTS
+    return np.flatnonzero(strokes & (middle < np.minimum(first, last) - MIN_FADE))
 
 
 def split(scene: Scene, index: IndexArray) -> Scene:
-    """The first and the last cubics of the strokes ``index``, each a stroke of three cubics: the same course,
-    two rows of the result for each of ``index``.
-    """
+    """Return the first and the last cubic of each of the strokes ``index``, each cut into three cubics."""
     strokes = np.repeat(np.asarray(index, np.intp), 2)
-    ends = np.tile([0, POINTS - 4], len(index))
+    ends = np.tile([0, STROKE_POINTS - 4], len(index))
     first = (scene.first[strokes] + ends)[:, None] + np.arange(4)
-    thirds = [_piece(scene.points[first], k / 3, (k + 1) / 3) for k in range(3)]
-    points = np.concatenate([thirds[0], thirds[1][:, 1:], thirds[2][:, 1:]], axis=1)
-    own = opacities_by_third(scene)[strokes, np.tile([0, 2], len(index))]
+    thirds = [_subcurve(scene.points[first], k / 3, (k + 1) / 3) for k in range(3)]
     return Scene.uniform(
         Kind.STROKE,
         scene.canvas,
-        points,
+        np.concatenate([thirds[0], thirds[1][:, 1:], thirds[2][:, 1:]], axis=1),
         colors=scene.colors[strokes],
-        opacities=own,
+        opacities=opacities_by_third(scene)[strokes, np.tile([0, 2], len(index))],
         widths=scene.widths[strokes],
     )
 
 
-def _piece(cubics: npt.NDArray[np.floating], a: float, b: float) -> npt.NDArray[np.floating]:
-    """The part of cubics [n, 4, 2] between the parameters ``a`` and ``b``, by their blossoms."""
+def _subcurve(cubics: npt.NDArray[np.floating], a: float, b: float) -> npt.NDArray[np.floating]:
+    """Return the part of cubics [n, 4, 2] between the parameters ``a`` and ``b``, by their blossoms."""
 
     def blossom(*at: float) -> npt.NDArray[np.floating]:
         p = cubics

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from warpsplat.fit.constraints import Keeper
+from warpsplat.fit.constraints import Projection
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Moments, Parameters
 from warpsplat.scene import Scene
@@ -40,18 +40,18 @@ class FitState:
     """Steps done."""
     per_pixel: float = GRIDS[-1]
     """Units of the file's view box a pixel."""
-    keeper: Keeper | None = None
-    """What outlines keep, where they have conditions."""
+    projection: Projection | None = None
+    """Onto the constraints of the outlines, if they have any."""
     base: int = 0
     """Shapes of earlier levels (``fit.layered``), which keep their number: the first ones."""
-    settled: bool = False
-    """Whether the opacities are rounded and held."""
+    opacities_frozen: bool = False
+    """Whether the opacities are rounded and frozen."""
     rounding: bool = False
     """Whether coordinates are being rounded and held, in stages."""
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: there was none."""
-    renewed: int = 0
-    """Times that a shape was set anew since a number of its was not finite (``fit.recover``)."""
+    recovered: int = 0
+    """Times that a shape was reset because a number was not finite (``fit.recover``)."""
 
     @staticmethod
     def start(

@@ -1,4 +1,4 @@
-"""A training step: render, compare, adjoint, update."""
+"""A training step: render, compare with the target, back-propagate, update."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from warpsplat.alpha import squares
 from warpsplat.fit import losses
 from warpsplat.fit.importance import weights_at
 from warpsplat.fit.levels import Level
-from warpsplat.fit.losses import Aim, LossInputs
+from warpsplat.fit.losses import LossInputs, LossTarget
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.schedule import Phase, fold_weight
 from warpsplat.fit.settings import Settings
@@ -25,16 +25,16 @@ from warpsplat.scene import FloatArray
 
 
 class Target:
-    """The image at the size of a phase, and what the error of its pixels counts."""
+    """The image at the size of a phase, with weights of its pixels."""
 
     def __init__(self, image: FloatArray, phase: Phase, weights: FloatArray | None = None) -> None:
-        """Both are reduced by area to the phase's size.
+        """Reduce the image and the weights to the phase's size, by area.
 
         Args:
             image: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
                 width, 4).
             phase: the size.
-            weights: of the pixels, shape (height, width) of any size and scale; without, all count alike.
+            weights: of the pixels, shape (height, width) of any size and scale; default: all equal.
         """
         self.phase = phase
         height, width = image.shape[:2]
@@ -48,19 +48,19 @@ class Target:
 
 
 def model_for(settings: Settings, step: int, slack: float = 1.0) -> Model:
-    """The settings' model of coverage, as it is after ``step`` steps, with a phase's ``slack``."""
+    """Return the coverage model of the settings after ``step`` steps, with a phase's ``slack``."""
+    if settings.renderer == "exact":
+        return ExactModel(slack=slack)
+    fold = fold_weight(settings, step)
     if settings.renderer == "splat":
-        return SplatModel(settings.through_scales, fold_weight(settings, step))
-    if settings.renderer == "gaussian":
-        fold = fold_weight(settings, step)
-        return GaussianModel(settings.softness, settings.gaussian_density, settings.through_scales, fold)
-    return ExactModel(slack=slack)
+        return SplatModel(settings.through_scales, fold)
+    return GaussianModel(settings.softness, settings.gaussian_density, settings.through_scales, fold)
 
 
 class Step:
-    """The launches of a step, recorded for the arrays of ``state`` as they are.
+    """The launches of a training step, recorded for the arrays of ``state`` as they are.
 
-    After surgery on the state a new one is made (``after_surgery``); this one then refuses to run.
+    When shapes come or go the arrays change: this step then refuses to run, ``rebuilt`` returns a new one.
     """
 
     def __init__(
@@ -70,57 +70,55 @@ class Step:
         target: Target,
         *,
         capacity: Capacity | None = None,
-        aim: Aim | None = None,
-        level_aim: Aim | None = None,
+        loss_target: LossTarget | None = None,
+        level_target: LossTarget | None = None,
         began: int | None = None,
     ) -> None:
-        """Without ``capacity``, the need is found by rendering.
+        """Allocate the renderers and record the launches.
 
-        ``level_aim``: what the pictures of the first levels are compared with; default: the image.
-        ``began``: steps that were done when it was made, if not those of now: weights go by that.
+        Args:
+            state: shapes, moments and counters.
+            settings: of the run.
+            target: what to fit, at the size of the phase.
+            capacity: of the renderer's arrays; default: as much as a first render needs.
+            loss_target: what renders are compared with; default: the image of ``target``.
+            level_target: what renders of earlier levels are compared with; likewise.
+            began: steps done when the step was first recorded, by which scheduled weights go; default: now.
         """
         self.state, self.settings, self.target = state, settings, target
         self.began = state.step if began is None else began
-        self.renderer = Renderer(
-            state.parameters,
-            target.viewport,
-            model=model_for(settings, self.began, target.slack),
-            capacity=capacity,
-        )
-        self.aim = aim or self._aim()
+        model = model_for(settings, self.began, target.slack)
+        self.renderer = Renderer(state.parameters, target.viewport, model=model, capacity=capacity)
+        self.loss_target = loss_target or self._image_target()
         if capacity is None:
             self.renderer.forward_complete()
-        ends = state.parameters.level_ends
-        self.level_aim = level_aim or (self._aim() if ends else None)
-        self.levels = [self._level(end, self.level_aim) for end in ends if self.level_aim]
+        self.level_target, self.levels = level_target, list[Level]()
+        if ends := state.parameters.level_ends:
+            shared = self.level_target = level_target or self._image_target()
+            self.levels = [Level.of(state, end, target.viewport, model, shared) for end in ends]
         self.record()
 
-    def _aim(self) -> Aim:
-        """At the image."""
-        return Aim(self.target.image, self.renderer.backend, self.target.viewport, self.target.weights)
-
-    def _level(self, end: int, aim: Aim) -> Level:
-        model = model_for(self.settings, self.began, self.target.slack)
-        return Level.of(self.state, end, self.target.viewport, model, aim)
+    def _image_target(self) -> LossTarget:
+        target = self.target
+        return LossTarget(target.image, self.renderer.backend, target.viewport, target.weights)
 
     def record(self) -> None:
         """Record the launches for the arrays and settings as they are now."""
         self.renderer.check_current()
-        backend, parameters = self.renderer.backend, self.state.parameters
+        backend, state = self.renderer.backend, self.state
+        inputs = LossInputs(self.renderer, self.loss_target, self.settings, state.clock)
         measure = backend.program("loss")
-        inputs = LossInputs(self.renderer, self.aim, self.settings, self.state.clock)
-        for record in losses.IMAGE_LOSSES:
-            record(measure, inputs)
+        for loss in losses.IMAGE_LOSSES:
+            loss.record(measure, inputs)
         update = backend.program("update")
-        for record_shapes in losses.SHAPE_LOSSES:
-            record_shapes(update, parameters, self.settings)
-        units = Units.of(self.settings, parameters.canvas)
-        keeper = self.state.keeper
-        if keeper:
-            keeper.record_adjoint(update)
-        record_adam(update, parameters, self.state.clock, self.settings, units)
-        if keeper:
-            keeper.record_project(update)
+        for loss in losses.SHAPE_LOSSES:
+            loss.record(update, inputs)
+        if state.projection:
+            state.projection.record_adjoint(update)
+        units = Units.of(self.settings, state.parameters.canvas)
+        record_adam(update, state.parameters, state.clock, self.settings, units)
+        if state.projection:
+            state.projection.record(update)
         self.programs: tuple[Program, ...] = (
             self.renderer.forward_program,
             measure,
@@ -141,7 +139,7 @@ class Step:
         self.state.step += 1
 
     def time(self, count: int) -> None:
-        """Render, compare and adjoint ``count`` times, without an update; for timing."""
+        """Render, compare and back-propagate ``count`` times without an update, to be timed."""
         self.renderer.check_current()
         for _ in range(count):
             for program in self.programs[:-1]:
@@ -150,76 +148,82 @@ class Step:
 
     @property
     def renderers(self) -> tuple[Renderer, ...]:
-        """Of the whole picture, and of the levels'."""
+        """The renderer of the whole scene, and those of the levels."""
         return (self.renderer, *(level.renderer for level in self.levels))
 
-    def make_room(self) -> None:
-        """Where the last steps ran out of capacity, go on with larger arrays."""
+    def ensure_capacity(self) -> None:
+        """Enlarge arrays that were too small in the last steps."""
         grown = [renderer.make_room() for renderer in self.renderers]
         if any(grown):
             self.record()
 
     def render(self) -> None:
-        """Render what there is now, all of it."""
+        """Render the current shapes without leaving any out."""
         if self.renderer.forward_complete():
             self.record()
 
     def configure(self, settings: Settings) -> None:
-        """Go on with other settings."""
+        """Continue with other settings."""
         self.settings = settings
         self.record()
 
-    def after_surgery(self) -> Step:
-        """A step for the state's new arrays, at the same size."""
+    def rebuilt(self) -> Step:
+        """Return a step for the state's new arrays, at the same size."""
         return Step(
             self.state,
             self.settings,
             self.target,
             capacity=self.renderer.capacity,
-            aim=self.aim,
-            level_aim=self.level_aim,
+            loss_target=self.loss_target,
+            level_target=self.level_target,
         )
 
+    def removal_costs(self) -> FloatArray:
+        """Return by how much the last render's squared error grows without each shape, shape (shape,)."""
+        return self.renderer.removal_costs(self.loss_target.target, self.loss_target.importance)
+
     def square_error(self) -> float:
-        """Mean squared error of the last render against what it is compared with. Reads the render back."""
-        difference = self.renderer.film.buffers.image.numpy() - self.aim.target.numpy()
+        """Return the mean squared error of the last render against the loss target. Reads the render back."""
+        difference = self.renderer.film.buffers.image.numpy() - self.loss_target.target.numpy()
         errors = squares(difference, axis=1) * self.renderer.film.buffers.inside.numpy()
-        return float(errors.sum(dtype="float64")) / self.aim.value_count
+        return float(errors.sum(dtype="float64")) / self.loss_target.value_count
 
     def measured_error(self) -> float:
-        """As ``square_error``, of the image only, summed up on the device: reads a number a tile back."""
+        """Return ``square_error`` as summed on the device. Reads a number per tile back."""
         self.programs[1].run()
-        return self.aim.mean_square()
+        return self.loss_target.mean_square()
 
-    def lacking(self) -> FloatArray:
-        """What the last render lacks of what it is compared with, by colour.
+    def residual(self) -> FloatArray:
+        """Return loss target - last render, by colour, shape (tile, 3, TILE, TILE).
 
-        Of a transparent picture, the mean of what it lacks on black and on white. Copies both to the host.
-
-        Returns:
-            shape (tile, 3, TILE, TILE).
+        On a transparent canvas, the mean of the residuals on black and on white. Copies both to the host.
         """
-        lacking = self.aim.target.numpy() - self.renderer.film.buffers.image.numpy()
-        if lacking.shape[1] == 4:
-            lacking = lacking[:, :3] - 0.5 * lacking[:, 3:]
-        return np.asarray(lacking, np.float32)
+        residual = self.loss_target.target.numpy() - self.renderer.film.buffers.image.numpy()
+        if residual.shape[1] == 4:
+            residual = residual[:, :3] - 0.5 * residual[:, 3:]
+        return np.asarray(residual, np.float32)
 
     def weights(self) -> FloatArray:
-        """What the error of each pixel counts, 0 outside of the image, shape (tile, TILE, TILE)."""
-        weights = self.aim.importance if self.aim.weighted else self.renderer.film.buffers.inside
+        """Return the weight of each pixel's error, 0 outside the image, shape (tile, TILE, TILE)."""
+        target = self.loss_target
+        weights = target.importance if target.weighted else self.renderer.film.buffers.inside
         return np.asarray(weights.numpy(), np.float32)
 
     def psnr(self) -> float:
-        """What the loss of the last step stands for, at its size [dB]: the render's PSNR, and from the first
-        look at the file on, an estimate of the file's. Reads a number a tile back from the device.
+        """Return the PSNR of the last step's loss, at its size [dB]: that of the render, or once the file has
+        been evaluated an estimate of the file's. Reads a number per tile back.
         """
-        return -10 * float(elementary.log10(max(self.aim.mean_square(), 1e-12)))
+        return _decibels(self.loss_target.mean_square())
 
     def render_psnr(self) -> float:
-        """Of the last render against the image, at its size [dB]. Reads the render back from the device."""
-        error = squares(self.renderer.read_image() - self.target.image).mean(dtype="float64") / 3
-        return -10 * float(elementary.log10(max(error, 1e-12)))
+        """Return the PSNR of the last render against the image, at its size [dB]. Reads the render back."""
+        difference = squares(self.renderer.read_image() - self.target.image)
+        return _decibels(difference.mean(dtype="float64") / 3)
 
     def snapshot(self) -> Snapshot:
-        """What there is now, for people to look at."""
+        """Return the current shapes and render, for people to look at."""
         return Snapshot(self.state.scene, self.renderer.read_image, self.state.past)
+
+
+def _decibels(error: float) -> float:
+    return -10 * float(elementary.log10(max(error, 1e-12)))

@@ -1,4 +1,4 @@
-"""What the units of the table of attributes are worth in a run."""
+"""Conversion of the units in the table of attributes to canvas units."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from warpsplat.scene import Canvas, Unit
 
 @dataclass(frozen=True)
 class Units:
-    """Canvas units of one of each unit."""
+    """Length of each unit in canvas units."""
 
     pixel: float
-    """A step is counted in pixels of the finest training size, whatever the size of the image."""
+    """A pixel of the finest training size, so that learning rates do not depend on the image's size."""
     canvas: float
 
     @staticmethod
     def of(settings: Settings, canvas: Canvas) -> Units:
-        """For a run with ``settings`` on ``canvas``."""
+        """Return the units of a run with ``settings`` on ``canvas``."""
         finest = phases(settings, canvas.width, canvas.height)[-1]
         return Units(canvas.width / finest.width, float(max(canvas.width, canvas.height)))
 
     def resolve(self, value: float, unit: Unit) -> float:
-        """``value`` in canvas units, or as it is where it has none."""
+        """Return ``value`` in canvas units; a value without a unit stays as it is."""
         return value * {Unit.ONE: 1.0, Unit.PIXEL: self.pixel, Unit.CANVAS: self.canvas}[unit]

@@ -12,14 +12,14 @@ import numpy.typing as npt
 
 from warpsplat.fit.afford import STYLE_BYTES
 from warpsplat.fit.costs import PIXELS, Course, score_cost, turn_cost
-from warpsplat.fit.density import densify
 from warpsplat.fit.export import finished
+from warpsplat.fit.grow import new_shapes
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.rounding import STAGES, stage_steps
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.simplify import LEAST_POINTS, simplify
+from warpsplat.fit.simplify import MIN_SPLINE_POINTS, simplify
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
@@ -158,13 +158,13 @@ class Pursuit:
         step = Step(FitState.start(scene, self.backend, rng), settings, target)
         sizes = path_sizes(scene, base.fit.per_pixel)
         if wanted < base.size:
-            seen = step.renderer.removal_costs(step.aim.target, step.aim.importance)
+            seen = step.removal_costs()
             scene = smaller(scene, seen, sizes, base.size - wanted)
         else:
             count = min(math.ceil((wanted - base.size) / sizes.mean()), settings.curves - len(scene))
             if count > 0:
                 image = step.renderer.read_image()
-                scene = scene.append(densify(settings, scene, target.image, image, count, rng, weights))
+                scene = scene.append(new_shapes(settings, scene, target.image, image, count, rng, weights))
         if len(scene) <= FEW and self.image.shape[2] == 3 and self.may_choose_ground:
             scene = grounded(scene, self.image, self.backend)
         return fit(
@@ -197,7 +197,7 @@ def smaller(scene: Scene, seen: FloatArray, sizes: npt.NDArray[np.int64], excess
     left = excess - (float(removed[count - 1]) if count else 0.0)
     kept = np.sort(order[count:])
     counts = scene.point_counts()
-    splines = kept[(scene.basis[kept] == Basis.SPLINE) & (counts[kept] > LEAST_POINTS)]
+    splines = kept[(scene.basis[kept] == Basis.SPLINE) & (counts[kept] > MIN_SPLINE_POINTS)]
     if not len(splines):  # nothing less than a shape can go
         return scene.take(np.sort(order[min(count + 1, len(scene) - 1) :]))
     a_point = (sizes[splines].mean() - STYLE_BYTES[Kind.FILL]) / (counts[splines].mean() + 2)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import CapacityError
-from warpsplat.fit.losses import Aim
+from warpsplat.fit.losses import LossTarget
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Renderer
@@ -97,7 +97,7 @@ def decibels(scene: Scene, target: FloatArray, backend: Backend) -> list[float |
     try:
         renderer = Renderer(Parameters(scene, backend), viewport)
         renderer.forward_complete()
-        costs = renderer.removal_costs(Aim(target, backend, viewport).target)
+        costs = renderer.removal_costs(LossTarget(target, backend, viewport).target)
         error = _squared_error(renderer.read_image() - target) + ROUNDING
     except CapacityError:
         return None

@@ -1,0 +1,159 @@
+"""Growth: new shapes on the components of the error (paper section 3.4 and appendix B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.alpha import squares, straight
+from warpsplat.fit.elongated import ComponentBars
+from warpsplat.fit.place import ShapeFactory, pixel_of, shape_angles
+from warpsplat.fit.settings import Settings
+from warpsplat.portable import elementary, filters
+from warpsplat.scene import FloatArray, Scene
+
+ERROR_LEVELS = 8
+"""Levels that the error map is quantised to."""
+
+TOP_QUANTILE = 0.995
+"""Quantile of the error that the highest level begins at: single pixels do not set the scale."""
+
+RADIUS_RATIO = 1.2
+"""Radius of a new shape over that of the largest circle in its component of the error."""
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Places for new shapes, lengths in pixels; each array has shape (candidate,) but ``centres``."""
+
+    centres: FloatArray
+    """Shape (candidate, 2)."""
+    radii: FloatArray
+    """Of a circle, for a fill."""
+    masses: FloatArray
+    """Error that a shape would cover."""
+    angles: FloatArray
+    """Of a stroke [rad]."""
+    lengths: FloatArray
+    """Of a stroke; 0 for a fill."""
+    widths: FloatArray
+    """Of a stroke."""
+
+
+def new_shapes(
+    settings: Settings,
+    scene: Scene,
+    target: FloatArray,
+    image: FloatArray,
+    count: int,
+    rng: np.random.Generator,
+    weights: FloatArray | None = None,
+) -> Scene:
+    """Return ``count`` shapes on the components of the quantised error map, the largest error first.
+
+    Where there are too few components, the others are placed at random, in proportion to the error.
+
+    Args:
+        settings: of the run.
+        scene: the current shapes, for the canvas.
+        target: the image, shape (height, width, 3 or 4).
+        image: the render, of the same shape; both may be smaller than the canvas.
+        count: number of shapes.
+        rng: for random places.
+        weights: of the pixels' errors, shape (height, width); default: all equal.
+    """
+    unit = scene.canvas.width / target.shape[1]
+    total = squares(image - target)
+    weighted = total if weights is None else weights * total
+    error = np.asarray(filters.gaussian_blur(weighted, 1.0), np.float32)
+    found = candidates(error, mixed=settings.mixed)
+    chosen = _without_overlap(found, error.shape, count)
+    places, radii = found.centres[chosen], np.maximum(RADIUS_RATIO * found.radii[chosen], 1.5)
+    missing = count - len(chosen)
+    if missing > 0:
+        weight = error.ravel().astype(np.float64) + 1e-12
+        picked = rng.choice(len(weight), missing, p=weight / weight.sum())
+        row, column = np.divmod(picked, target.shape[1])
+        places = np.concatenate([places, np.stack([column + 0.5, row + 0.5], axis=1)]).astype(np.float32)
+        radii = np.concatenate([radii, np.full(missing, 2.0, np.float32)])
+    column, row = pixel_of(places, target)
+    colors = straight(np.asarray(filters.gaussian_blur(target, 1.0)[row, column], np.float32))
+    angles = shape_angles(settings, target, places, 2.0)
+    factory = ShapeFactory(settings, scene.canvas)
+    shapes = factory.place(places * unit, np.pi * (radii * unit) ** 2, angles, colors)
+    long = np.flatnonzero(found.lengths[chosen])
+    if not len(long):
+        return shapes
+    bars = np.array(chosen)[long]
+    lengths, widths = found.lengths[bars] * unit, np.maximum(found.widths[bars], 1.0) * unit
+    strokes = factory.place_strokes(places[long] * unit, lengths, widths, found.angles[bars], colors[long])
+    order = np.arange(count)
+    order[long] = count + np.arange(len(long))
+    return shapes.append(strokes).take(order)
+
+
+def candidates(error: FloatArray, *, mixed: bool) -> Candidates:
+    """Return the components of the error map's level sets as candidates.
+
+    A component becomes its largest inscribed circle: a shape there covers error only, however branched the
+    component is. If shapes may be ``mixed``, it becomes a stroke where that covers more.
+    """
+    top = max(float(np.quantile(error, TOP_QUANTILE)), 1e-12)
+    levels = [_level_set(error, top * level / ERROR_LEVELS, mixed) for level in range(1, ERROR_LEVELS)]
+    arrays = [np.concatenate([getattr(found, f.name) for found in levels]) for f in fields(Candidates)]
+    return Candidates(*arrays)
+
+
+def _level_set(error: FloatArray, threshold: float, mixed: bool) -> Candidates:
+    """Return the components of the pixels whose error is at least ``threshold``."""
+    inside = error >= threshold
+    mask = inside.view(np.uint8)
+    number, labels = cv2.connectedComponents(mask, connectivity=4)
+    # Padded, so that the border of the image bounds a circle as well.
+    depth = filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
+    # The deepest pixel of a component has no deeper neighbour; of several the last is taken.
+    peak = np.flatnonzero(inside & (depth >= cv2.dilate(depth, np.ones((3, 3)))))
+    peak = peak[np.argsort(depth.ravel()[peak], kind="stable")]
+    deepest = np.zeros(number, np.intp)
+    deepest[labels.ravel()[peak]] = peak
+    row, column = np.divmod(deepest[1:], error.shape[1])
+    pixel = np.flatnonzero(inside)
+    label = labels.ravel()[pixel]
+    size = np.bincount(label, minlength=number)[1:]
+    mass = np.bincount(label, weights=error.ravel()[pixel], minlength=number)[1:]
+    radius = depth[row, column]
+    share = np.minimum(1.0, np.pi * radius**2 / size)
+    centre = np.stack([column + 0.5, row + 0.5], axis=1)
+    stroke: list[npt.NDArray[Any]] = [np.zeros(len(radius))] * 3
+    if mixed:
+        bars = ComponentBars.of(*np.divmod(pixel, error.shape[1]), label, number)
+        long = bars.exceed(share)
+        share = np.where(long, bars.shares, share)
+        centre = np.where(long[:, None], bars.centres, centre)
+        stroke = [bars.angles, np.where(long, bars.lengths, 0.0), bars.widths]
+    arrays = (centre, radius, mass * share, *stroke)
+    return Candidates(*(np.asarray(array, np.float32) for array in arrays))
+
+
+def _without_overlap(found: Candidates, size: tuple[int, ...], count: int) -> list[int]:
+    """Return at most ``count`` candidates, the largest error first, whose centres no earlier one covers."""
+    chosen: list[int] = []
+    covered = np.zeros(size, np.uint8)
+    for i in np.argsort(-found.masses, kind="stable").tolist():
+        if len(chosen) == count:
+            break
+        x, y = int(found.centres[i, 0]), int(found.centres[i, 1])
+        if covered[y, x]:
+            continue
+        chosen.append(i)
+        if not found.lengths[i]:
+            cv2.circle(covered, (x, y), max(1, round(float(found.radii[i]))), 1, -1)
+            continue
+        angle, half = float(found.angles[i]), float(found.lengths[i]) / 2
+        dx, dy = round(half * float(elementary.cos(angle))), round(half * float(elementary.sin(angle)))
+        cv2.line(covered, (x - dx, y - dy), (x + dx, y + dy), 1, max(1, round(float(found.widths[i]))))
+    return chosen
