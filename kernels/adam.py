@@ -7,7 +7,6 @@ from warpsplat.kernels.elementary import power, sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-NONE = wp.constant(constants.NONE)
 BETA1 = wp.constant(0.9)
 BETA2 = wp.constant(0.99)
 EPSILON = wp.constant(1.0e-12)  # the gradients of a mean over 10^6 pixels are about 1e-7
@@ -53,7 +52,7 @@ def tie_twins(
     """Two rows that are one point get the gradient of both, and move as one."""
     i = offset + wp.tid()
     j = point_twin[i]
-    if j != NONE:
+    if j != constants.NONE:
         both = points_grad[i] + points_grad[j]
         points_grad[i] = both
         points_grad[j] = both

@@ -8,7 +8,6 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-CUBIC = wp.constant(constants.CUBIC)
 
 control_points: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float32)
 """The control points of a cubic, a row each."""
@@ -72,7 +71,7 @@ def bezier_points(
     """Bézier ``local`` of a contour with ``count`` points from ``first`` on, as a cubic: of a spline, its
     quadratic with the degree elevated.
     """
-    if basis == CUBIC:
+    if basis == constants.CUBIC:
         i = first + 3 * local
         last = i + 3
         if 3 * local + 3 == count:
@@ -106,7 +105,7 @@ def add_bezier_grad(
     points_grad: wp.array[wp.vec2],
 ):
     """Adjoint of ``bezier_points``: add ``grad`` to the contour's control points."""
-    if basis == CUBIC:
+    if basis == constants.CUBIC:
         for j in range(4):
             i = first + (3 * local + j) % count
             points_grad[i] = points_grad[i] + grad[j]
@@ -131,7 +130,7 @@ def point_weight(
     """Weight of control point ``j`` of Bézier ``local`` where its cubic's have the weights ``w``, which sum
     to 1: the adjoint of ``bezier_points``.
     """
-    if basis == CUBIC:
+    if basis == constants.CUBIC:
         return w[j]
     before = chain_end(closed == 0 and local == 0) * (w[0] + w[1] / 3.0)
     after = chain_end(closed == 0 and local == count - 3) * (w[3] + w[2] / 3.0)

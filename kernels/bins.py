@@ -12,16 +12,6 @@ from warpsplat.kernels.ranges import find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FLAT = wp.constant(constants.FLAT)
-TILE = wp.constant(constants.TILE)
-INT_MAX = wp.constant(constants.INT_MAX)
-TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
-COVERED = wp.constant(constants.COVERED)
-FULL = wp.constant(constants.FULL)
-HIDDEN = wp.constant(constants.HIDDEN)
-STILL = wp.constant(constants.STILL)
-SAME = wp.constant(constants.SAME)
-
 
 @wp.kernel
 def rectangles(
@@ -49,11 +39,16 @@ def rectangles(
     x1 = int(0)
     y1 = int(0)
     # Written so that NaN positions give an empty rectangle.
-    if high[0] > 0.0 and high[1] > 0.0 and low[0] < float(TILE * tiles_x) and low[1] < float(TILE * tiles_y):
-        x0 = int(wp.max(low[0], 0.0)) / TILE
-        y0 = int(wp.max(low[1], 0.0)) / TILE
-        x1 = wp.min(int(wp.min(high[0], 1.0e8)) / TILE + 1, tiles_x)
-        y1 = wp.min(int(wp.min(high[1], 1.0e8)) / TILE + 1, tiles_y)
+    if (
+        high[0] > 0.0
+        and high[1] > 0.0
+        and low[0] < float(constants.TILE * tiles_x)
+        and low[1] < float(constants.TILE * tiles_y)
+    ):
+        x0 = int(wp.max(low[0], 0.0)) / constants.TILE
+        y0 = int(wp.max(low[1], 0.0)) / constants.TILE
+        x1 = wp.min(int(wp.min(high[0], 1.0e8)) / constants.TILE + 1, tiles_x)
+        y1 = wp.min(int(wp.min(high[1], 1.0e8)) / constants.TILE + 1, tiles_y)
     shape_tiles[shape, 0] = x0
     shape_tiles[shape, 1] = y0
     shape_tiles[shape, 2] = x1
@@ -82,7 +77,7 @@ def fill_slots(
     shape_count = front_ends.shape[0]
     front = find_range(front_ends, shape_count, slot)
     shape = int(-1)
-    tile = int(INT_MAX)
+    tile = int(constants.INT_MAX)
     if front < shape_count:
         candidate = shape_count - 1 - front
         if slot >= slot_first[candidate] and slot < slot_last[candidate]:
@@ -124,12 +119,12 @@ def tile_ranges(
     """A thread at each border between two keys writes the one's end and the other's start."""
     i = offset + wp.tid()
     tile = sort_keys[i]
-    if tile == INT_MAX:
+    if tile == constants.INT_MAX:
         return
     before = int(-1)
     if i > 0:
         before = sort_keys[i - 1]
-    after = int(INT_MAX)
+    after = int(constants.INT_MAX)
     if i + 1 < slot_capacity:
         after = sort_keys[i + 1]
     if before != tile:
@@ -170,23 +165,23 @@ def list_visible(
     for k in range(tile_first[tile], tile_last[tile]):
         slot = sort_slots[k]
         state = slot_state[slot]
-        if light <= TRANSMITTANCE_MIN:
-            slot_state[slot] = state | HIDDEN
-        elif state & COVERED != 0:
+        if light <= constants.TRANSMITTANCE_MIN:
+            slot_state[slot] = state | constants.HIDDEN
+        elif state & constants.COVERED != 0:
             shape = slot_shape[slot]
             list_paint[n] = shape_paint(paint, colors, opacities, shape)
             list_slot[n] = slot
-            if state == FULL:
+            if state == constants.FULL:
                 list_slot[n] = -1 - slot
                 shapes = 31 * shapes + shape + 1
-                if paint[shape] == FLAT:
+                if paint[shape] == constants.FLAT:
                     light *= 1.0 - wp.min(opacities[shape], most)
-            if state != FULL or paint[shape] != FLAT:
+            if state != constants.FULL or paint[shape] != constants.FLAT:
                 is_still = 0
             n += 1
     tile_stop[tile] = n
     still = int(0)
     if is_still == 1:
-        still = wp.where(shapes == tile_shapes[tile], SAME, STILL)
+        still = wp.where(shapes == tile_shapes[tile], constants.SAME, constants.STILL)
     tile_shapes[tile] = is_still * shapes
     tile_still[tile] = still

@@ -1,157 +1,128 @@
-"""Coverage -> image by front-to-back alpha blending (paper eq. 8, once a shape), and the adjoint.
+"""Coverage -> image by front-to-back alpha blending (paper eq. 8, once per shape), and kernels like it.
 
-alpha = opacity x coverage; C = sum_i c_i alpha_i prod_{j<i} (1 - alpha_j) + background x what is left.
-Both directions run front to back. The adjoint starts from total = dot(C, dL/dC), subtracts each shape's own
-share and so knows the share of all that lies behind, without stored lists:
-dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
-A coverage may come from splats or from any other model: this stage knows only the tiles' lists of visible
-slots. It takes the magnitude (an exact fill stores which way round it is as a sign), and 1 throughout a FULL
-slot. A flat paint comes with the lists; of a gradient (``composite_paint``) the colours of a slot's pixels
-lie in memory as its coverage does. A transparent canvas has a fourth plane: how opaque a pixel is, as a
-colour that all shapes have and the background has not. Images are arrays of tiles, planes and columns (see
-``warpsplat.tiles``).
+alpha = opacity x coverage; C = sum_i c_i alpha_i prod_{j<i} (1 - alpha_j) + background x transmittance, where
+the transmittance T_i = prod_{j<i} (1 - alpha_j) is the part of the light that reaches shape i. Coverage may
+come from splats or any other model: this stage knows only the tiles' lists of visible slots. It takes the
+magnitude (an exact fill stores its orientation as a sign), and 1 throughout a FULL slot. A flat paint comes
+with the lists, as colour and opacity; where that opacity is negative, the colours and opacities of the slot's
+pixels are in ``paint_columns``. On a transparent canvas the fourth plane is the opacity of each pixel, which
+is treated as a colour channel in which all shapes are 1 and the background is 0.
+
+The factories here, in ``composite_backward`` and in ``composite_opaque`` capture booleans; Warp drops the
+branches not taken. Scenes of flat paints on an opaque background have kernels of their own because the tests
+for other paints, made for each slot, cost a tenth of the time.
 """
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint.flat import paint_against, paint_times
+from warpsplat.kernels.paint.flat import paint_times
 from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-AREA = wp.constant(constants.AREA)
-TRANSMITTANCE_MIN = wp.constant(constants.TRANSMITTANCE_MIN)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
-SAME = wp.constant(constants.SAME)
 
 
-@wp.kernel
-def composite_forward(
-    # In:
-    offset: wp.int32,
-    lane_columns: wp.int32,  # columns of a tile that a thread handles
-    tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_stop: wp.array[wp.int32],  # [tile_count]
-    tile_still: wp.array[wp.int32],  # [tile_count]
-    list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
-    list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
-    coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    background: wp.vec3,
-    # Out:
-    image: wp.array3d[column],  # [tile_count, 3, TILE]
-):
-    """One thread a tile and lane. A tile that is the same as in the last pass stays as it is."""
-    i, lane = wp.tid()
-    tile = offset + i
-    if tile_still[tile] == SAME:
-        return
-    start = tile_first[tile]
-    stop = tile_stop[tile]
-    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        t = column(1.0)
-        red = column(0.0)
-        green = column(0.0)
-        blue = column(0.0)
-        for k in range(start, stop):
-            paint = list_paint[k]
-            slot = list_slot[k]
-            share = paint[3] * t
-            if slot >= 0:
-                share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
-            red = red + paint_times(paint, 0, share)
-            green = green + paint_times(paint, 1, share)
-            blue = blue + paint_times(paint, 2, share)
-            t = t - share
-        image[tile, 0, x] = red + background[0] * t
-        image[tile, 1, x] = green + background[1] * t
-        image[tile, 2, x] = blue + background[2] * t
+def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kernel:
+    """Return a kernel that composites each tile's list.
 
-
-@wp.kernel
-def composite_backward(
-    # In:
-    offset: wp.int32,
-    lane_columns: wp.int32,
-    tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_stop: wp.array[wp.int32],  # [tile_count]
-    tile_still: wp.array[wp.int32],  # [tile_count]
-    list_slot: wp.array[wp.int32],  # [slot_capacity]
-    list_paint: wp.array[wp.vec4],  # [slot_capacity]
-    coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    law: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-    image: wp.array3d[column],  # [tile_count, 3, TILE] of the forward pass
-    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
-    # Out:
-    sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
-    slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3) and opacity by pixel row: one lane
-    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
-):
-    """See the module. The gradient of s takes the place of the coverage, which is not needed any more: this
-    stage waits for memory. Tiles that are still have no gradient that is asked for.
+    Args:
+        name: of the kernel.
+        painted: whether there may be gradients and pictures, or a transparent canvas.
+        straight: whether the colours are to be straight, not premultiplied, as in DiffVG: the mean over the
+            pixel's area of the colours, black where nothing is. That is colour / opacity x hit; hit, the part
+            of the pixel that shapes lie on, is the sum of their coverages, at most 1, which compositing
+            underestimates where shapes meet.
     """
-    i, lane = wp.tid()
-    tile = offset + i
-    if tile_still[tile] != 0:
-        return
-    start = tile_first[tile]
-    stop = tile_stop[tile]
-    one = column(1.0)
-    zero = column(0.0)
-    least = column(TINY)
-    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        red = image_grad[tile, 0, x]
-        green = image_grad[tile, 1, x]
-        blue = image_grad[tile, 2, x]
-        behind = wp.cw_mul(image[tile, 0, x], red)
-        behind = behind + wp.cw_mul(image[tile, 1, x], green)
-        behind = behind + wp.cw_mul(image[tile, 2, x], blue)
-        t = one
-        for k in range(start, stop):
-            paint = list_paint[k]
-            slot = list_slot[k]
-            full = slot < 0
-            covered = one
-            signed = one
-            if full:
-                slot = -1 - slot
+    skips_cached = not straight
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def forward(
+        # In:
+        offset: wp.int32,
+        lane_columns: wp.int32,  # columns of a tile that a thread handles
+        tile_first: wp.array[wp.int32],  # [tile_count]
+        tile_stop: wp.array[wp.int32],  # [tile_count]
+        tile_still: wp.array[wp.int32],  # [tile_count]
+        list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
+        list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: see paint_columns
+        coverage: wp.array2d[column],  # [slot_capacity, TILE]
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity of each pixel
+        background: wp.vec3,
+        # Out:
+        image: wp.array3d[column],  # [tile_count, planes, TILE] colour, and opacity of a transparent canvas
+        hit: wp.array2d[column],  # [tile_count, TILE] part of a pixel that shapes lie on; straight only
+    ):
+        """One thread a tile and lane. A tile that is the same as in the last pass stays as it is."""
+        i, lane = wp.tid()
+        tile = offset + i
+        if skips_cached:
+            if tile_still[tile] == constants.SAME:
+                return
+        start = tile_first[tile]
+        stop = tile_stop[tile]
+        for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+            t = column(1.0)
+            red = column(0.0)
+            green = column(0.0)
+            blue = column(0.0)
+            if straight:
+                touched = column(0.0)
+            for k in range(start, stop):
+                paint = list_paint[k]
+                slot = list_slot[k]
+                if straight:
+                    opacity = wp.abs(paint[3])
+                    covered = column(1.0)
+                    if slot >= 0:
+                        covered = wp.abs(coverage[slot, x])
+                    if opacity > constants.SEEN:
+                        touched = touched + covered
+                    share = opacity * wp.cw_mul(covered, t)
+                else:
+                    share = wp.abs(paint[3]) * t
+                    if slot >= 0:
+                        share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
+                if painted:
+                    if paint[3] >= 0.0:
+                        red = red + paint_times(paint, 0, share)
+                        green = green + paint_times(paint, 1, share)
+                        blue = blue + paint_times(paint, 2, share)
+                    else:
+                        s = wp.max(slot, -1 - slot)
+                        share = wp.cw_mul(share, paint_columns[s, 3, x])
+                        red = red + wp.cw_mul(share, paint_columns[s, 0, x])
+                        green = green + wp.cw_mul(share, paint_columns[s, 1, x])
+                        blue = blue + wp.cw_mul(share, paint_columns[s, 2, x])
+                else:
+                    red = red + paint_times(paint, 0, share)
+                    green = green + paint_times(paint, 1, share)
+                    blue = blue + paint_times(paint, 2, share)
+                t = t - share
+            if straight:
+                one = column(1.0)
+                touched = wp.min(touched, one)
+                factor = wp.cw_div(touched, wp.max(one - t, constants.NOTHING * one))
+                image[tile, 0, x] = wp.cw_mul(red, factor)
+                image[tile, 1, x] = wp.cw_mul(green, factor)
+                image[tile, 2, x] = wp.cw_mul(blue, factor)
+                hit[tile, x] = touched
             else:
-                signed = coverage[slot, x]
-                covered = wp.abs(signed)
-            alpha = paint[3] * covered
-            share = wp.cw_mul(t, paint_against(paint, red, green, blue))
-            seen = wp.cw_mul(t, alpha)
-            behind = behind - wp.cw_mul(alpha, share)
-            # Where no light is left, only rounding is; Adam would make steps of it.
-            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
-            alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
-            t = t - seen
-            if not full:
-                # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.
-                slope = one - covered
-                if law == AREA:
-                    slope = wp.min(STEEP * slope, one)
-                    slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
-                sum_grad[slot, x] = paint[3] * wp.cw_mul(slope, alpha_grad)
-            red_grad = wp.cw_mul(seen, red)
-            green_grad = wp.cw_mul(seen, green)
-            blue_grad = wp.cw_mul(seen, blue)
-            opacity_grad = wp.cw_mul(covered, alpha_grad)
-            if lane_columns == 1:
-                slot_grad[slot, lane] = wp.vec4(
-                    total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
-                )
-            else:
-                if x > 0:
-                    red_grad = red_grad + slot_columns[slot, 0]
-                    green_grad = green_grad + slot_columns[slot, 1]
-                    blue_grad = blue_grad + slot_columns[slot, 2]
-                    opacity_grad = opacity_grad + slot_columns[slot, 3]
-                slot_columns[slot, 0] = red_grad
-                slot_columns[slot, 1] = green_grad
-                slot_columns[slot, 2] = blue_grad
-                slot_columns[slot, 3] = opacity_grad
+                image[tile, 0, x] = red + background[0] * t
+                image[tile, 1, x] = green + background[1] * t
+                image[tile, 2, x] = blue + background[2] * t
+            if painted:
+                if image.shape[1] == 4:
+                    image[tile, 3, x] = column(1.0) - t
+
+    return forward
+
+
+composite_forward = make_forward("composite_forward", painted=False)
+paint_forward = make_forward("paint_forward", painted=True)
+straight_forward = make_forward("straight_forward", painted=True, straight=True)
 
 
 @wp.kernel
@@ -205,7 +176,7 @@ def removal_cost(
                 slot = -1 - slot
             if paint[3] < 0.0:
                 seen = wp.cw_mul(seen, paint_columns[slot, 3, x])
-            lit = wp.min(wp.max(STEEP * (t - TRANSMITTANCE_MIN * one), zero), one)
+            lit = wp.min(wp.max(STEEP * (t - constants.TRANSMITTANCE_MIN * one), zero), one)
             t = t - seen
             red_seen = paint_times(paint, 0, seen)
             green_seen = paint_times(paint, 1, seen)
@@ -233,3 +204,36 @@ def removal_cost(
                 cost = cost + 0.5 * wp.cw_mul(blue_seen - d, blue_seen - d + blue_error - opaque_error)
             cost = wp.cw_mul(cost, wp.cw_mul(lit, importance[tile, x]))
             slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)
+
+
+@wp.kernel
+def visibility(
+    # In:
+    offset: wp.int32,
+    lane_columns: wp.int32,  # columns of a tile that a thread handles
+    tile_first: wp.array[wp.int32],  # [tile_count]
+    tile_stop: wp.array[wp.int32],  # [tile_count]
+    list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
+    list_paint: wp.array[wp.vec4],  # [slot_capacity] opacity last, negative of gradients
+    coverage: wp.array2d[column],  # [slot_capacity, TILE]
+    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] of gradients: opacity last
+    # Out:
+    seen: wp.array2d[column],  # [slot_capacity, TILE] written for slots on the lists; others kept
+):
+    """One thread a tile and lane."""
+    i, lane = wp.tid()
+    tile = offset + i
+    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+        t = column(1.0)
+        for k in range(tile_first[tile], tile_stop[tile]):
+            opacity = list_paint[k][3]
+            slot = list_slot[k]
+            share = wp.abs(opacity) * t
+            if slot >= 0:
+                share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
+            else:
+                slot = -1 - slot
+            if opacity < 0.0:
+                share = wp.cw_mul(share, paint_columns[slot, 3, x])
+            seen[slot, x] = share
+            t = t - share

@@ -15,7 +15,6 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-NONE = wp.constant(constants.NONE)
 MIN_LENGTH = wp.constant(1.0e-6)  # [canvas units] shorter ways have no direction
 MIN_HANDLE = wp.constant(0.05)  # [canvas units] a handle of length 0 would have none, and the joint a corner
 
@@ -139,9 +138,9 @@ def turn_backward(
     """What lines give their far ends, for the joints that they turn; a thread a point."""
     i = offset + wp.tid()
     g = points_grad[i]
-    if turned_by[i, 0] != NONE:
+    if turned_by[i, 0] != constants.NONE:
         g += joint_turn[turned_by[i, 0]]
-    if turned_by[i, 1] != NONE:
+    if turned_by[i, 1] != constants.NONE:
         g += joint_turn[turned_by[i, 1]]
     points_grad[i] = g
 
@@ -157,7 +156,7 @@ def lay(
     """Handles of lines at their thirds; a thread a point."""
     i = offset + wp.tid()
     j = line_end[i]
-    if j != NONE:
+    if j != constants.NONE:
         step = (points[j] - points[i]) / 3.0
         points[i + 1] = points[i] + step
         points[i + 2] = points[j] - step
@@ -175,12 +174,12 @@ def lay_backward(
     """Adjoint of ``lay``: ends get the shares of the handles; a thread a point."""
     i = offset + wp.tid()
     g = points_grad[i]
-    if line_end[i] != NONE:
+    if line_end[i] != constants.NONE:
         g += (2.0 * points_grad[i + 1] + points_grad[i + 2]) / 3.0
     j = line_start[i]
-    if j != NONE:
+    if j != constants.NONE:
         g += (points_grad[j + 1] + 2.0 * points_grad[j + 2]) / 3.0
-    if line_end[i] != NONE or j != NONE:
+    if line_end[i] != constants.NONE or j != constants.NONE:
         points_grad[i] = g
 
 

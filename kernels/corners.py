@@ -20,11 +20,7 @@ from warpsplat.kernels.ranges import find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-NONE = wp.constant(constants.NONE)
-STYLED = wp.constant(constants.STYLED)
-MITERED = wp.constant(constants.MITERED)
 TINY = wp.constant(1.0e-12)
-SHORT = wp.constant(constants.SEGMENT_MIN)
 
 
 @wp.func
@@ -32,7 +28,7 @@ def segment_direction(
     vertex: wp.array[wp.vec2], vertex_next: wp.array[wp.int32], segment: wp.int32
 ) -> wp.vec2:
     """Unit vector along a segment of the centre line; NONE has that of the x axis."""
-    if segment == NONE:
+    if segment == constants.NONE:
         return wp.vec2(1.0, 0.0)
     d = vertex[vertex_next[segment]] - vertex[segment]
     return d / wp.max(wp.length(d), TINY)
@@ -91,12 +87,12 @@ def place_corners(
     t = wp.vec2(1.0, 0.0)
     rotation = place[2]
     radius = place[3]
-    if after != NONE:
+    if after != constants.NONE:
         t = segment_direction(vertex, vertex_next, before)
         if after != before:
             turn = turn_between(t, segment_direction(vertex, vertex_next, after))
             rotation += place[1] * turn
-            if radius == MITERED:
+            if radius == constants.MITERED:
                 radius = miter_ratio(turn)
     direction = sine_and_cosine(rotation)
     x = direction[1]
@@ -130,18 +126,18 @@ def add_corner_grad(
         end_grad[before] = end_grad[before] + along * g
         if along != 1.0:
             d = vertex[vertex_next[before]] - vertex[before]
-            slide = wp.dot(g, d) / wp.max(wp.length(d), SHORT)
+            slide = wp.dot(g, d) / wp.max(wp.length(d), constants.SEGMENT_MIN)
             # Of the angle, of the length, and of what lies before.
             segment_grad[before] = segment_grad[before] - wp.vec3(0.0, slide * along, slide)
     if place[3] == 0.0:
         return 0.0
     side = corner[i] - corner_centre(vertex, vertex_next, before, along)
     outwards = wp.dot(side, g)
-    if after != NONE:
+    if after != constants.NONE:
         across = side[0] * g[1] - side[1] * g[0]
         second = place[1] * across
         first = across - second
-        if place[3] == MITERED:
+        if place[3] == constants.MITERED:
             t = segment_direction(vertex, vertex_next, before)
             turn = turn_between(t, segment_direction(vertex, vertex_next, after))
             half_turn = sine_and_cosine(0.5 * turn)
@@ -170,12 +166,12 @@ def add_segment_grads(
     behind = float(0.0)
     for k in range(last - first):
         i = last - 1 - k
-        if vertex_next[i] != NONE:
+        if vertex_next[i] != constants.NONE:
             grad = segment_grad[i]
             d = vertex[vertex_next[i]] - vertex[i]
             length = wp.length(d)
             # A shorter one has no direction and counts for no length.
-            if length >= SHORT:
+            if length >= constants.SEGMENT_MIN:
                 t = d / length
                 g = (grad[1] + behind) * t + (grad[0] / length) * wp.vec2(-t[1], t[0])
                 start_grad[i] = start_grad[i] - g
@@ -214,7 +210,7 @@ def corners_backward(
 ):
     """One thread a shape: edges of polygons -> segments of centre lines, and the width."""
     shape = offset + wp.tid()
-    if part[shape] != STYLED:
+    if part[shape] != constants.STYLED:
         return
     for i in range(vertex_first[shape], vertex_last[shape]):
         start_grad[i] = wp.vec2(0.0, 0.0)

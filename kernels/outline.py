@@ -17,18 +17,6 @@ from warpsplat.kernels.bezier import bezier_points, control_points, cubic_weight
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FILL = wp.constant(constants.FILL)
-NONE = wp.constant(constants.NONE)
-REACH_MAX = wp.constant(constants.REACH_MAX)
-FLATNESS = wp.constant(constants.FLATNESS)
-FLATNESS_STROKE = wp.constant(constants.FLATNESS_STROKE)
-STYLED = wp.constant(constants.STYLED)
-SLANT = wp.constant(constants.SLANT)
-CUBIC = wp.constant(constants.CUBIC)
-PIECES_MIN_SPLINE = wp.constant(constants.PIECES_MIN_SPLINE)
-PIECES_MIN = wp.constant(constants.PIECES_MIN)
-PIECES_MAX = wp.constant(constants.PIECES_MAX)
-
 
 @wp.func
 def bezier_of(
@@ -76,13 +64,13 @@ def plan_outline(
 ):
     """Pieces of each Bézier, one thread a shape: the polyline is slack x FLATNESS px off it at most."""
     shape = offset + wp.tid()
-    flatness = FLATNESS
-    if kind[shape] != FILL:
-        flatness = FLATNESS_STROKE
+    flatness = constants.FLATNESS
+    if kind[shape] != constants.FILL:
+        flatness = constants.FLATNESS_STROKE
     flatness *= slack
-    least = PIECES_MIN
-    if basis[shape] != CUBIC:
-        least = PIECES_MIN_SPLINE
+    least = constants.PIECES_MIN
+    if basis[shape] != constants.CUBIC:
+        least = constants.PIECES_MIN_SPLINE
     vertices = int(0)
     for bezier in range(bezier_first[shape], bezier_first[shape + 1]):
         contour = bezier_contour[bezier]
@@ -92,10 +80,12 @@ def plan_outline(
         wanted = wp.ceil(wp.sqrt(0.5 * scale * worst / flatness))
         is_end = local == 0 or bezier + 1 == contour_bezier[contour + 1]
         # Splines are smooth but for the ends of open ones.
-        if part[shape] == STYLED and (basis[shape] == CUBIC or (is_end and contour_closed[contour] == 0)):
+        if part[shape] == constants.STYLED and (
+            basis[shape] == constants.CUBIC or (is_end and contour_closed[contour] == 0)
+        ):
             slant = wp.max(turn_rate(p[1] - p[0], p[2] - p[1]), turn_rate(p[3] - p[2], p[2] - p[1]))
-            wanted = wp.max(wanted, 0.25 * scale * widths[shape] * slant / (SLANT * slack))
-        pieces = wp.clamp(int(wp.min(wp.ceil(wanted), 1.0e6)), least, PIECES_MAX)
+            wanted = wp.max(wanted, 0.25 * scale * widths[shape] * slant / (constants.SLANT * slack))
+        pieces = wp.clamp(int(wp.min(wp.ceil(wanted), 1.0e6)), least, constants.PIECES_MAX)
         bezier_vertex[bezier] = vertices
         bezier_pieces[bezier] = pieces
         vertices += pieces
@@ -109,7 +99,7 @@ def within_reach(x: wp.float32) -> wp.float32:
     """A coordinate that kernels may turn into an int: a file may hold any number."""
     if not wp.isfinite(x):
         return 0.0
-    return wp.clamp(x, -REACH_MAX, REACH_MAX)
+    return wp.clamp(x, -constants.REACH_MAX, constants.REACH_MAX)
 
 
 @wp.func
@@ -158,8 +148,8 @@ def outline_forward(
     if is_last and not closed:
         count += 1
     reach = float(0.0)
-    if kind[shape] != FILL:
-        reach = wp.min(0.5 * scale * widths[shape], REACH_MAX) + 1.0
+    if kind[shape] != constants.FILL:
+        reach = wp.min(0.5 * scale * widths[shape], constants.REACH_MAX) + 1.0
     for k in range(count):
         t = float(k) / float(pieces)
         position = weighted(p, fair_weights(t, pieces))
@@ -178,8 +168,8 @@ def outline_forward(
         extent[base + k] = wp.vec2(reach, reach)
     if is_last:
         start = vertex_first[shape] + bezier_vertex[contour_bezier[contour]]
-        if not closed and kind[shape] != FILL:
-            start = NONE
+        if not closed and kind[shape] != constants.FILL:
+            start = constants.NONE
         vertex_next[base + count - 1] = start
 
 
@@ -223,7 +213,7 @@ def outline_backward(
         latest = index / 3
         j = index % 3
         step = int(3)
-        if basis[shape] != CUBIC:
+        if basis[shape] != constants.CUBIC:
             latest = index + closed
             j = int(0)
             step = 1

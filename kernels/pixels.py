@@ -11,9 +11,6 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-TILE = wp.constant(constants.TILE)
-QUAD = wp.constant(constants.QUAD)
-
 
 @wp.kernel
 def tiles_to_pixels(
@@ -29,17 +26,17 @@ def tiles_to_pixels(
     """One thread four rows of pixels of a tile. Of three planes the opacity is 1."""
     i, part = wp.tid()
     tile = offset + i
-    y = tile / tiles_x * TILE + QUAD * part
-    x0 = tile % tiles_x * TILE
-    for x in range(wp.min(width - x0, TILE)):
-        k = QUAD * x + part
+    y = tile / tiles_x * constants.TILE + constants.QUAD * part
+    x0 = tile % tiles_x * constants.TILE
+    for x in range(wp.min(width - x0, constants.TILE)):
+        k = constants.QUAD * x + part
         red = image_quads[tile, 0, k]
         green = image_quads[tile, 1, k]
         blue = image_quads[tile, 2, k]
         opacity = wp.vec4(1.0, 1.0, 1.0, 1.0)
         if image_quads.shape[1] == 4:
             opacity = image_quads[tile, 3, k]
-        for j in range(QUAD):
+        for j in range(constants.QUAD):
             if y + j < height:
                 pixels[y + j, x0 + x] = wp.vec4(red[j], green[j], blue[j], opacity[j])
 
@@ -58,8 +55,8 @@ def pixels_to_tiles(
     """One thread four rows of pixels of a tile. Three planes leave the opacity out."""
     i, part = wp.tid()
     tile = offset + i
-    y = tile / tiles_x * TILE + QUAD * part
-    x0 = tile % tiles_x * TILE
+    y = tile / tiles_x * constants.TILE + constants.QUAD * part
+    x0 = tile % tiles_x * constants.TILE
     last = height - 1
     if y > last:
         return
@@ -70,8 +67,8 @@ def pixels_to_tiles(
     in1 = float(y1 - y)
     in2 = float(y2 - y1)
     in3 = float(y3 - y2)
-    for x in range(wp.min(width - x0, TILE)):
-        k = QUAD * x + part
+    for x in range(wp.min(width - x0, constants.TILE)):
+        k = constants.QUAD * x + part
         p0 = pixels[y, x0 + x]
         p1 = in1 * pixels[y1, x0 + x]
         p2 = in2 * pixels[y2, x0 + x]

@@ -6,14 +6,11 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-INT_MAX = wp.constant(constants.INT_MAX)
-COUNT_MAX = wp.constant(constants.COUNT_MAX)
-
 
 @wp.func
 def bounded_product(a: wp.int32, b: wp.int32) -> wp.int32:
     """``a`` times ``b`` as a count: from 0 to COUNT_MAX."""
-    return wp.int32(wp.clamp(wp.int64(a) * wp.int64(b), wp.int64(0), wp.int64(COUNT_MAX)))
+    return wp.int32(wp.clamp(wp.int64(a) * wp.int64(b), wp.int64(0), wp.int64(constants.COUNT_MAX)))
 
 
 @wp.func
@@ -53,7 +50,7 @@ def clip_ranges(
     end = ends[i]
     start = end - count[i]
     if end < 0 or start < 0:
-        wp.atomic_max(needed, 0, INT_MAX)
+        wp.atomic_max(needed, 0, constants.INT_MAX)
         start = int(0)
         end = int(0)
     if end > capacity:

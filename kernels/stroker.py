@@ -19,16 +19,6 @@ from warpsplat.kernels.elementary import sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-NONE = wp.constant(constants.NONE)
-STYLED = wp.constant(constants.STYLED)
-ROUND = wp.constant(constants.ROUND)
-BUTT = wp.constant(constants.BUTT)
-SQUARE = wp.constant(constants.SQUARE)
-MITER = wp.constant(constants.MITER)
-MITERED = wp.constant(constants.MITERED)
-SHORT = wp.constant(constants.SEGMENT_MIN)
-PERIOD_MIN = wp.constant(constants.DASH_PERIOD_MIN)
-CORNERS_MAX = wp.constant(constants.CORNERS_MAX)
 HALF_PI = wp.constant(1.5707963267948966)
 PI = wp.constant(3.141592653589793)
 ROOT_TWO = wp.constant(1.4142135623730951)
@@ -87,11 +77,11 @@ def meet(turn: wp.float32, room: wp.float32, half: wp.float32, join: wp.int32, l
     fits = half * wp.abs(half_turn[0]) <= room * half_turn[1]
     tip = half * (ratio - 1.0) <= UNSEEN
     gap = BEVELLED
-    if join == MITER:
+    if join == constants.MITER:
         tip = tip or ratio <= limit
         if tip:
             gap = TIPPED
-    elif join == ROUND:
+    elif join == constants.ROUND:
         gap = ROUNDED
     if not fits:
         return wp.vec3i(0, 0, gap)
@@ -122,7 +112,7 @@ def put_wedge(
         pieces = arc_pieces(turn, half)
     elif gap == TIPPED:
         pieces = 2
-        radius = MITERED
+        radius = constants.MITERED
     side = HALF_PI
     if turn > 0.0:
         side = -HALF_PI
@@ -157,7 +147,7 @@ def put_side(
 ) -> wp.int32:
     """Add a corner of a quadrilateral, shared with the neighbour or not."""
     if shared != 0:
-        place = wp.vec4(1.0, 0.5, angle, MITERED)
+        place = wp.vec4(1.0, 0.5, angle, constants.MITERED)
         return put_corner(at, write, before, after, place, corner_segments, corner_place)
     place = wp.vec4(along, 0.0, angle, 1.0)
     return put_corner(at, write, segment, segment, place, corner_segments, corner_place)
@@ -209,16 +199,16 @@ def put_cap(
     corner_next: wp.array[wp.int32],
 ) -> wp.int32:
     """Add a cap; ``facing``: angle from the segment's direction to where it points."""
-    if cap == BUTT:
+    if cap == constants.BUTT:
         return at
     pieces = int(3)
-    if cap == ROUND:
+    if cap == constants.ROUND:
         pieces = arc_pieces(PI, half)
     n = at
     for k in range(pieces + 1):
         angle = -HALF_PI + PI * float(k) / float(pieces)
         radius = float(1.0)
-        if cap != ROUND and (k == 1 or k == 2):  # noqa: PLR1714
+        if cap != constants.ROUND and (k == 1 or k == 2):  # noqa: PLR1714
             angle = 0.5 * HALF_PI * float(2 * k - 3)
             radius = ROOT_TWO
         place = wp.vec4(along, 0.0, facing + angle, radius)
@@ -240,17 +230,17 @@ def put_dot(
     corner_next: wp.array[wp.int32],
 ) -> wp.int32:
     """Add what a contour or a dash without length shows: its caps, along the x axis, as viewers have it."""
-    if cap == BUTT:
+    if cap == constants.BUTT:
         return at
     pieces = int(4)
     radius = ROOT_TWO
-    if cap == ROUND:
+    if cap == constants.ROUND:
         pieces = wp.max(arc_pieces(2.0 * PI, half), 4)
         radius = 1.0
     n = at
     for k in range(pieces):
         place = wp.vec4(along, 0.0, 0.5 * HALF_PI + 2.0 * PI * float(k) / float(pieces), radius)
-        n = put_corner(n, write, segment, NONE, place, corner_segments, corner_place)
+        n = put_corner(n, write, segment, constants.NONE, place, corner_segments, corner_place)
     close_polygon(at, n, write, corner_next)
     return n
 
@@ -269,7 +259,7 @@ def dash_stretch(
         period += scale * dashes[k]
     if period <= 0.0:
         return 0.0
-    return scale * wp.max(wp.ceil(PERIOD_MIN / period), 1.0)
+    return scale * wp.max(wp.ceil(constants.DASH_PERIOD_MIN / period), 1.0)
 
 
 @wp.func
@@ -339,8 +329,8 @@ def walk_contour(
     n = int(at)
     length = float(0.0)
     # The last piece that was made and not yet added: its neighbour comes first.
-    seg = int(NONE)
-    before = int(NONE)
+    seg = int(constants.NONE)
+    before = int(constants.NONE)
     start = float(0.0)
     stop = float(1.0)
     room = float(0.0)
@@ -350,11 +340,11 @@ def walk_contour(
         for k in range(bezier_pieces[bezier]):
             i = base + bezier_vertex[bezier] + k
             own = wp.length(vertex[vertex_next[i]] - vertex[i])
-            if own >= SHORT:
+            if own >= constants.SEGMENT_MIN:
                 length += own
                 seg = i
                 room = own
-    if seg == NONE:
+    if seg == constants.NONE:
         if stretch == 0.0:
             n = put_dot(
                 n,
@@ -370,14 +360,14 @@ def walk_contour(
         return n
     ring = closed != 0 and stretch == 0.0
     t = segment_direction(vertex, vertex_next, seg)
-    first_seg = int(NONE)
+    first_seg = int(constants.NONE)
     first_room = float(0.0)
     laps = int(1)
     index = int(0)
     left = float(2.0 * length + 1.0)
     passing = int(0)
     if not ring:
-        seg = NONE
+        seg = constants.NONE
     if stretch != 0.0:
         begin = dash_at(dashes, dash_start, dash_stop, stretch, 0.0)
         index = int(begin[0])
@@ -402,16 +392,16 @@ def walk_contour(
                 i = base + bezier_vertex[bezier] + k
                 own = wp.length(vertex[vertex_next[i]] - vertex[i])
                 gone = float(0.0)
-                more = wp.where(own >= SHORT and done == 0, 1, 0)
+                more = wp.where(own >= constants.SEGMENT_MIN and done == 0, 1, 0)
                 direction_here = segment_direction(vertex, vertex_next, i)
                 while more != 0:
                     ends = left <= own - gone
                     step = wp.min(left, own - gone)
                     drawn = index % 2 == 0 and passing == 0
                     from_here = float(0.0)
-                    if seg == NONE and fresh == 0:
+                    if seg == constants.NONE and fresh == 0:
                         from_here = wp.clamp(gone / own, INSIDE, 1.0 - INSIDE)
-                    if drawn and step == 0.0 and seg == NONE:
+                    if drawn and step == 0.0 and seg == constants.NONE:
                         n = put_dot(
                             n, write, i, from_here, half, cap, corner_segments, corner_place, corner_next
                         )
@@ -420,12 +410,12 @@ def walk_contour(
                         if ends:
                             to_here = wp.clamp((gone + step) / own, INSIDE, 1.0 - INSIDE)
                         new_sides = wp.vec2i(0, 0)
-                        if seg != NONE:
+                        if seg != constants.NONE:
                             turn = turn_between(t, direction_here)
-                            style = wp.where(corner != 0, join, ROUND)
+                            style = wp.where(corner != 0, join, constants.ROUND)
                             met = meet(turn, 0.5 * wp.min(room, step), half, style, limit)
                             new_sides = wp.vec2i(met[0], met[1])
-                            if first_seg != NONE or not ring:
+                            if first_seg != constants.NONE or not ring:
                                 shared = wp.vec4i(sides[0], sides[1], met[0], met[1])
                                 n = put_piece(
                                     n,
@@ -453,7 +443,7 @@ def walk_contour(
                                     corner_place,
                                     corner_next,
                                 )
-                            if style == MITER:
+                            if style == constants.MITER:
                                 reach = half * miter_ratio(turn)
                                 if reach <= half * limit:
                                     reach_out(write, vertex_next[seg], i, reach + 1.0, extent)
@@ -470,7 +460,7 @@ def walk_contour(
                                 corner_place,
                                 corner_next,
                             )
-                        if first_seg == NONE:
+                        if first_seg == constants.NONE:
                             first_seg = i
                             first_room = own
                         before = seg
@@ -488,7 +478,7 @@ def walk_contour(
                                 write,
                                 before,
                                 seg,
-                                NONE,
+                                constants.NONE,
                                 start,
                                 stop,
                                 shared,
@@ -508,20 +498,20 @@ def walk_contour(
                                 corner_place,
                                 corner_next,
                             )
-                            seg = NONE
+                            seg = constants.NONE
                     fresh = 0
                     gone += step
                     left -= step
                     if ends:
                         passing = 0
-                        if lap == 1 or n - at > CORNERS_MAX:
+                        if lap == 1 or n - at > constants.CORNERS_MAX:
                             done = 1
                         index += 1
                         if dash_start + 1 + index >= dash_stop:
                             index = 0
                         left = stretch * dashes[dash_start + 1 + index]
                     more = wp.where(ends and done == 0 and gone < own, 1, 0)
-    if seg == NONE:
+    if seg == constants.NONE:
         return n
     if ring:
         turn = turn_between(t, segment_direction(vertex, vertex_next, first_seg))
@@ -532,7 +522,7 @@ def walk_contour(
         )
     shared = wp.vec4i(sides[0], sides[1], 0, 0)
     n = put_piece(
-        n, write, before, seg, NONE, start, stop, shared, corner_segments, corner_place, corner_next
+        n, write, before, seg, constants.NONE, start, stop, shared, corner_segments, corner_place, corner_next
     )
     return put_cap(n, write, seg, 1.0, 0.0, half, cap, corner_segments, corner_place, corner_next)
 
@@ -574,7 +564,7 @@ def walk_strokes(
     shape = offset + wp.tid()
     if write == 0:
         corner_count[shape] = 0
-    if part[shape] != STYLED or vertex_last[shape] == vertex_first[shape]:
+    if part[shape] != constants.STYLED or vertex_last[shape] == vertex_first[shape]:
         return
     first = int(0)
     half = half_width(widths[shape], scale)
@@ -582,19 +572,19 @@ def walk_strokes(
         first = corner_first[shape]
         if corner_last[shape] == first:
             return
-        reach = half * wp.where(cap[shape] == SQUARE, ROOT_TWO, 1.0) + 1.0
+        reach = half * wp.where(cap[shape] == constants.SQUARE, ROOT_TWO, 1.0) + 1.0
         for i in range(vertex_first[shape], vertex_last[shape]):
             extent[i] = wp.vec2(reach, reach)
     dash_start = int(0)
     dash_stop = int(0)
     stretch = float(0.0)
-    if dash[shape] != NONE:
+    if dash[shape] != constants.NONE:
         dash_start = dash_first[dash[shape]]
         dash_stop = dash_first[dash[shape] + 1]
         stretch = dash_stretch(dashes, dash_start, dash_stop, scale)
     n = int(first)
     bezier = bezier_first[shape]
-    while bezier < bezier_first[shape + 1] and n - first <= CORNERS_MAX:
+    while bezier < bezier_first[shape + 1] and n - first <= constants.CORNERS_MAX:
         contour = bezier_contour[bezier]
         n = walk_contour(
             n,

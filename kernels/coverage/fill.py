@@ -18,14 +18,8 @@ from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-NONZERO = wp.constant(constants.NONZERO)
-EVENODD = wp.constant(constants.EVENODD)
-TILE = wp.constant(constants.TILE)
 TILE_LAST = wp.constant(constants.TILE - 1)
 TILE_BITS = wp.constant(constants.TILE.bit_length() - 1)  # of a pixel within its tile
-FULL = wp.constant(constants.FULL)
-PARTIAL = wp.constant(constants.PARTIAL)
-UNCOVERED = wp.constant(constants.UNCOVERED)
 FLAT = wp.constant(1.0e-30)  # [px] an edge that rises less is horizontal: its slope would not be finite
 MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
 NEVER = wp.constant(4.0)  # beyond the parameters of an edge, which are 0 to 1
@@ -35,7 +29,7 @@ MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as
 @wp.func
 def tile_of(x: wp.float32, wide: wp.int32) -> wp.int32:
     """Tile of ``x`` px right of the shape's tiles' left border: -1 left of them, ``wide`` right of them."""
-    return int(wp.floor(wp.clamp(x, -1.0, float(TILE * wide)) / float(TILE)))
+    return int(wp.floor(wp.clamp(x, -1.0, float(constants.TILE * wide)) / float(constants.TILE)))
 
 
 @wp.func
@@ -92,9 +86,9 @@ def fill_states(
     if part[shape] != own_part:
         return
     wide = row[2]
-    low = float(TILE * row[3])
-    high = low + float(TILE)
-    left = float(TILE * row[1])
+    low = float(constants.TILE * row[3])
+    high = low + float(constants.TILE)
+    left = float(constants.TILE * row[1])
     end = slot + wide
     for s in range(slot, end):
         slot_state[s] = 0
@@ -116,21 +110,21 @@ def fill_states(
             s0 = wp.max(slot + tile_of(wp.min(ends[0], ends[1]) - MARGIN - left, wide), slot)
             s1 = wp.min(slot + tile_of(wp.max(ends[0], ends[1]) + MARGIN - left, wide), end - 1)
             for s in range(s0, s1 + 1):
-                slot_state[s] = PARTIAL
+                slot_state[s] = constants.PARTIAL
     for s in range(slot, end):
         winding += slot_winding[s]
         slot_winding[s] = winding
-        if slot_state[s] != PARTIAL:
-            slot_state[s] = UNCOVERED
-            if winding % 2 != 0 or (winding != 0 and rule[shape] == NONZERO):
-                slot_state[s] = FULL
+        if slot_state[s] != constants.PARTIAL:
+            slot_state[s] = constants.UNCOVERED
+            if winding % 2 != 0 or (winding != 0 and rule[shape] == constants.NONZERO):
+                slot_state[s] = constants.FULL
 
 
 @wp.func
 def add_area(pixels: wp.array2d[wp.float32], slot: wp.int32, x: wp.int32, row: wp.int32, value: wp.float32):
     """Add to the pixel ``x`` right of the left border of ``slot``, in row ``row`` of its tile."""
-    s = slot + x / TILE
-    p = TILE * (x % TILE) + row
+    s = slot + x / constants.TILE
+    p = constants.TILE * (x % constants.TILE) + row
     pixels[s, p] = pixels[s, p] + value
 
 
@@ -220,7 +214,7 @@ def add_edge(
 def any_visible(slot_state: wp.array[wp.int32], first: wp.int32, last: wp.int32) -> wp.bool:
     """Whether one of the slots [first, last) is PARTIAL and not HIDDEN."""
     for s in range(first, last):
-        if slot_state[s] == PARTIAL:
+        if slot_state[s] == constants.PARTIAL:
             return True
     return False
 
@@ -237,8 +231,8 @@ def sum_columns(
     total = column(0.0)
     one = column(1.0)
     for s in range(first, last):
-        if slot_state[s] & PARTIAL == PARTIAL:
-            for x in range(TILE):
+        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
+            for x in range(constants.TILE):
                 total = total + coverage[s, x]
                 coverage[s, x] = wp.min(wp.max(total, -one), one)
         else:
@@ -266,13 +260,13 @@ def sum_row(
     """Prefix sums along one row of the slots [first, last), clamped or folded."""
     total = float(0.0)
     for s in range(first, last):
-        if slot_state[s] & PARTIAL == PARTIAL:
-            for x in range(TILE):
-                total += pixels[s, TILE * x + row]
+        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
+            for x in range(constants.TILE):
+                total += pixels[s, constants.TILE * x + row]
                 value = wp.clamp(total, -1.0, 1.0)
-                if rule == EVENODD:
+                if rule == constants.EVENODD:
                     value = fold(total)
-                pixels[s, TILE * x + row] = value
+                pixels[s, constants.TILE * x + row] = value
         else:
             total = float(slot_winding[s])
 
@@ -313,20 +307,22 @@ def fill_forward(
     if not any_visible(slot_state, slot, end):
         return
     for s in range(slot, end):
-        if slot_state[s] & PARTIAL == PARTIAL:
-            for x in range(TILE):
-                if lane_rows == TILE:
+        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
+            for x in range(constants.TILE):
+                if lane_rows == constants.TILE:
                     coverage[s, x] = column(0.0)
                 else:
-                    coverage_pixels[s, TILE * x + lane] = 0.0
-    top = TILE * row[3]
+                    coverage_pixels[s, constants.TILE * x + lane] = 0.0
+    top = constants.TILE * row[3]
     row_first = top + lane * lane_rows
-    left = float(TILE * row[1])
+    left = float(constants.TILE * row[1])
     for j in range(vertex_first[shape], vertex_last[shape]):
         a = vertex[j]
         b = vertex[vertex_next[j]]
-        add_edge(coverage_pixels, slot, a, b, left, TILE * row[2], top, row_first, row_first + lane_rows)
-    if lane_rows == TILE and rule[shape] == NONZERO:
+        add_edge(
+            coverage_pixels, slot, a, b, left, constants.TILE * row[2], top, row_first, row_first + lane_rows
+        )
+    if lane_rows == constants.TILE and rule[shape] == constants.NONZERO:
         sum_columns(coverage, slot_state, slot_winding, slot, end)
     else:
         for y in range(lane * lane_rows, (lane + 1) * lane_rows):
@@ -394,9 +390,11 @@ def fill_backward(
         # From here on, pixels are counted from the corner of the shape's tiles. Those of them that lie
         # outside the canvas have no gradient.
         across = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-        wide = TILE * across
-        high = TILE * (shape_tiles[shape, 3] - shape_tiles[shape, 1])
-        a = vertex[i] - float(TILE) * wp.vec2(float(shape_tiles[shape, 0]), float(shape_tiles[shape, 1]))
+        wide = constants.TILE * across
+        high = constants.TILE * (shape_tiles[shape, 3] - shape_tiles[shape, 1])
+        a = vertex[i] - float(constants.TILE) * wp.vec2(
+            float(shape_tiles[shape, 0]), float(shape_tiles[shape, 1])
+        )
         span = inside_box(a, d, wp.vec4(0.0, 0.0, float(wide), float(high)))
         s = span[0]
         s_end = span[1]
@@ -417,8 +415,8 @@ def fill_backward(
         while s < s_end and x >= 0 and x < wide and y >= 0 and y < high:
             s_next = wp.max(wp.min(wp.min(s_x, s_y), s_end), s)
             slot = first + (y >> TILE_BITS) * across + (x >> TILE_BITS)
-            if slot_state[slot] == PARTIAL:
-                g = sum_grad[slot, TILE * (x & TILE_LAST) + (y & TILE_LAST)] * (s_next - s)
+            if slot_state[slot] == constants.PARTIAL:
+                g = sum_grad[slot, constants.TILE * (x & TILE_LAST) + (y & TILE_LAST)] * (s_next - s)
                 area += g
                 moment += g * (s + s_next)
             s = s_next

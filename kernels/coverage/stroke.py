@@ -18,13 +18,6 @@ from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STROKE = wp.constant(constants.STROKE)
-NONE = wp.constant(constants.NONE)
-TILE = wp.constant(constants.TILE)
-COVERED = wp.constant(constants.COVERED)
-UNCOVERED = wp.constant(constants.UNCOVERED)
-PARTIAL = wp.constant(constants.PARTIAL)
-REACH_MAX = wp.constant(constants.REACH_MAX)
 FAR = wp.constant(1.0e15)
 TINY = wp.constant(1.0e-12)
 FLAT = wp.constant(1.0e-4)
@@ -109,7 +102,7 @@ def overhang(
         if vertex_next[i - 1] == i:
             start = turn(vertex[i] - vertex[i - 1], e)
     following = vertex_next[vertex_next[i]]
-    if following != NONE:
+    if following != constants.NONE:
         end = turn(e, vertex[following] - vertex[vertex_next[i]])
     return wp.vec2(start * reach + MARGIN, end * reach + MARGIN)
 
@@ -161,7 +154,7 @@ def pixels_within(low: wp.float32, high: wp.float32, first: wp.int32, last: wp.i
 @wp.func
 def half_width(width: wp.float32, scale: wp.float32) -> wp.float32:
     """Half a stroke's width [px], within what kernels can hold."""
-    return wp.min(0.5 * scale * width, REACH_MAX)
+    return wp.min(0.5 * scale * width, constants.REACH_MAX)
 
 
 @wp.func
@@ -201,11 +194,14 @@ def keep_nearest(
         span = segment_span(a[0], py, ends, sides)
         xs = pixels_within(span[0], span[1], columns[0], columns[1])
         if xs[0] < xs[1]:
-            for s in range(slot + (xs[0] - columns[0]) / TILE, slot + (xs[1] - 1 - columns[0]) / TILE + 1):
+            for s in range(
+                slot + (xs[0] - columns[0]) / constants.TILE,
+                slot + (xs[1] - 1 - columns[0]) / constants.TILE + 1,
+            ):
                 slot_near[s, lane] = 1
         for x in range(xs[0], xs[1]):
-            s = slot + (x - columns[0]) / TILE
-            p = TILE * ((x - columns[0]) % TILE) + y - top
+            s = slot + (x - columns[0]) / constants.TILE
+            p = constants.TILE * ((x - columns[0]) % constants.TILE) + y - top
             so_far = pixels[s, p]
             # Well inside the stroke it does not matter which segment is nearest.
             if so_far < inside:
@@ -248,9 +244,9 @@ def cover_slot(
     """Distances of a slot's pixels in ``rows`` -> coverages; the slot's state as far as they tell."""
     most = float(0.0)
     least = float(1.0)
-    for x in range(TILE):
+    for x in range(constants.TILE):
         for y in range(rows[0], rows[1]):
-            p = TILE * x + y - top
+            p = constants.TILE * x + y - top
             value = pixels[s, p]
             if value >= inside:
                 value = 1.0
@@ -263,10 +259,10 @@ def cover_slot(
             most = wp.max(most, value)
             least = wp.min(least, value)
     if most <= 0.0:
-        return UNCOVERED
+        return constants.UNCOVERED
     if least < 1.0:
-        return PARTIAL
-    return COVERED
+        return constants.PARTIAL
+    return constants.COVERED
 
 
 @wp.kernel
@@ -300,7 +296,7 @@ def stroke_forward(
     shape = row[0]
     if shape < 0:
         return
-    if part[shape] != STROKE:
+    if part[shape] != constants.STROKE:
         return
     half = half_width(widths[shape], scale)
     reach = half + HALF_DIAGONAL
@@ -308,19 +304,19 @@ def stroke_forward(
     inside = float(FAR)
     if half > HALF_DIAGONAL:
         inside = reach * reach - (half - HALF_DIAGONAL) * (half - HALF_DIAGONAL)
-    left = TILE * row[1]
-    top = TILE * row[3]
-    columns = wp.vec2i(left, left + TILE * row[2])
+    left = constants.TILE * row[1]
+    top = constants.TILE * row[3]
+    columns = wp.vec2i(left, left + constants.TILE * row[2])
     rows = wp.vec2i(top + lane * lane_rows, top + (lane + 1) * lane_rows)
     for s in range(slot, slot + row[2]):
         slot_near[s, lane] = 0
-        for x in range(TILE):
-            if lane_rows == TILE:
+        for x in range(constants.TILE):
+            if lane_rows == constants.TILE:
                 coverage[s, x] = column(0.0)
             else:
-                coverage_pixels[s, TILE * x + lane] = 0.0
+                coverage_pixels[s, constants.TILE * x + lane] = 0.0
     for j in range(vertex_first[shape], vertex_last[shape]):
-        if vertex_next[j] == NONE:
+        if vertex_next[j] == constants.NONE:
             continue
         a = vertex[j]
         b = vertex[vertex_next[j]]
@@ -343,9 +339,9 @@ def stroke_forward(
                 top,
             )
     for s in range(slot, slot + row[2]):
-        state = int(UNCOVERED)
+        state = int(constants.UNCOVERED)
         if slot_near[s, lane] == 1:
-            at = left + TILE * (s - slot)
+            at = left + constants.TILE * (s - slot)
             state = cover_slot(coverage_pixels, segment, vertex, vertex_next, s, at, top, rows, half, inside)
         wp.atomic_or(slot_state, s, state)
 
@@ -381,12 +377,12 @@ def stroke_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if part[shape] != STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
+    if part[shape] != constants.STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     of_half = float(0.0)
-    if slot_last[shape] > slot_first[shape] and vertex_next[i] != NONE:
+    if slot_last[shape] > slot_first[shape] and vertex_next[i] != constants.NONE:
         half = half_width(widths[shape], scale)
         reach = half + HALF_DIAGONAL
         x0 = shape_tiles[shape, 0]
@@ -401,18 +397,18 @@ def stroke_backward(
         sides = segment_sides(e, reach)
         heights = segment_rows(a, e, length, reach, over)
         # The rectangle's corners may lie outside the shape's tiles, where it has no pixel.
-        right = wp.min(width, TILE * shape_tiles[shape, 2])
-        bottom = wp.min(height, TILE * shape_tiles[shape, 3])
-        ys = pixels_within(heights[0], heights[1], TILE * y0, bottom)
+        right = wp.min(width, constants.TILE * shape_tiles[shape, 2])
+        bottom = wp.min(height, constants.TILE * shape_tiles[shape, 3])
+        ys = pixels_within(heights[0], heights[1], constants.TILE * y0, bottom)
         for y in range(ys[0], ys[1]):
-            slot_row = slot_first[shape] + (y / TILE - y0) * wide - x0
+            slot_row = slot_first[shape] + (y / constants.TILE - y0) * wide - x0
             span = segment_span(a[0], float(y) + 0.5 - a[1], ends, sides)
-            xs = pixels_within(span[0], span[1], TILE * x0, right)
+            xs = pixels_within(span[0], span[1], constants.TILE * x0, right)
             for x in range(xs[0], xs[1]):
-                slot = slot_row + x / TILE
-                p = TILE * (x % TILE) + y % TILE
+                slot = slot_row + x / constants.TILE
+                p = constants.TILE * (x % constants.TILE) + y % constants.TILE
                 g = float(0.0)
-                if slot_state[slot] == PARTIAL:
+                if slot_state[slot] == constants.PARTIAL:
                     g = sum_grad[slot, p]
                 # No gradient, no segment: the array is kept only where the coverage is neither 0 nor 1.
                 if g != 0.0 and segment[slot, p] == i:
@@ -447,7 +443,7 @@ def widths_backward(
 ):
     """One thread a shape sums its segments in order."""
     shape = offset + wp.tid()
-    if part[shape] != STROKE:
+    if part[shape] != constants.STROKE:
         return
     total = float(0.0)
     for i in range(vertex_first[shape], vertex_last[shape]):

@@ -13,9 +13,6 @@ from warpsplat.kernels.ranges import bounded_product, find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FILL = wp.constant(constants.FILL)
-PLAN_SAMPLES = wp.constant(constants.PLAN_SAMPLES)
-
 
 @wp.func
 def chain_cubics(point_first: wp.array[wp.int32], shape: wp.int32) -> wp.int32:
@@ -54,11 +51,11 @@ def plan_fill(
 ):
     """Grid size from the longer chain and the mean width of the strip. One thread a shape."""
     shape = offset + wp.tid()
-    if kind[shape] != FILL:
+    if kind[shape] != constants.FILL:
         return
     start = point_first[shape]
     cubics = chain_cubics(point_first, shape)
-    count = PLAN_SAMPLES * cubics
+    count = constants.PLAN_SAMPLES * cubics
     a0 = scale * points[start]
     b0 = a0
     length_a = float(0.0)
@@ -66,7 +63,7 @@ def plan_fill(
     width = float(0.0)
     doubled_area = float(0.0)
     for i in range(1, count + 1):
-        t = float(i) / float(PLAN_SAMPLES)
+        t = float(i) / float(constants.PLAN_SAMPLES)
         a1 = scale * chain_point(points, start, 0, t, cubics)
         b1 = scale * chain_point(points, start, 1, t, cubics)
         length_a += wp.length(a1 - a0)
@@ -110,7 +107,7 @@ def fill_grid_forward(
     if shape >= gaussian_ends.shape[0]:
         gaussian_shape[i] = -1
         return
-    if kind[shape] != FILL:
+    if kind[shape] != constants.FILL:
         return
     gaussian_shape[i] = -1
     if i >= gaussian_last[shape]:
@@ -149,7 +146,7 @@ def fill_stations_backward(
     shape = gaussian_shape[i]
     if shape < 0:
         return
-    if kind[shape] != FILL:
+    if kind[shape] != constants.FILL:
         return
     stations = shape_stations[shape]
     if i - gaussian_first[shape] >= stations:
@@ -182,7 +179,7 @@ def fill_points_backward(
     """A gather, one thread a control point: the sum over stations of Bernstein weight x station gradient."""
     i = offset + wp.tid()
     shape = point_shape[i]
-    if kind[shape] != FILL:
+    if kind[shape] != constants.FILL:
         return
     cubics = chain_cubics(point_first, shape)
     point_count = 6 * cubics

@@ -15,10 +15,6 @@ from warpsplat.kernels.ranges import bounded_product, find_range
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STROKE = wp.constant(constants.STROKE)
-ROW_INSET = wp.constant(constants.ROW_INSET)
-EPSILON = wp.constant(constants.EPSILON)
-PLAN_SAMPLES = wp.constant(constants.PLAN_SAMPLES)
 HALF_PI = wp.constant(1.5707963267948966)
 
 
@@ -46,7 +42,7 @@ def plan_stroke(
 ):
     """Grid size from the stroke's width and its longest segment; the stations include the caps."""
     shape = offset + wp.tid()
-    if kind[shape] != STROKE:
+    if kind[shape] != constants.STROKE:
         return
     start = point_first[shape]
     segments = (point_first[shape + 1] - start) / 3
@@ -54,8 +50,8 @@ def plan_stroke(
     for segment in range(segments):
         before = scale * points[start + 3 * segment]
         length = float(0.0)
-        for i in range(1, PLAN_SAMPLES + 1):
-            weights = cubic_weights(float(i) / float(PLAN_SAMPLES))
+        for i in range(1, constants.PLAN_SAMPLES + 1):
+            weights = cubic_weights(float(i) / float(constants.PLAN_SAMPLES))
             here = wp.vec2(0.0, 0.0)
             for j in range(4):
                 here += scale * weights[j] * points[start + 3 * segment + j]
@@ -78,7 +74,7 @@ def run_place(station: wp.int32, run: wp.int32, rows: wp.int32, width: wp.float3
     """
     caps = cap_plan(rows)
     # A cap's last Gaussians stay as far inside the circle as the outermost rows inside the sides.
-    radius = wp.max(1.0 - 2.0 * ROW_INSET / wp.max(width, EPSILON), 0.5)
+    radius = wp.max(1.0 - 2.0 * constants.ROW_INSET / wp.max(width, constants.EPSILON), 0.5)
     if station < caps:
         angle = HALF_PI * (float(caps - station) - 0.25) / float(caps)
         direction = sine_and_cosine(angle)
@@ -95,7 +91,7 @@ def run_place(station: wp.int32, run: wp.int32, rows: wp.int32, width: wp.float3
 def unit_tangent(tangent: wp.vec2) -> wp.vec2:
     """``tangent`` / its length; (1, 0) where it has none."""
     length = wp.length(tangent)
-    if length < EPSILON:
+    if length < constants.EPSILON:
         return wp.vec2(1.0, 0.0)
     return tangent / length
 
@@ -138,7 +134,7 @@ def stroke_grid_forward(
     if shape >= gaussian_ends.shape[0]:
         gaussian_shape[i] = -1
         return
-    if kind[shape] != STROKE:
+    if kind[shape] != constants.STROKE:
         return
     gaussian_shape[i] = -1
     if i >= gaussian_last[shape]:
@@ -186,7 +182,7 @@ def stroke_stations_backward(
     shape = gaussian_shape[i]
     if shape < 0:
         return
-    if kind[shape] != STROKE:
+    if kind[shape] != constants.STROKE:
         return
     stations = shape_stations[shape]
     rows = shape_rows[shape]
@@ -211,7 +207,7 @@ def stroke_stations_backward(
     e_grad *= 0.5 * widths[shape]
     tangent_grad = wp.vec2(0.0, 0.0)
     length = wp.length(tangent)
-    if length >= EPSILON:
+    if length >= constants.EPSILON:
         tangent_grad = (e_grad - wp.dot(e, e_grad) * e) / length
     station_grad[i] = centre_grad
     station_grad[i + stations] = tangent_grad
@@ -241,7 +237,7 @@ def stroke_points_backward(
     """A gather, one thread a control point; the thread of point 0 sums the width's gradient too."""
     i = offset + wp.tid()
     shape = point_shape[i]
-    if kind[shape] != STROKE:
+    if kind[shape] != constants.STROKE:
         return
     point = i - point_first[shape]
     start = gaussian_first[shape]

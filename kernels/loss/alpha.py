@@ -8,9 +8,6 @@ from warpsplat.kernels.tile import column, total
 # Unrolled, its loops over channels and columns take a minute to compile for CUDA.
 wp.set_module_options({**constants.MODULE_OPTIONS, "max_unroll": 1})
 
-TILE = wp.constant(constants.TILE)
-SAME = wp.constant(constants.SAME)
-
 
 @wp.kernel
 def alpha_loss(
@@ -29,12 +26,12 @@ def alpha_loss(
     which is that on black, a the error of the opacity, by which less of the white shows. One thread a tile.
     """
     tile = offset + wp.tid()
-    if tile_still[tile] == SAME and loss[tile, 0] >= 0.0:
+    if tile_still[tile] == constants.SAME and loss[tile, 0] >= 0.0:
         return
     factor = 1.0 / float(value_count)
     for channel in range(3):
         squares = column(0.0)
-        for x in range(TILE):
+        for x in range(constants.TILE):
             e = image[tile, channel, x] - target[tile, channel, x]
             white = e - (image[tile, 3, x] - target[tile, 3, x])
             weight = importance[tile, x]

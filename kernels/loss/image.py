@@ -7,8 +7,6 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-TILE = wp.constant(constants.TILE)
-SAME = wp.constant(constants.SAME)
 WINDOW = wp.constant(8)
 C1 = wp.constant(0.01 * 0.01)
 C2 = wp.constant(0.03 * 0.03)
@@ -19,7 +17,7 @@ def rows_between(y0: wp.int32, y1: wp.int32) -> column:
     """1 in the rows from ``y0`` to ``y1``, 0 in the others."""
     rows = column(0.0)
     y = int(0)
-    while y < TILE:  # a range of constants would be unrolled, and take seconds to compile
+    while y < constants.TILE:  # a range of constants would be unrolled, and take seconds to compile
         rows[y] = wp.where(y >= y0, 1.0, 0.0) * wp.where(y < y1, 1.0, 0.0)
         y += 1
     return rows
@@ -59,10 +57,10 @@ def image_loss(
     """
     i, channel = wp.tid()
     tile = offset + i
-    if tile_still[tile] == SAME and loss[tile, channel] >= 0.0:
+    if tile_still[tile] == constants.SAME and loss[tile, channel] >= 0.0:
         return
-    columns = wp.min(width - tile % tiles_x * TILE, TILE)
-    rows = wp.min(height - tile / tiles_x * TILE, TILE)
+    columns = wp.min(width - tile % tiles_x * constants.TILE, constants.TILE)
+    rows = wp.min(height - tile / tiles_x * constants.TILE, constants.TILE)
     phase = clock[0] % 4
     shift_x = (phase % 2) * (WINDOW / 2)
     shift_y = (phase / 2) * (WINDOW / 2)
@@ -163,7 +161,7 @@ def image_loss(
             s_grad = a - wp.cw_mul(b, u) + wp.cw_mul(c, v)
             image_grad[tile, channel, x] = wp.cw_mul(inside, e_grad - s_grad)
         x0 = x1
-    for x in range(columns, TILE):
+    for x in range(columns, constants.TILE):
         image_grad[tile, channel, x] = zero
     loss[tile, channel] = total(wp.cw_mul(inside, squares))
     similarity[tile, channel] = total(wp.cw_mul(inside, similar))

@@ -7,13 +7,11 @@ from warpsplat.kernels.bezier import add_bezier_grad, bezier_points, control_poi
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-EPSILON = wp.constant(constants.EPSILON)
-
 
 @wp.func
 def sine(a: wp.vec2, b: wp.vec2) -> wp.float32:
     """Sine of the angle from ``a`` to ``b``; 0 where either has no length."""
-    return cross(a, b) / wp.max(wp.length(a) * wp.length(b), EPSILON)
+    return cross(a, b) / wp.max(wp.length(a) * wp.length(b), constants.EPSILON)
 
 
 @wp.kernel
@@ -60,7 +58,7 @@ def xing_backward(
         total += sign * s
         length_a = wp.length(a)
         length_b = wp.length(b)
-        if sign != 0.0 and length_a * length_b > EPSILON:
+        if sign != 0.0 and length_a * length_b > constants.EPSILON:
             product = length_a * length_b
             k = factor * sign
             a_grad = k * (wp.vec2(b[1], -b[0]) / product - s * a / (length_a * length_a))
@@ -109,7 +107,7 @@ def bending_backward(
         total += energy
         k = 2.0 * weight / (1.0 + c)
         stretch = wp.vec2(0.0, 0.0)
-        if c > EPSILON:
+        if c > constants.EPSILON:
             stretch = (weight * energy / ((1.0 + c) * c)) * chord
         g0 = k * a + stretch
         g1 = k * (b - 2.0 * a)

@@ -11,10 +11,7 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FLAT = wp.constant(constants.FLAT)
 SOME = wp.constant(1.0e-20)  # as good as nothing, but with a sign
-COVERED = wp.constant(constants.COVERED)
-HIDDEN = wp.constant(constants.HIDDEN)
 
 
 @wp.func
@@ -24,7 +21,7 @@ def shape_paint(
     """Colour and opacity of a shape, as the tiles' lists have them; a negative opacity says that the colour
     is a gradient's.
     """
-    if paint[shape] != FLAT:
+    if paint[shape] != constants.FLAT:
         return wp.vec4(0.0, 0.0, 0.0, -wp.max(opacities[shape], SOME))
     color = colors[shape]
     return wp.vec4(color[0], color[1], color[2], opacities[shape])
@@ -66,7 +63,7 @@ def flat_backward(
     sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
     for slot in range(slot_first[shape], slot_last[shape]):
         state = slot_state[slot]
-        if state & COVERED != 0 and state & HIDDEN == 0:
+        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
             if lanes == 1:
                 red = red + slot_columns[slot, 0]
                 green = green + slot_columns[slot, 1]
@@ -75,7 +72,7 @@ def flat_backward(
             else:
                 for lane in range(lanes):
                     sums = sums + slot_grad[slot, lane]
-    if paint[shape] != FLAT:
+    if paint[shape] != constants.FLAT:
         red = column(0.0)
         green = column(0.0)
         blue = column(0.0)

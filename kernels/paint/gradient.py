@@ -15,13 +15,6 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-LINEAR = wp.constant(constants.LINEAR)
-RADIAL = wp.constant(constants.RADIAL)
-PAD = wp.constant(constants.PAD)
-REPEAT = wp.constant(constants.REPEAT)
-TILE = wp.constant(constants.TILE)
-COVERED = wp.constant(constants.COVERED)
-HIDDEN = wp.constant(constants.HIDDEN)
 TINY = wp.constant(1.0e-12)
 
 frame: Any = wp.types.vector(length=6, dtype=wp.float32)
@@ -31,9 +24,9 @@ frame: Any = wp.types.vector(length=6, dtype=wp.float32)
 @wp.func
 def is_gradient(paint: wp.int32) -> wp.bool:
     """Whether that is what is here."""
-    if paint == LINEAR:
+    if paint == constants.LINEAR:
         return True
-    return paint == RADIAL
+    return paint == constants.RADIAL
 
 
 @wp.func
@@ -59,7 +52,7 @@ def to_unit_adjoint(f: frame, g: wp.vec2) -> wp.vec2:
 @wp.func
 def parameter(paint: wp.int32, focus: wp.vec3, p: wp.vec2) -> wp.vec3:
     """t at a point of the unit space, and its derivatives by the two coordinates."""
-    if paint == LINEAR:
+    if paint == constants.LINEAR:
         return wp.vec3(p[0], 1.0, 0.0)
     c0 = wp.vec2(focus[0], focus[1])
     r0 = focus[2]
@@ -76,9 +69,9 @@ def parameter(paint: wp.int32, focus: wp.vec3, p: wp.vec2) -> wp.vec3:
 @wp.func
 def spread_out(spread: wp.int32, t: wp.float32) -> wp.vec2:
     """t brought into [0, 1], and the derivative of that; where the end stops go on, t as it is."""
-    if spread == PAD:
+    if spread == constants.PAD:
         return wp.vec2(t, 1.0)
-    if spread == REPEAT:
+    if spread == constants.REPEAT:
         return wp.vec2(t - wp.floor(t), 1.0)
     r = t - 2.0 * wp.floor(0.5 * t)
     if r > 1.0:
@@ -137,7 +130,7 @@ def is_ramp(
     spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 ) -> wp.bool:
     """Whether a gradient is one of those that ``ramp`` has a shorter way for."""
-    if spread != PAD or last - first != 2:
+    if spread != constants.PAD or last - first != 2:
         return False
     if focus[0] != 0.0 or focus[1] != 0.0 or focus[2] != 0.0:
         return False
@@ -149,7 +142,7 @@ def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) 
     """Whether a gradient is one of those that ``stops`` has a shorter way for: a ramp, but for more stops, in
     any order.
     """
-    if spread != PAD or last - first < 3:
+    if spread != constants.PAD or last - first < 3:
         return False
     return focus[0] == 0.0 and focus[1] == 0.0 and focus[2] == 0.0
 
@@ -167,8 +160,8 @@ def is_columnwise(
 @wp.func
 def pixel_place(tile: wp.int32, tiles_x: wp.int32, x: wp.int32, y: wp.int32, scale: wp.float32) -> wp.vec2:
     """Centre of a tile's pixel, canvas units."""
-    px = float(TILE * (tile % tiles_x) + x) + 0.5
-    py = float(TILE * (tile / tiles_x) + y) + 0.5
+    px = float(constants.TILE * (tile % tiles_x) + x) + 0.5
+    py = float(constants.TILE * (tile / tiles_x) + y) + 0.5
     return wp.vec2(px / scale, py / scale)
 
 
@@ -202,18 +195,18 @@ def gradient_forward(
     if shape < 0:
         return
     state = slot_state[slot]
-    if not is_gradient(paint[shape]) or state & COVERED == 0 or state & HIDDEN != 0:
+    if not is_gradient(paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
         return
     if is_columnwise(spread[shape], focus[shape], stop_offsets, stop_first[shape], stop_first[shape + 1]):
         return
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        for y in range(TILE):
+        for y in range(constants.TILE):
             place = to_unit(frames[shape], pixel_place(slot_tile[slot], tiles_x, x, y, scale))
             raw = parameter(paint[shape], focus[shape], place)
             t = spread_out(spread[shape], raw[0])
             at = between_stops(stop_offsets, stop_first[shape], stop_first[shape + 1], t[0])
             color = (1.0 - at.share) * stop_colors[at.low] + at.share * stop_colors[at.high]
-            p = TILE * x + y
+            p = constants.TILE * x + y
             paint_pixels[slot, 0, p] = color[0]
             paint_pixels[slot, 1, p] = color[1]
             paint_pixels[slot, 2, p] = color[2]
@@ -266,11 +259,13 @@ def gradient_backward(
     across = wp.vec2(0.0, 0.0)
     for slot in range(slot_first[shape], slot_last[shape]):
         state = slot_state[slot]
-        if state & COVERED != 0 and state & HIDDEN == 0:
-            for p in range(TILE * TILE):
+        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+            for p in range(constants.TILE * constants.TILE):
                 g = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
                 g_opacity = paint_pixels[slot, 3, p]
-                place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, p / TILE, p % TILE, scale))
+                place = to_unit(
+                    f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
+                )
                 raw = parameter(paint[shape], focus[shape], place)
                 t = spread_out(spread[shape], raw[0])
                 at = between_stops(stop_offsets, first, last, t[0])

@@ -7,9 +7,6 @@ from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-COVERED = wp.constant(constants.COVERED)
-HIDDEN = wp.constant(constants.HIDDEN)
-
 
 @wp.kernel
 def picture_forward(
@@ -35,7 +32,7 @@ def picture_forward(
         return
     state = slot_state[slot]
     number = picture[shape]
-    if number < 0 or state & COVERED == 0 or state & HIDDEN != 0:
+    if number < 0 or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
         return
     x0 = picture_tiles[number, 0]
     y0 = picture_tiles[number, 1]

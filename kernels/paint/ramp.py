@@ -19,10 +19,6 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-LINEAR = wp.constant(constants.LINEAR)
-TILE = wp.constant(constants.TILE)
-COVERED = wp.constant(constants.COVERED)
-HIDDEN = wp.constant(constants.HIDDEN)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped share
 TINY = wp.constant(1.0e-12)
 
@@ -31,7 +27,7 @@ TINY = wp.constant(1.0e-12)
 def rows() -> column:
     """Numbers of a column's pixels."""
     result = column(0.0)
-    for i in range(TILE):
+    for i in range(constants.TILE):
         result[i] = float(i)
     return result
 
@@ -40,7 +36,7 @@ def rows() -> column:
 def roots(squares: column) -> column:
     """Square root of each element."""
     result = column(0.0)
-    for i in range(TILE):
+    for i in range(constants.TILE):
         result[i] = wp.sqrt(squares[i])
     return result
 
@@ -80,7 +76,7 @@ def ramp_forward(
     if shape < 0:
         return
     state = slot_state[slot]
-    if not is_gradient(paint[shape]) or state & COVERED == 0 or state & HIDDEN != 0:
+    if not is_gradient(paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
         return
     first = stop_first[shape]
     if not is_ramp(spread[shape], focus[shape], stop_offsets, first, stop_first[shape + 1]):
@@ -92,7 +88,7 @@ def ramp_forward(
     low_opacity = stop_opacities[first]
     high_opacity = stop_opacities[first + 1]
     f = frames[shape]
-    linear = paint[shape] == LINEAR
+    linear = paint[shape] == constants.LINEAR
     down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
     row = rows()
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
@@ -145,7 +141,7 @@ def ramp_backward(
     between = stop_colors[first + 1] - stop_colors[first]
     opacity_between = stop_opacities[first + 1] - stop_opacities[first]
     f = frames[shape]
-    linear = paint[shape] == LINEAR
+    linear = paint[shape] == constants.LINEAR
     down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
     row = rows()
     zero = column(0.0)
@@ -167,10 +163,10 @@ def ramp_backward(
     u_by_v = zero
     v_by_u = zero
     v_by_v = zero
-    columns = int(TILE)  # a loop that is not unrolled, which takes long to compile
+    columns = int(constants.TILE)  # a loop that is not unrolled, which takes long to compile
     for slot in range(slot_first[shape], slot_last[shape]):
         state = slot_state[slot]
-        if state & COVERED != 0 and state & HIDDEN == 0:
+        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
             for x in range(columns):
                 top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
                 u = column(top[0]) + down[0] * row

@@ -21,10 +21,6 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-LINEAR = wp.constant(constants.LINEAR)
-TILE = wp.constant(constants.TILE)
-COVERED = wp.constant(constants.COVERED)
-HIDDEN = wp.constant(constants.HIDDEN)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped share
 TINY = wp.constant(1.0e-12)
 
@@ -65,14 +61,14 @@ def stops_forward(
     if shape < 0:
         return
     state = slot_state[slot]
-    if not is_gradient(paint[shape]) or state & COVERED == 0 or state & HIDDEN != 0:
+    if not is_gradient(paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
         return
     first = stop_first[shape]
     last = stop_first[shape + 1]
     if not is_chain(spread[shape], focus[shape], first, last):
         return
     f = frames[shape]
-    linear = paint[shape] == LINEAR
+    linear = paint[shape] == constants.LINEAR
     down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
     row = rows()
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
@@ -151,7 +147,7 @@ def stops_backward(
         stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
         stop_opacities_grad[i] = 0.0
     f = frames[shape]
-    linear = paint[shape] == LINEAR
+    linear = paint[shape] == constants.LINEAR
     down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
     row = rows()
     zero = column(0.0)
@@ -163,10 +159,10 @@ def stops_backward(
     u_by_v = zero
     v_by_u = zero
     v_by_v = zero
-    columns = int(TILE)  # a loop that is not unrolled, which takes long to compile
+    columns = int(constants.TILE)  # a loop that is not unrolled, which takes long to compile
     for slot in range(slot_first[shape], slot_last[shape]):
         state = slot_state[slot]
-        if state & COVERED != 0 and state & HIDDEN == 0:
+        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
             for x in range(columns):
                 top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
                 u = column(top[0]) + down[0] * row

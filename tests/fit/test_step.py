@@ -11,7 +11,7 @@ import pytest
 
 from tests.drawing.drawings import seam
 from tests.fit.pictures import picture, step_for
-from tests.kernels.modules import kernel_modules, kernels_of
+from tests.kernels.modules import all_kernels
 from tests.scenes import mixed_scene, picture_scene, with_gradients
 from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.fit.evaluate_file import evaluate_file
@@ -61,8 +61,12 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
         np.testing.assert_array_equal(getattr(scenes[0], name), getattr(scenes[1], name))
 
 
-OF_TORCH = {"pixels", "composite_opaque", "composite_straight"}
-"""Kernels of passes that are no steps: those of ``warpsplat.torch``."""
+NOT_IN_STEPS = {
+    *("removal_cost", "visibility"),
+    *("tiles_to_pixels", "pixels_to_tiles"),
+    *("opaque_backward", "opaque_paint_backward", "straight_forward", "straight_backward"),
+}
+"""Kernels that run between steps, or in passes of ``warpsplat.torch``."""
 
 
 def steps_of_all_kinds(device: str) -> Iterator[Step]:
@@ -89,13 +93,12 @@ def steps_of_all_kinds(device: str) -> Iterator[Step]:
 
 def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     """All that the package has, found by walking it: a graph can hold it, and something launches it."""
-    launched = {"removal_cost", "visibility"}  # between steps
+    launched = set()
     for step in steps_of_all_kinds(device):
         assert step._graph is not None
         launched |= {launch.name for program in step.programs for launch in program.launches}
-    modules = [m for m in kernel_modules() if m.__name__.rpartition(".")[2] not in OF_TORCH]
-    every = {kernel.key for module in modules for kernel in kernels_of(module)}
-    assert every <= launched
+    every = {kernel.key for kernel in all_kernels()}
+    assert every - launched == NOT_IN_STEPS
     assert launched - every == {"array_scan", "radix_sort_pairs"}
 
 

@@ -12,15 +12,15 @@ from warpsplat import kernels
 
 
 def kernels_of(module: ModuleType) -> list[wp.Kernel]:
-    """Those that the module defines."""
+    """Return those that the module defines, by factories too."""
     return [
         value
         for value in vars(module).values()
-        if isinstance(value, wp.Kernel) and value.module.name == module.__name__
+        if isinstance(value, wp.Kernel) and value.func.__module__ == module.__name__
     ]
 
 
-def kernel_modules() -> list[ModuleType]:
-    """Modules that define a kernel."""
+def all_kernels() -> list[wp.Kernel]:
+    """Return all kernels of the package."""
     names = sorted(m.name for m in pkgutil.walk_packages(kernels.__path__, "warpsplat.kernels."))
-    return [module for module in map(importlib.import_module, names) if kernels_of(module)]
+    return [kernel for module in map(importlib.import_module, names) for kernel in kernels_of(module)]

@@ -66,7 +66,7 @@ class BoxGeometry:
 class BoxCoverage:
     """What compositing asks for."""
 
-    law = constants.AREA
+    mapping = constants.AREA
 
     def __init__(self, job: Job, geometry: BoxGeometry) -> None:
         self._job = job

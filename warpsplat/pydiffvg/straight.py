@@ -1,6 +1,6 @@
 """What DiffVG shows on a background that one sees through: means over the pixels of straight colours.
 
-On nothing, ``kernels.composite_straight`` makes that. Here the part of a pixel that shapes lie on is taken
+On nothing, ``kernels.composite`` makes that. Here the part of a pixel that shapes lie on is taken
 from a picture of the same outlines, so faint that their coverages add up.
 """
 

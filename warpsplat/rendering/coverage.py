@@ -51,7 +51,7 @@ class Coverage(Protocol):
     """What compositing asks of a model."""
 
     buffers: CoverageBuffers
-    law: int
+    mapping: int
     """``constants.AREA`` or ``constants.PRODUCT``."""
 
     def states(self, program: Program) -> None:
@@ -197,7 +197,7 @@ EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
 class ExactCoverage:
     """The area that a viewer computes, of polylines: a part for each kind of shape that there is."""
 
-    law = constants.AREA
+    mapping = constants.AREA
 
     def __init__(
         self,
@@ -233,7 +233,7 @@ class ExactCoverage:
 class SplatCoverage:
     """The paper's Gaussians: 1 - product of 1 - g."""
 
-    law = constants.PRODUCT
+    mapping = constants.PRODUCT
     kernels: ClassVar[tuple[wp.Kernel, wp.Kernel]] = (splat.splat_forward, splat.splat_backward)
     """Gaussians -> coverages, and its adjoint."""
 

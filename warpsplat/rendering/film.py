@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import (
-    composite,
-    composite_opaque,
-    composite_paint,
-    composite_straight,
-    constants,
-    visibility,
-)
+from warpsplat.kernels import composite, composite_backward, composite_opaque, constants
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -31,39 +24,55 @@ class FilmBuffers:
     """Images by tiles: [tile, channel, column]."""
 
     image: wp.array = buffer(column, "tiles", "planes", constants.TILE)
-    """sRGB in [0, 1]; of a transparent canvas premultiplied, and opacity."""
+    """sRGB in [0, 1]; on a transparent canvas premultiplied, unless straight, and opacity."""
     image_grad: wp.array = buffer(column, "tiles", "planes", constants.TILE)
     inside: wp.array = buffer(column, "tiles", constants.TILE)
     """1 for pixels of the image, 0 for the padding."""
+    hit: wp.array = buffer(column, "straight_tiles", constants.TILE)
+    """Part of each pixel that shapes lie on, where colours are straight."""
 
 
 class Film:
     """What the shapes are composited on."""
 
-    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas, *, opaque: bool = False) -> None:
-        """``opaque``: whether shapes of opacity 1 have gradients (``kernels.composite_opaque``)."""
-        self._opaque = opaque
+    def __init__(
+        self,
+        backend: Backend,
+        viewport: Viewport,
+        canvas: Canvas,
+        *,
+        opaque: bool = False,
+        straight: bool = False,
+    ) -> None:
+        """Allocate the images.
+
+        Args:
+            backend: the device.
+            viewport: the picture.
+            canvas: its background; premultiplied, a transparent one is black.
+            opaque: whether shapes of opacity 1 have gradients (``kernels.composite_opaque``).
+            straight: whether colours are not premultiplied; on a transparent canvas, with any opacities.
+        """
         self._backend, self._viewport = backend, viewport
-        # Premultiplied, nothing is black.
+        self._opaque, self._straight = opaque, straight
         shown = np.zeros(3) if canvas.background is None else canvas.background
         self._background = wp.vec3(*(float(x) for x in shown))
         self.planes = 4 if canvas.background is None else 3
-        sizes = {"tiles": viewport.tile_count, "planes": self.planes}
+        tiles = viewport.tile_count
+        sizes = {"tiles": tiles, "planes": self.planes, "straight_tiles": tiles if straight else 1}
         self.buffers = backend.allocate(FilmBuffers, sizes)
         whole = np.ones((viewport.height, viewport.width, 1), np.float32)
         self.buffers.inside.assign(to_tiles(whole)[:, 0])
 
-    @property
-    def _dim(self) -> tuple[int, int]:
-        return self._viewport.tile_count, self._backend.lanes
-
-    def _is_plain(self, paint: Painting) -> bool:
-        """Whether all is flat and opaque behind."""
-        return self.planes == 3 and paint.is_flat
-
-    def _light(self, bins: Bins) -> wp.array:
-        """Where the adjoints of opaque shapes keep what light arrives at each slot."""
-        return self._backend.array(column, bins.buffers.list_slot.shape[0], self._backend.lanes)
+    def _kernels(self, paint: Painting) -> tuple[wp.Kernel, wp.Kernel]:
+        """Return the forward pass and its adjoint: those of flat paints on a background where that is all."""
+        if self._straight:
+            return composite.straight_forward, composite_opaque.straight_backward
+        if self.planes == 3 and paint.is_flat:
+            usual, opaque = composite_backward.composite_backward, composite_opaque.opaque_backward
+            return composite.composite_forward, opaque if self._opaque else usual
+        usual, opaque = composite_backward.paint_backward, composite_opaque.opaque_paint_backward
+        return composite.paint_forward, opaque if self._opaque else usual
 
     def _launch(
         self,
@@ -72,28 +81,25 @@ class Film:
         bins: Bins,
         coverage: Coverage,
         paint: Painting,
-        **more: Any,
+        **values: Any,
     ) -> None:
         """Record a kernel that goes through each tile's list."""
-        sources = (self.buffers, bins.buffers, coverage.buffers, paint.buffers)
-        columns = self._backend.lane_size
-        program.launch(kernel, self._dim, *sources, lane_columns=columns, split=True, **more)
+        dim = (self._viewport.tile_count, self._backend.lanes)
+        numbers = {"lane_columns": self._backend.lane_size, "background": self._background}
+        sources = (self.buffers, bins.buffers, coverage.buffers, paint.buffers, numbers, values)
+        program.launch(kernel, dim, *sources, split=True)
 
     def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record lists and coverages -> ``image``."""
-        plain = self._is_plain(paint)
-        kernel = composite.composite_forward if plain else composite_paint.paint_forward
-        self._launch(program, kernel, bins, coverage, paint, background=self._background)
+        self._launch(program, self._kernels(paint)[0], bins, coverage, paint)
 
     def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
-        plain = self._is_plain(paint)
-        kernel = composite.composite_backward if plain else composite_paint.paint_backward
-        more = {"law": coverage.law, "sum_grad": coverage.buffers.coverage}
+        values: dict[str, Any] = {"mapping": coverage.mapping, "sum_grad": coverage.buffers.coverage}
         if self._opaque:
-            kernel = composite_opaque.opaque_backward if plain else composite_opaque.opaque_paint_backward
-            more |= {"background": self._background, "light": self._light(bins)}
-        self._launch(program, kernel, bins, coverage, paint, **more)
+            slots = bins.buffers.list_slot.shape[0]
+            values["transmittance"] = self._backend.array(column, slots, self._backend.lanes)
+        self._launch(program, self._kernels(paint)[1], bins, coverage, paint, **values)
 
     def removal_cost(
         self,
@@ -105,40 +111,13 @@ class Film:
         importance: wp.array | None,
         slot_cost: wp.array,
     ) -> None:
-        """Record what the squared error against ``target`` would grow by without each slot."""
+        """Record by how much the squared error against ``target`` would grow without each slot."""
         importance = self.buffers.inside if importance is None else importance
-        more = {"target": target, "importance": importance, "slot_cost": slot_cost}
-        self._launch(program, composite.removal_cost, bins, coverage, paint, **more)
+        values = {"target": target, "importance": importance, "slot_cost": slot_cost}
+        self._launch(program, composite.removal_cost, bins, coverage, paint, **values)
 
     def visibility(
         self, program: Program, bins: Bins, coverage: Coverage, paint: Painting, seen: wp.array
     ) -> None:
-        """Record what each pixel of a slot shows of its shape."""
-        program.launch(
-            visibility.visibility,
-            self._dim,
-            bins.buffers,
-            coverage.buffers,
-            paint.buffers,
-            lane_columns=self._backend.lane_size,
-            seen=seen,
-            split=True,
-        )
-
-
-class StraightFilm(Film):
-    """A transparent one whose colours are not premultiplied (``kernels.composite_straight``)."""
-
-    def __init__(self, backend: Backend, viewport: Viewport, canvas: Canvas) -> None:
-        super().__init__(backend, viewport, canvas, opaque=True)
-        self._hit = backend.array(column, viewport.tile_count, constants.TILE)
-
-    def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
-        """See ``Film``."""
-        self._launch(program, composite_straight.straight_forward, bins, coverage, paint, hit=self._hit)
-
-    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
-        """See ``Film``."""
-        more = {"law": coverage.law, "sum_grad": coverage.buffers.coverage}
-        more |= {"hit": self._hit, "light": self._light(bins)}
-        self._launch(program, composite_straight.straight_backward, bins, coverage, paint, **more)
+        """Record how much each pixel of a slot shows of its shape."""
+        self._launch(program, composite.visibility, bins, coverage, paint, seen=seen)

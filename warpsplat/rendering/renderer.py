@@ -13,7 +13,7 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins
-from warpsplat.rendering.film import Film, StraightFilm
+from warpsplat.rendering.film import Film
 from warpsplat.rendering.models import EXACT, Job, Model
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.parameters import Parameters
@@ -92,11 +92,7 @@ class Renderer:
         self.backend = parameters.backend
         check_room(viewport, self.backend.device)
         self.model, self._opaque = model, opaque or straight
-        self.film = (
-            StraightFilm(self.backend, viewport, parameters.canvas)
-            if straight
-            else Film(self.backend, viewport, parameters.canvas, opaque=opaque)
-        )
+        self.film = Film(self.backend, viewport, parameters.canvas, opaque=self._opaque, straight=straight)
         self.needed_samples = self.backend.array(wp.int32, 1)
         self.needed_slots = self.backend.array(wp.int32, 1)
         shapes = parameters.shape_count
