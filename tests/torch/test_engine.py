@@ -1,11 +1,11 @@
-"""Renderers that are kept: as few as needed, no more than allowed, for ever."""
+"""Engines that are kept: as few as needed, and no more than allowed."""
 
 from __future__ import annotations
 
 import gc
 import sys
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -27,12 +27,12 @@ def step(scene: Scene, width: int = 40) -> torch.Tensor:
 
 def live(kind: type) -> int:
     gc.collect()
-    return sum(type(each) is kind for each in gc.get_objects())  # others dislike being asked
+    return sum(type(each) is kind for each in gc.get_objects())  # isinstance would run code of other classes
 
 
 @pytest.fixture(scope="module", autouse=True)
 def only_what_is_new() -> Iterator[None]:
-    """Neither counted nor looked at is what there was before these tests: the objects of all modules."""
+    """Leave out the objects of all modules, which exist before these tests."""
     clear_cache()
     gc.collect()
     gc.freeze()
@@ -45,7 +45,7 @@ def empty() -> None:
     clear_cache()
 
 
-def test_scenes_of_one_structure_share_a_renderer() -> None:
+def test_scenes_of_one_structure_share_an_engine() -> None:
     scene = random_scene(Kind.FILL)
     for by in range(4):
         step(replace(scene, points=scene.points + np.float32(by), first=scene.first.copy()))
@@ -62,8 +62,7 @@ def test_scenes_of_one_structure_share_a_renderer() -> None:
         lambda scene: replace(scene, cap=scene.cap + 1),
     ],
 )
-def test_another_structure_has_a_renderer_of_its_own(other: object) -> None:
-    assert callable(other)
+def test_another_structure_has_its_own_engine(other: Callable[[Scene], Scene]) -> None:
     scene = random_scene(Kind.FILL)
     changed = other(scene)
     images = [render(SceneTensors.of(each)) for each in (scene, changed, scene)]
@@ -71,7 +70,7 @@ def test_another_structure_has_a_renderer_of_its_own(other: object) -> None:
     assert live(engine.Engine) == 2
 
 
-def test_patterns_of_dashes_belong_to_the_structure() -> None:
+def test_dashes_belong_to_the_structure() -> None:
     scene = styled_scene(Cap.BUTT, Join.BEVEL, 1)
     first = step(scene)
     other = replace(scene, dashes=tuple((offset, 2.0, 9.0) for offset, *_ in scene.dashes))
@@ -79,7 +78,7 @@ def test_patterns_of_dashes_belong_to_the_structure() -> None:
     assert step(scene) == first
 
 
-def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changing_scenes_neither_compile_nor_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:
     step(random_scene(Kind.FILL, 2))
     monkeypatch.setattr(kernel_cache, "compile_by", None)
     monkeypatch.setattr(engine, "KEPT", 3)
@@ -92,9 +91,8 @@ def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyP
     assert tensors[0] == tensors[1]
 
 
-def test_an_engine_keeps_no_picture_alive() -> None:
-    tensors = SceneTensors.of(random_scene(Kind.FILL), requires_grad=True)
-    image = render(tensors)
+def test_an_engine_keeps_no_image_alive() -> None:
+    image = render(SceneTensors.of(random_scene(Kind.FILL), requires_grad=True))
     gradient = torch.ones_like(image)
     image.backward(gradient)
     kept = [weakref.ref(image), weakref.ref(gradient)]
@@ -103,24 +101,20 @@ def test_an_engine_keeps_no_picture_alive() -> None:
     assert [each() for each in kept] == [None, None]
 
 
-def test_little_memory_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "KEPT_BYTES", 1)
-    for count in (2, 3, 4):
-        step(random_scene(Kind.FILL, count))
-    assert live(engine.Engine) == 1
-
-
-def test_the_bytes_are_counted_and_grow_with_the_picture() -> None:
+def test_bytes_are_counted_and_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = random_scene(Kind.FILL, 2)
     step(scene)
     step(scene, 800)
     small, large = (each.bytes for each in engine.ENGINES._kept.values())
     assert 50_000 < small < large / 20
+    monkeypatch.setattr(engine, "KEPT_BYTES", 1)
+    step(random_scene(Kind.FILL, 3))
+    assert live(engine.Engine) == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks the system for the size of the process")
 def test_many_steps_need_no_more_memory() -> None:
-    """Images of a quarter of a megabyte, and their gradients: one kept in five would be seen."""
+    """Images and gradients of a quarter of a megabyte: one in five that is kept would show."""
 
     def resident() -> int:
         with open("/proc/self/statm", encoding="ascii") as sizes:

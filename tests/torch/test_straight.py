@@ -16,13 +16,13 @@ from tests.scenes import mixed_scene, random_scene, with_gradients
 from warpsplat.rendering.models import EXACT
 from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.torch import SceneTensors
-from warpsplat.torch.engine import Picture
+from warpsplat.torch.engine import RenderSpec
 from warpsplat.torch.function import draw
 from warpsplat.torch.tensors import attributes_of
 
 
 def opaque_in_parts() -> Scene:
-    """Shapes that hide others, some that are faint, and one that is not seen."""
+    """Return shapes that hide others, some that are faint, and an invisible one."""
     scene = random_scene(Kind.FILL, 6, seed=4)
     return replace(scene, opacities=np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32))
 
@@ -36,20 +36,20 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("threads", [1, 2])
-def test_picture_and_gradients(name: str, threads: int) -> None:
-    """For a random gradient of the picture."""
+def test_image_and_gradients(name: str, threads: int) -> None:
+    """Compare with the reference, for a random gradient of the image."""
     scene = SCENES[name]()
     scene = replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
     plan = renderer_for(scene, "cpu")
     v, p = plan.viewport, tensors(scene)
     image = straight(exact.coverages(scene, p, pieces_of(plan), v.width, v.height, v.scale), p, scene)
-    # Where little is seen, the quotient makes much of what float32 leaves.
+    # Where the image is faint, division by its opacity amplifies rounding errors.
     weights = torch.tensor(np.random.default_rng(1).normal(size=tuple(image.shape)))
     weights = weights * (image[..., 3:].detach() > 1e-2)
     (image * weights).sum().backward()
     found = SceneTensors.of(scene, requires_grad=True)
-    picture = Picture(scene, v, EXACT, torch.device("cpu"), threads, opaque=True, straight=True)
-    shown = draw([picture], [{a.name: found.value(a) for a in attributes_of(scene)}])[0]
+    spec = RenderSpec(scene, v, EXACT, torch.device("cpu"), threads, opaque=True, straight=True)
+    shown = draw(spec, {a.name: found.value(a) for a in attributes_of(scene)})
     seen = image[..., 3] > 1e-2
     assert float((shown - image).detach()[seen].abs().max()) < 1e-3
     (shown * weights.float()).sum().backward()

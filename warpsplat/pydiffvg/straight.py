@@ -1,27 +1,51 @@
-"""What DiffVG shows on a background that one sees through: means over the pixels of straight colours.
+"""Images on a translucent background as DiffVG shows them: means of colours that are not premultiplied.
 
-On nothing, ``kernels.composite_straight`` makes that. Here the part of a pixel that shapes lie on is taken
-from a picture of the same outlines, so faint that their coverages add up.
+Without a background ``kernels.composite_straight`` makes such images. Here the share of a pixel that shapes
+cover is taken from an image of the same outlines, so faint that their coverages add up.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import torch
 
-from warpsplat.kernels.constants import NOTHING
-from warpsplat.pydiffvg.assemble import FAINT
+from warpsplat.kernels import constants
+from warpsplat.pydiffvg.layout import Layout
+from warpsplat.torch import SceneTensors, render
 
 Tensor = torch.Tensor
 
+FAINT = 1 / 256
+"""Opacity of the faint outlines. Two shapes that each cover half of a pixel then add up to all of it; at full
+opacity compositing would leave a quarter uncovered."""
 
-def over(image: Tensor, faint: Tensor, background: Tensor) -> Tensor:
-    """Pictures of the shapes, premultiplied, and of the faint outlines on a straight background; each has
-    shape (height, width, 4).
+
+def on_translucent(image: Tensor, values: Mapping[str, Tensor], layout: Layout, background: Tensor) -> Tensor:
+    """Composite an image on a translucent background.
+
+    Args:
+        image: of the shapes, premultiplied, shape (height, width, 4).
+        values: attributes of ``layout.scene``.
+        layout: of the scene.
+        background: not premultiplied, shape (height, width, 4).
+
+    Returns:
+        the image, not premultiplied, shape (height, width, 4).
     """
-    hit = (faint[..., 3:] / FAINT).clamp_max(1.0)
+    covered = _coverage(values, layout)
     below, opacity = background[..., :3], background[..., 3:]
-    # Of the part that shapes lie on, as if it were all; the background is seen through them there.
-    seen = hit - image[..., 3:]
+    # Premultiplied opacity and colour of the covered part, behind which the background shows.
+    seen = covered - image[..., 3:]
     total = image[..., 3:] + seen * opacity
-    color = (image[..., :3] + seen * opacity * below) * (hit / total.clamp_min(NOTHING))
-    return torch.cat([color + (1 - hit) * below, total + (1 - hit) * opacity], dim=2)
+    color = (image[..., :3] + seen * opacity * below) * (covered / total.clamp_min(constants.NOTHING))
+    return torch.cat([color + (1 - covered) * below, total + (1 - covered) * opacity], dim=2)
+
+
+def _coverage(values: Mapping[str, Tensor], layout: Layout) -> Tensor:
+    """Return the covered share of each pixel, shape (height, width, 1); invisible shapes do not count."""
+    own = {name: values[name] for name in ("points", "widths") if name in values}
+    own["opacities"] = FAINT * (values["opacities"].detach() > constants.SEEN).float()
+    own["colors"] = torch.zeros_like(values["colors"])
+    image = render(SceneTensors(layout.outlines, own))
+    return (image[..., 3:] / FAINT).clamp_max(1.0)
