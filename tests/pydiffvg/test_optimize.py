@@ -11,7 +11,7 @@ import torch
 from tests.pydiffvg.helpers import on_white, psnr, shown, tensor
 from warpsplat import pydiffvg
 from warpsplat.errors import UsageError
-from warpsplat.pydiffvg.transform import MODES, OptimizableTransform
+from warpsplat.pydiffvg.optimizable import MODES, OptimizableTransform
 
 DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="40" height="40">
 <linearGradient id="sky"><stop stop-color="#aaf"/><stop offset="1" stop-color="#fca"/></linearGradient>

@@ -7,6 +7,7 @@ import sys
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,37 +46,27 @@ def empty() -> None:
     clear_cache()
 
 
-def test_scenes_of_one_structure_share_an_engine() -> None:
-    scene = random_scene(Kind.FILL)
-    for by in range(4):
-        step(replace(scene, points=scene.points + np.float32(by), first=scene.first.copy()))
-    assert live(engine.Engine) == 1
+def with_canvas(scene: Scene, **changed: Any) -> Scene:
+    return replace(scene, canvas=replace(scene.canvas, **changed))
 
 
 @pytest.mark.parametrize(
-    "other",
+    ("engines", "change"),
     [
-        lambda scene: random_scene(Kind.STROKE),
-        lambda scene: replace(scene, rule=1 - scene.rule),
-        lambda scene: replace(scene, canvas=replace(scene.canvas, background=np.zeros(3, np.float32))),
-        lambda scene: replace(scene, canvas=replace(scene.canvas, width=39)),
-        lambda scene: replace(scene, cap=scene.cap + 1),
+        (1, lambda scene: replace(scene, points=scene.points + np.float32(3), first=scene.first.copy())),
+        (2, lambda scene: random_scene(Kind.FILL)),
+        (2, lambda scene: replace(scene, rule=1 - scene.rule)),
+        (2, lambda scene: with_canvas(scene, background=np.zeros(3, np.float32))),
+        (2, lambda scene: with_canvas(scene, width=39)),
+        (2, lambda scene: replace(scene, cap=scene.cap + 1)),
+        (2, lambda scene: replace(scene, dashes=tuple((start, 2.0, 9.0) for start, *_ in scene.dashes))),
     ],
 )
-def test_another_structure_has_its_own_engine(other: Callable[[Scene], Scene]) -> None:
-    scene = random_scene(Kind.FILL)
-    changed = other(scene)
-    images = [render(SceneTensors.of(each)) for each in (scene, changed, scene)]
-    assert torch.equal(images[0], images[2])
-    assert live(engine.Engine) == 2
-
-
-def test_dashes_belong_to_the_structure() -> None:
+def test_scenes_of_one_structure_share_an_engine(engines: int, change: Callable[[Scene], Scene]) -> None:
     scene = styled_scene(Cap.BUTT, Join.BEVEL, 1)
-    first = step(scene)
-    other = replace(scene, dashes=tuple((offset, 2.0, 9.0) for offset, *_ in scene.dashes))
-    assert step(other) != first
-    assert step(scene) == first
+    images = [render(SceneTensors.of(each)) for each in (scene, change(scene), scene)]
+    assert torch.equal(images[0], images[2])
+    assert live(engine.Engine) == engines
 
 
 def test_changing_scenes_neither_compile_nor_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:

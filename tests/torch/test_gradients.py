@@ -17,7 +17,7 @@ from tests.scenes import (
     with_gradients,
     with_two_stops,
 )
-from tests.torch.helpers import compare
+from tests.torch.helpers import compare, compare_straight
 from warpsplat.scene import Canvas, Cap, Join, Kind, Rule, Scene
 from warpsplat.torch import SceneTensors, render
 
@@ -53,6 +53,16 @@ def test_opacities_of_one(name: str, transparent: bool) -> None:
     opacities = np.where(np.arange(len(scene)) % 3 == 1, scene.opacities, 1).astype(np.float32)
     scene = replace(scene, opacities=opacities)
     compare(clear(scene) if transparent else scene)
+
+
+@pytest.mark.parametrize("name", ["mixed", "opaque", "gradients"])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_colors_that_are_not_premultiplied(name: str, threads: int) -> None:
+    """Opaque shapes hide others, some of which are faint or invisible."""
+    scene = random_scene(Kind.FILL, 6, seed=4) if name == "opaque" else SCENES[name]()
+    if name == "opaque":
+        scene = replace(scene, opacities=np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32))
+    compare_straight(clear(scene), threads)
 
 
 @pytest.mark.parametrize("opaque", [False, True])

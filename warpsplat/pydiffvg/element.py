@@ -9,16 +9,16 @@ from xml.etree import ElementTree
 import torch
 
 from warpsplat.pydiffvg.color import Color
-from warpsplat.pydiffvg.optimizers import (
+from warpsplat.pydiffvg.optimizable import (
     COLORS,
     BoundedOptimizer,
     Bounds,
     OptimizableGradient,
+    OptimizableTransform,
     make_optimizer,
 )
 from warpsplat.pydiffvg.save_svg import path_data, rgb_text
 from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
-from warpsplat.pydiffvg.transform import OptimizableTransform
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import outline, parse_transform
 from warpsplat.svg.gradients import Flat, Gradient, parse_link, resolve_paint
@@ -37,8 +37,8 @@ class Context(NamedTuple):
     document: Document
     viewport: Viewport
     device: torch.device
-    settings_of: Callable[[str | None], dict[str, Any]]
-    """Settings of the element or gradient of an ``id``."""
+    retrieve: Callable[[str | None], tuple[dict[str, Any], bool]]
+    """``SvgOptimizationSettings.retrieve``."""
 
 
 class OptimizableElement:
@@ -46,7 +46,7 @@ class OptimizableElement:
 
     def __init__(self, context: Context, element: Element) -> None:
         self._context, self._element = context, element
-        self._settings = context.settings_of(element.get("id"))
+        self._settings = context.retrieve(element.get("id"))[0]
         self._style = context.document.style_of(element)
         self.children = [OptimizableElement(context, child) for child in drawn_children(element)]
         self.optimizers: list[BoundedOptimizer] = []
@@ -90,7 +90,7 @@ class OptimizableElement:
         self._paints = [self._paint(name, subpaths) for name in ("fill", "stroke")]
 
     def _paint(self, name: str, subpaths: list[Subpath]) -> Tensor | OptimizableGradient | None:
-        document, viewport, device, settings_of = self._context
+        document, viewport, device, retrieve = self._context
         text = self._style[name]
         paint = resolve_paint(text, self._style, document, viewport, subpaths, torch.eye(3).numpy())
         if isinstance(paint, Flat):
@@ -101,19 +101,15 @@ class OptimizableElement:
             return color
         if isinstance(paint, Gradient):
             link = parse_link(text.strip())
-            gradient = OptimizableGradient(paint, settings_of(link[0] if link else None), device)
+            gradient = OptimizableGradient(paint, retrieve(link[0] if link else None)[0], device)
             self.optimizers += gradient.optimizers
             return gradient
         return None
 
     def build(self, matrix: Tensor, opacity: Tensor, shapes: list[Shape], groups: list[ShapeGroup]) -> None:
-        """Append the shapes and groups that the element draws.
+        """Append what the element draws to ``shapes`` and ``groups``.
 
-        Args:
-            matrix: from the units of the element's parent to the canvas, shape (3, 3).
-            opacity: of the parent, shape (1,).
-            shapes: list to append to.
-            groups: list to append to.
+        ``matrix``: from the parent's units to the canvas, shape (3, 3); ``opacity``: its own, shape (1,).
         """
         if self.transform is not None:
             matrix = matrix @ self.transform()
@@ -139,10 +135,7 @@ class OptimizableElement:
             yield from child.walk()
 
     def write(self, element: Element, definitions: Element) -> None:
-        """Write the current values into a copy of the element and of its children.
-
-        ``definitions``: gradients are appended to this element.
-        """
+        """Write the current values into a copy of the element, and append gradients to ``definitions``."""
         for child, copied in zip(self.children, drawn_children(element), strict=True):
             child.write(copied, definitions)
         if self.transform is not None:

@@ -15,7 +15,7 @@ import torch
 from warpsplat.errors import ImageError
 from warpsplat.pydiffvg.device import nearest
 from warpsplat.pydiffvg.element import Context, OptimizableElement
-from warpsplat.pydiffvg.optimizers import COLORS, make_optimizer
+from warpsplat.pydiffvg.optimizable import COLORS, make_optimizer
 from warpsplat.pydiffvg.parse_svg import root_and_size
 from warpsplat.pydiffvg.render_pytorch import RenderFunction
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
@@ -134,9 +134,8 @@ class OptimizableSvg:
             box, view = view_box(root), view_box_map(root, *size)
             self._view = torch.eye(3) if view is None else torch.tensor(view).float()
             self.settings.global_override(["transforms", "translation_mult"], max(self.canvas))
-            viewport = Viewport(*(box[2:] if box else size))
             context = Context(
-                self.document, viewport, self.device, lambda name: self.settings.retrieve(name)[0]
+                self.document, Viewport(*(box[2:] if box else size)), self.device, self.settings.retrieve
             )
             with np.errstate(all="ignore"):  # overflows are found where the values are used
                 self.root = OptimizableElement(context, self.document.root)

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Any
 
 import torch
 
 from warpsplat.errors import UsageError
+from warpsplat.kernels import constants
 from warpsplat.pydiffvg.arguments import SceneArguments
 from warpsplat.pydiffvg.assemble import assemble
 from warpsplat.pydiffvg.cache import serialize_cached
 from warpsplat.pydiffvg.device import get_device
-from warpsplat.pydiffvg.layout import make_layout
+from warpsplat.pydiffvg.layout import Layout, make_layout
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
-from warpsplat.pydiffvg.straight import on_translucent
 from warpsplat.torch import SceneTensors, render
 from warpsplat.torch.engine import check_memory
 from warpsplat.torch.function import draw
 
 Tensor = torch.Tensor
+
+FAINT = 1 / 256
+"""Opacity at which coverages add up: two shapes that each cover half of a pixel cover all of it, where opaque
+ones would leave a quarter."""
 
 print_timing = False
 
@@ -144,7 +148,7 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
         if bool((background[..., 3] >= 1).all()):
             result = result + (1 - result[..., 3:]) * background
         else:
-            result = on_translucent(result, values, layout, background)
+            result = _on_translucent(result, values, layout, background)
     if print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result
@@ -161,3 +165,27 @@ def _with_opacity(background: Tensor, width: int, height: int) -> Tensor:
     if tuple(background.shape) != (height, width, 4):
         raise UsageError(f"background_image has shape {tuple(background.shape)}, not ({height}, {width}, 4)")
     return background
+
+
+def _on_translucent(
+    image: Tensor, values: Mapping[str, Tensor], layout: Layout, background: Tensor
+) -> Tensor:
+    """Composite a premultiplied image on a translucent background, which is not premultiplied.
+
+    As in DiffVG a pixel is the mean of colours that are not premultiplied. Arrays: shape (height, width, 4).
+    """
+    covered = _coverage(values, layout)
+    below, opacity = background[..., :3], background[..., 3:]
+    # Premultiplied opacity and colour of the covered part, behind which the background shows.
+    seen = covered - image[..., 3:]
+    total = image[..., 3:] + seen * opacity
+    color = (image[..., :3] + seen * opacity * below) * (covered / total.clamp_min(constants.NOTHING))
+    return torch.cat([color + (1 - covered) * below, total + (1 - covered) * opacity], dim=2)
+
+
+def _coverage(values: Mapping[str, Tensor], layout: Layout) -> Tensor:
+    """Return the share of each pixel that visible shapes cover, shape (height, width, 1)."""
+    own = {name: values[name] for name in ("points", "widths") if name in values}
+    own["opacities"] = FAINT * (values["opacities"].detach() > constants.SEEN).float()
+    own["colors"] = torch.zeros_like(values["colors"])
+    return (render(SceneTensors(layout.outlines, own))[..., 3:] / FAINT).clamp_max(1.0)

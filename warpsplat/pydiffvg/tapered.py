@@ -26,15 +26,12 @@ def contour_sizes(segments: int, is_closed: bool) -> list[int]:
 
 
 def contours_around(segments: Tensor, radii: Tensor, is_closed: bool) -> Tensor:
-    """Return the control points of the contours around strokes, see ``contour_sizes``.
+    """Return the control points of the contours around strokes, shape (stroke, point, 2).
 
     Args:
         segments: control points of cubics, shape (stroke, segment, 4, 2).
         radii: half widths as a cubic's control values, shape (stroke, segment, 4).
         is_closed: whether the last segment ends at the first.
-
-    Returns:
-        shape (stroke, point, 2).
     """
     center, normal, radius = _samples(segments, radii)
     left = _cubics(center + radius * normal)
@@ -58,7 +55,7 @@ def contours_around(segments: Tensor, radii: Tensor, is_closed: bool) -> Tensor:
 def _samples(segments: Tensor, radii: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Return points, unit normals and half widths at the ends of the pieces.
 
-    Shapes (stroke, segment, sample, 2), the same, and (stroke, segment, sample, 1).
+    Shape (stroke, segment, sample, 2); that of half widths (stroke, segment, sample, 1).
     """
     t = torch.linspace(0, 1, PIECES + 1, device=segments.device)
     s = 1 - t
@@ -92,16 +89,10 @@ def _angle(start: Tensor, end: Tensor) -> Tensor:
 
 
 def _arc(center: Tensor, radius: Tensor, start: Tensor, turn: Tensor) -> Tensor:
-    """Return the cubics of arcs without their last point.
+    """Return the cubics of arcs without their last point, shape (..., 3 x ARCS, 2).
 
-    Args:
-        center: shape (..., 2).
-        radius: shape (..., 1).
-        start: unit vector from the centre to the first point, shape (..., 2).
-        turn: signed angle of the arc, shape (...,).
-
-    Returns:
-        shape (..., 3 x ARCS, 2).
+    ``center``: shape (..., 2); ``radius``: shape (..., 1); ``start``: unit vector to the first point, shape
+    (..., 2); ``turn``: signed angle, shape (...,).
     """
     angle = turn[..., None] * (torch.arange(ARCS + 1, device=start.device) / ARCS)
     across = torch.stack([-start[..., 1], start[..., 0]], dim=-1)[..., None, :]
