@@ -1,14 +1,15 @@
-"""SVG files and pictures, read and written by pydiffvg."""
+"""SVG files and images, read and written by pydiffvg."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import torch
 
-from tests.pydiffvg.helpers import SIZE, on_white, png, psnr, render, shown, tensor
+from tests.pydiffvg.helpers import SIZE, blob, group, on_white, png, psnr, render, shown, tensor
 from warpsplat import pydiffvg
 from warpsplat.errors import ImageError
 
@@ -26,38 +27,44 @@ DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 48 48" width="
 
 
 def test_a_drawing_is_read_and_written(tmp_path: Path) -> None:
-    source, saved = tmp_path / "drawing.svg", tmp_path / "new" / "saved.svg"
+    source, small, saved = tmp_path / "drawing.svg", tmp_path / "small.svg", tmp_path / "new" / "saved.svg"
     source.write_text(DRAWING, encoding="utf-8")
+    small.write_text(DRAWING.replace('width="96"', 'width="48"'), encoding="utf-8")
     width, height, shapes, groups = pydiffvg.svg_to_scene(source)
     assert (width, height) == (SIZE, SIZE)
     assert all(isinstance(shape, pydiffvg.Path) for shape in shapes)
     image = render(shapes, groups)
-    small = tmp_path / "small.svg"
-    small.write_text(DRAWING.replace('width="96"', 'width="48"'), encoding="utf-8")
-    assert psnr(on_white(image), shown(small)) > 36
     pydiffvg.save_svg(saved, width, height, shapes, groups)
-    assert psnr(on_white(image), shown(saved)) > 36
+    assert min(psnr(on_white(image), shown(path)) for path in (small, saved)) > 36
+    parsed = pydiffvg.parse_scene(ElementTree.fromstring(DRAWING))
+    assert parsed[:2] == (SIZE, SIZE)
+    assert torch.equal(render(*parsed[2:]), image)
 
 
 def test_segments_stay_what_they_are() -> None:
     (path,) = pydiffvg.from_svg_path("M2 2h14v12q-6 8 -14 0c1 2 3 4 5 6z")
     assert path.num_control_points.tolist() == [0, 0, 1, 2, 0]
     assert path.is_closed and len(path.points) == 8
-    (way,) = pydiffvg.from_svg_path("M2 2h14v12", torch.diag(tensor(2, 3, 1)))
-    assert not way.is_closed
-    assert way.points.tolist() == [[4, 6], [32, 6], [32, 42]]
+    (line,) = pydiffvg.from_svg_path("M2 2h14v12", torch.diag(tensor(2, 3, 1)))
+    assert not line.is_closed
+    assert line.points.tolist() == [[4, 6], [32, 6], [32, 42]]
     (closed,) = pydiffvg.from_svg_path("M2 2h14v12", force_close=True)
     assert closed.is_closed and closed.num_control_points.tolist() == [0, 0, 0]
 
 
-def test_gamma_of_a_saved_scene(tmp_path: Path) -> None:
-    groups = [pydiffvg.ShapeGroup(torch.tensor([0]), tensor(0.2, 0.2, 0.2, 1.0))]
-    pydiffvg.save_svg(
-        tmp_path / "a.svg", 8, 8, [pydiffvg.Rect(tensor(0, 0), tensor(8, 8))], groups, use_gamma=True
-    )
+def test_gamma_and_background_of_a_saved_scene(tmp_path: Path) -> None:
+    shapes, groups = [pydiffvg.Rect(tensor(0, 0), tensor(8, 8))], [group(0, tensor(0.2, 0.2, 0.2, 1.0))]
+    pydiffvg.save_svg(tmp_path / "a.svg", 8, 8, shapes, groups, use_gamma=True)
     # Filters work in linear light unless each of their parts says otherwise, as DiffVG's does.
     assert "feFuncA" in (tmp_path / "a.svg").read_text(encoding="utf-8")
     assert shown(tmp_path / "a.svg")[4, 4, 0] == pytest.approx(0.2 ** (1 / 2.2), abs=0.01)
+    pydiffvg.save_svg(tmp_path / "b.svg", SIZE, SIZE, [blob()], [group()], background="background: #cde")
+    assert ElementTree.parse(tmp_path / "b.svg").getroot().get("style") == "background: #cde"
+    assert pydiffvg.prettify(ElementTree.fromstring("<a><b/></a>")).endswith("<a>\n  <b />\n</a>")
+
+
+STOPS = '<stop stop-color="red"/><stop offset="1"/>'
+RECT = '<rect width="9" height="9" fill="url(#g)"/>'
 
 
 @pytest.mark.parametrize(
@@ -65,27 +72,23 @@ def test_gamma_of_a_saved_scene(tmp_path: Path) -> None:
     [
         ("<text>a</text>", "uses <text>"),
         (
-            '<linearGradient id="g" spreadMethod="repeat"><stop stop-color="red"/><stop offset="1"/>'
-            '</linearGradient><rect width="9" height="9" fill="url(#g)"/>',
+            f'<linearGradient id="g" spreadMethod="repeat">{STOPS}</linearGradient>{RECT}',
             "spreadMethod repeat",
         ),
-        (
-            '<radialGradient id="g" fx=".2"><stop stop-color="red"/><stop offset="1"/></radialGradient>'
-            '<rect width="9" height="9" fill="url(#g)"/>',
-            "focus",
-        ),
+        (f'<radialGradient id="g" fx=".2">{STOPS}</radialGradient>{RECT}', "focus"),
     ],
 )
-def test_what_cannot_be_held_is_named(tmp_path: Path, body: str, cause: str) -> None:
+def test_what_cannot_be_read_is_named(tmp_path: Path, body: str, cause: str) -> None:
     path = tmp_path / "a.svg"
-    path.write_text(
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">{body}</svg>', encoding="utf-8"
-    )
-    with pytest.raises(ImageError, match=cause):
+    text = f'<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">{body}</svg>'
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ImageError, match=f"a.svg: .*{cause}"):
         pydiffvg.svg_to_scene(path)
+    with pytest.raises(ImageError, match=cause):
+        pydiffvg.parse_scene(ElementTree.fromstring(text))
 
 
-def test_pictures(tmp_path: Path) -> None:
+def test_images(tmp_path: Path) -> None:
     image = torch.full((4, 5, 4), 0.25)
     pydiffvg.imwrite(image, tmp_path / "new" / "a.png")
     found = png(tmp_path / "new" / "a.png")

@@ -1,4 +1,4 @@
-"""Documents that are optimised in place."""
+"""SVG documents that are optimised in place."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import torch
 from tests.pydiffvg.helpers import on_white, psnr, shown, tensor
 from warpsplat import pydiffvg
 from warpsplat.errors import UsageError
-from warpsplat.pydiffvg.motion import MODES, Motion
+from warpsplat.pydiffvg.optimizable import MODES, OptimizableTransform
 
 DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="40" height="40">
 <linearGradient id="sky"><stop stop-color="#aaf"/><stop offset="1" stop-color="#fca"/></linearGradient>
@@ -21,24 +21,24 @@ d="M-14 -3H14V3H-14Z" style="fill:#228844;stroke:black;stroke-width:1"/></g></sv
 
 
 def document(
-    tmp_path: Path, settings: pydiffvg.SvgOptimizationSettings | None = None
+    tmp_path: Path, settings: pydiffvg.SvgOptimizationSettings | None = None, device: str = "cpu"
 ) -> pydiffvg.OptimizableSvg:
     path = tmp_path / "drawing.svg"
     path.write_text(DRAWING, encoding="utf-8")
-    return pydiffvg.OptimizableSvg(path, settings)
+    return pydiffvg.OptimizableSvg(path, settings, device=device)
 
 
-def test_it_is_the_file_and_writes_one(tmp_path: Path) -> None:
-    svg = document(tmp_path)
-    image = svg.render()
-    assert psnr(on_white(image), shown(tmp_path / "drawing.svg")) > 33
-    written = tmp_path / "written.svg"
-    written.write_text(svg.write_xml(), encoding="utf-8")
-    assert psnr(on_white(image), shown(written)) > 33
+def test_a_document_renders_and_is_written_as_its_file(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="there is no cuda:9"):
+        svg = document(tmp_path, device="cuda:9")
+    image = svg.render().cpu()
+    (tmp_path / "written.svg").write_text(svg.write_xml(), encoding="utf-8")
+    for name in ("drawing.svg", "written.svg"):
+        assert psnr(on_white(image), shown(tmp_path / name)) > 33
     assert svg.render(scale=0.5).shape == (20, 20, 4)
 
 
-def test_a_turn_is_found(tmp_path: Path) -> None:
+def test_a_rotation_is_found(tmp_path: Path) -> None:
     settings = pydiffvg.SvgOptimizationSettings()
     settings.global_override(["paths", "optimize_points"], False)
     settings.global_override(["optimize_color"], False)
@@ -49,7 +49,9 @@ def test_a_turn_is_found(tmp_path: Path) -> None:
     svg = document(tmp_path, settings)
     with torch.no_grad():
         target = svg.render()
-        svg.root.children[1].children[0].motion.turn += 0.25  # type: ignore[union-attr]
+        transform = svg.root.children[1].children[0].transform
+        assert transform is not None
+        transform.rotation.add_(0.25)
     losses = []
     for _ in range(45):
         svg.zero_grad()
@@ -58,19 +60,18 @@ def test_a_turn_is_found(tmp_path: Path) -> None:
         svg.step()
         losses.append(loss.item())
     assert losses[-1] < 0.05 * losses[0]
-    angle = svg.root.children[1].children[0].motion.turn.item()  # type: ignore[union-attr]
-    assert angle == pytest.approx(0.349, abs=0.03)
+    assert transform.rotation.item() == pytest.approx(0.349, abs=0.03)
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_every_mode_begins_at_the_transform(mode: str) -> None:
+def test_every_mode_starts_at_the_transform(mode: str) -> None:
     values = pydiffvg.SvgOptimizationSettings.default_params["transforms"] | {"transform_mode": mode}
     for matrix in (
         tensor([[0.6, -0.8, 3], [0.8, 0.6, -2], [0, 0, 1]]),
         tensor([[1.2, 0.3, 3], [-0.5, 0.7, -2], [0, 0, 1]]),
         tensor([[2, 0, 1], [0, -2, 5], [0, 0, 1]]),
     ):
-        assert torch.allclose(Motion(matrix, values)(), matrix, atol=1e-5)
+        assert torch.allclose(OptimizableTransform(matrix, values)(), matrix, atol=1e-5)
 
 
 def test_settings_are_saved(tmp_path: Path) -> None:

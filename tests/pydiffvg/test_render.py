@@ -1,32 +1,33 @@
-"""Pictures of DiffVG's classes, and their gradients."""
+"""Images of DiffVG's classes, and their gradients."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from tests.pydiffvg.helpers import SIZE, on_white, psnr, render, scene, shown, tensor
+from tests.pydiffvg.helpers import SIZE, blob, group, on_white, psnr, render, scene, shown, tensor
 from warpsplat import pydiffvg
 from warpsplat.errors import UsageError
-from warpsplat.pydiffvg.assemble import LAYOUTS
 from warpsplat.pydiffvg.diffvg import FilterType
+from warpsplat.pydiffvg.layout import make_layout
+from warpsplat.pydiffvg.shape import Shape
 
 Tensor = torch.Tensor
 
 
 def circle(opacity: float = 1.0) -> tuple[pydiffvg.Circle, pydiffvg.ShapeGroup]:
-    group = pydiffvg.ShapeGroup(torch.tensor([0]), tensor(0.2, 0.4, 0.8, opacity))
-    return pydiffvg.Circle(tensor(10.0), tensor(20.5, 22.25)), group
+    return pydiffvg.Circle(tensor(10.0), tensor(20.5, 22.25)), group(0, tensor(0.2, 0.4, 0.8, opacity))
 
 
 def test_area_of_a_circle() -> None:
-    shape, group = circle()
-    image = render([shape], [group])
+    shape, fill = circle()
+    image = render([shape], [fill])
     assert image.shape == (SIZE, SIZE, 4)
     assert float(image[..., 3].sum()) == pytest.approx(math.pi * 100, rel=2e-3)
 
@@ -42,8 +43,8 @@ def test_every_kind_looks_as_its_file_does(tmp_path: Path) -> None:
 
 
 def test_colors_are_not_premultiplied() -> None:
-    shape, group = circle(0.5)
-    image = render([shape], [group])
+    shape, fill = circle(0.5)
+    image = render([shape], [fill])
     assert torch.allclose(image[22, 20], tensor(0.2, 0.4, 0.8, 0.5), atol=1e-5)
     # A pixel that the shape lies on in part: its colour fades as its opacity does.
     edge = (image[..., 3] > 0.1) & (image[..., 3] < 0.4)
@@ -52,54 +53,52 @@ def test_colors_are_not_premultiplied() -> None:
 
 
 def test_a_shape_that_is_not_seen_changes_nothing() -> None:
-    shape, group = circle()
+    shape, fill = circle()
     around = pydiffvg.Rect(tensor(2, 2), tensor(46, 46))
-    hidden = pydiffvg.ShapeGroup(torch.tensor([1]), tensor(0.9, 0.9, 0.9, 0.0))
-    assert torch.allclose(render([shape, around], [group, hidden]), render([shape], [group]), atol=1e-6)
+    hidden = group(1, tensor(0.9, 0.9, 0.9, 0.0))
+    assert torch.allclose(render([shape, around], [fill, hidden]), render([shape], [fill]), atol=1e-6)
 
 
 def test_seams_of_shapes_that_meet_keep_their_color() -> None:
-    halves = [
-        pydiffvg.Rect(tensor(10, 10), tensor(20.5, 30)),
-        pydiffvg.Rect(tensor(20.5, 10), tensor(30, 30)),
-    ]
-    groups = [pydiffvg.ShapeGroup(torch.tensor([i]), tensor(0.2, 0.4, 0.8, 1.0)) for i in range(2)]
-    image = render(halves, groups)
+    halves = [pydiffvg.Rect(tensor(x, 10), tensor(x + 10, 30)) for x in (10.5, 20.5)]
+    image = render(halves, [group(i, tensor(0.2, 0.4, 0.8, 1.0)) for i in range(2)])
     assert torch.allclose(image[20, 20, :3], tensor(0.2, 0.4, 0.8), atol=2e-3)
 
 
-@pytest.mark.parametrize("opacity", [1.0, 0.5])
-def test_background(opacity: float) -> None:
-    shape, group = circle(0.25)
-    below = torch.cat([torch.full((SIZE, SIZE, 3), 0.6), torch.full((SIZE, SIZE, 1), opacity)], dim=2)
+@pytest.mark.parametrize("opacity", [1.0, 0.5, None])
+def test_background(opacity: float | None) -> None:
+    """Without opacity it is opaque."""
+    below = torch.full((SIZE, SIZE, 3), 0.6)
+    if opacity is not None:
+        below = torch.cat([below, torch.full((SIZE, SIZE, 1), opacity)], dim=2)
     below.requires_grad_()
-    image = render([shape], [group], below)
-    shown = image.detach()
-    left = 0.75 * opacity
-    total = 0.25 + left
-    assert float(shown[22, 20, 3]) == pytest.approx(total, abs=1e-5)
-    assert float(shown[22, 20, 2]) == pytest.approx((0.25 * 0.8 + left * 0.6) / total, abs=1e-5)
-    assert torch.allclose(shown[2, 2], below[2, 2], atol=1e-5)
+    shape, fill = circle(0.25)
+    image = render([shape], [fill], below)
+    through = 0.75 * (opacity or 1.0)
+    total = 0.25 + through
+    assert float(image[22, 20, 3].detach()) == pytest.approx(total, abs=1e-5)
+    assert float(image[22, 20, 2].detach()) == pytest.approx((0.25 * 0.8 + through * 0.6) / total, abs=1e-5)
+    assert torch.allclose(image[2, 2], tensor(0.6, 0.6, 0.6, opacity or 1.0), atol=1e-5)
     (grad,) = torch.autograd.grad(image[22, 20, 2], below)
-    assert float(grad[22, 20, 2]) == pytest.approx(left / total, abs=1e-4)
+    assert grad.shape == below.shape
+    assert float(grad[22, 20, 2]) == pytest.approx(through / total, abs=1e-4)
 
 
-def test_other_size_than_the_canvas() -> None:
+@pytest.mark.parametrize("size", [(2 * SIZE, 2 * SIZE), (2 * SIZE, SIZE)])
+def test_other_size_than_the_canvas(size: tuple[int, int]) -> None:
     shapes, groups = scene()
-    large = render(shapes, groups, size=(2 * SIZE, 2 * SIZE))
-    halved = large.reshape(SIZE, 2, SIZE, 2, 4).mean(dim=(1, 3))
-    assert psnr(on_white(halved), on_white(render(shapes, groups))) > 33
-    wide = render(shapes, groups, size=(2 * SIZE, SIZE)).reshape(SIZE, SIZE, 2, 4).mean(dim=2)
-    assert psnr(on_white(wide), on_white(render(shapes, groups))) > 33
+    large = render(shapes, groups, size=size)
+    shrunk = large.reshape(SIZE, size[1] // SIZE, SIZE, size[0] // SIZE, 4).mean(dim=(1, 3))
+    assert psnr(on_white(shrunk), on_white(render(shapes, groups))) > 33
 
 
 def test_scenes_of_one_structure_share_a_layout() -> None:
-    shape, group = circle()
-    render([shape], [group])
-    before = len(LAYOUTS)
+    shape, fill = circle()
+    render([shape], [fill])
+    before = make_layout.cache_info().misses
     for radius in range(3, 9):
-        render([pydiffvg.Circle(tensor(float(radius)), tensor(20, 20))], [group])
-    assert len(LAYOUTS) == before
+        render([pydiffvg.Circle(tensor(float(radius)), tensor(20, 20))], [fill])
+    assert make_layout.cache_info().misses == before
 
 
 def test_nothing_to_draw() -> None:
@@ -107,15 +106,15 @@ def test_nothing_to_draw() -> None:
 
 
 def varied() -> dict[str, tuple[Tensor, Callable[[Tensor], Tensor]]]:
-    """What has gradients: values, and the picture that they make."""
+    """Return what has gradients: values, and the image that they make."""
 
     def one(shape: object, color: object = None, **group: object) -> Tensor:
         fill = tensor(0.7, 0.3, 0.5, 0.8) if color is None else color
         return render([shape], [pydiffvg.ShapeGroup(torch.tensor([0]), fill, **group)])  # type: ignore[list-item]
 
     def stroked(shape: object, **group: object) -> Tensor:
-        made = pydiffvg.ShapeGroup(torch.tensor([0]), None, stroke_color=tensor(0.2, 0.6, 0.1, 0.7), **group)
-        return render([shape], [made])  # type: ignore[list-item]
+        stroke = tensor(0.2, 0.6, 0.1, 0.7)
+        return render([shape], [pydiffvg.ShapeGroup(torch.tensor([0]), None, stroke_color=stroke, **group)])  # type: ignore[list-item]
 
     disc = pydiffvg.Circle(tensor(12.0), tensor(24.3, 22.1), tensor(2.0))
     bow = tensor([[8, 30], [14, 8], [30, 44], [40, 16]])
@@ -185,29 +184,36 @@ def test_gradients_are_those_of_differences(name: str) -> None:
         assert found == pytest.approx(expected, rel=0.03, abs=0.03 * float(gradient.norm()))
 
 
-def test_what_is_not_there_says_so() -> None:
-    shape, group = circle()
-    serialize = pydiffvg.RenderFunction.serialize_scene
+NO_POINT = pydiffvg.Circle(tensor(float("nan")), tensor(9, 9))
+REFUSED: dict[str, Callable[[], object]] = {
+    "signed distances": lambda: serialize([blob()], output_type=pydiffvg.OutputType.sdf),
+    "signed distances .*eval_positions": lambda: serialize([blob()], eval_positions=torch.zeros(3, 2)),
+    "pixel filter tent of radius 1 ": lambda: serialize(
+        [blob()], filter=pydiffvg.PixelFilter(FilterType.tent, tensor(1.0))
+    ),
+    "group 0 names shape 0, there are 0": lambda: serialize([]),
+    "shape 0 has 6 points, its num_control_points .* ask for 7": lambda: serialize(
+        [pydiffvg.Path(torch.tensor([2, 2]), torch.zeros(6, 2), False)]
+    ),
+    "center of shape 0 has shape": lambda: serialize([pydiffvg.Circle(tensor(1.0), torch.zeros(3))]),
+    "render_grad": pydiffvg.RenderFunction.render_grad,
+    "a point of a shape is not finite": lambda: render([NO_POINT], [group()]),
+    "background_image has shape": lambda: render([blob()], [group()], torch.zeros(SIZE, 9, 4)),
+    "takes what RenderFunction.serialize_scene gave": lambda: pydiffvg.RenderFunction.apply(
+        SIZE, SIZE, 2, 2, 0, None, SIZE, SIZE
+    ),
+}
 
-    def refused(message: str, *arguments: object, **more: object) -> None:
-        with pytest.raises(UsageError, match=message) as caught:
-            serialize(SIZE, SIZE, *arguments, **more)
-        assert "\n" not in str(caught.value)
 
-    refused("signed distances", [shape], [group], output_type=pydiffvg.OutputType.sdf)
-    refused("signed distances", [shape], [group], eval_positions=torch.zeros(3, 2))
-    tent = pydiffvg.PixelFilter(FilterType.tent, tensor(1.0))
-    refused("pixel filter tent of radius 1", [shape], [group], filter=tent)
-    refused("group 0 names shape 0, there are 0", [], [group])
-    path = pydiffvg.Path(torch.tensor([2, 2]), torch.zeros(6, 2), False)
-    refused("shape 0 has 6 points, its num_control_points .* ask for 7", [path], [group])
-    refused("center of shape 0 has shape", [pydiffvg.Circle(tensor(1.0), torch.zeros(3))], [group])
-    with pytest.raises(UsageError, match="render_grad"):
-        pydiffvg.RenderFunction.render_grad()
-    with pytest.raises(UsageError, match="a point of a shape is not finite"):
-        render([pydiffvg.Circle(tensor(float("nan")), tensor(9, 9))], [group])
-    with pytest.raises(UsageError, match="background_image has shape"):
-        render([shape], [group], torch.zeros(SIZE, 9, 4))
+def serialize(shapes: list[Shape], **more: Any) -> object:
+    return pydiffvg.RenderFunction.serialize_scene(SIZE, SIZE, shapes, [group()], **more)
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_is_not_supported_is_named_in_one_line(message: str) -> None:
+    with pytest.raises(UsageError, match=message) as caught:
+        REFUSED[message]()
+    assert "\n" not in str(caught.value)
 
 
 def test_a_device_that_is_not_there() -> None:
@@ -223,10 +229,9 @@ def test_a_device_that_is_not_there() -> None:
 
 
 def test_opacity_that_has_left_its_range_comes_back() -> None:
-    shape, group = circle()
-    color = tensor(0.2, 0.4, 0.8, 1.2).requires_grad_()
-    group.fill_color = color
-    image = render([shape], [group])
+    shape, fill = circle()
+    color = fill.fill_color = tensor(0.2, 0.4, 0.8, 1.2).requires_grad_()
+    image = render([shape], [fill])
     assert float(image[22, 20, 3].detach()) == pytest.approx(1.0, abs=1e-5)
     image[..., 3].sum().backward()
     assert color.grad is not None and float(color.grad[3]) > 100

@@ -52,13 +52,13 @@ pydiffvg.RenderFunction.serialize_scene(8, 8, [], [], output_type=pydiffvg.Outpu
 
 
 def is_ours(name: str) -> bool:
-    """Whether a module is one that scripts get from this package."""
+    """Return whether scripts get a module from this package."""
     return name.partition(".")[0] in ("pydiffvg", "diffvg", "optimize_svg")
 
 
 @pytest.fixture(autouse=True)
 def _own_modules(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
-    """What a script sees of the interpreter is as before afterwards."""
+    """Restore what a script changes in the interpreter."""
     before = {name: module for name, module in sys.modules.items() if is_ours(name)}
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setattr(sys, "path", [*sys.path])
@@ -80,7 +80,7 @@ def test_a_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (tmp_path / "results/fit/final.png").exists()
 
 
-def test_what_is_not_there_is_one_line_with_its_place(
+def test_what_is_not_supported_is_one_line_with_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     script = tmp_path / "distances.py"

@@ -1,12 +1,13 @@
-"""Renderers that are kept: as few as needed, no more than allowed, for ever."""
+"""Engines that are kept: as few as needed, and no more than allowed."""
 
 from __future__ import annotations
 
 import gc
 import sys
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,12 +28,12 @@ def step(scene: Scene, width: int = 40) -> torch.Tensor:
 
 def live(kind: type) -> int:
     gc.collect()
-    return sum(type(each) is kind for each in gc.get_objects())  # others dislike being asked
+    return sum(type(each) is kind for each in gc.get_objects())  # isinstance would run code of other classes
 
 
 @pytest.fixture(scope="module", autouse=True)
 def only_what_is_new() -> Iterator[None]:
-    """Neither counted nor looked at is what there was before these tests: the objects of all modules."""
+    """Leave out the objects of all modules, which exist before these tests."""
     clear_cache()
     gc.collect()
     gc.freeze()
@@ -45,41 +46,30 @@ def empty() -> None:
     clear_cache()
 
 
-def test_scenes_of_one_structure_share_a_renderer() -> None:
-    scene = random_scene(Kind.FILL)
-    for by in range(4):
-        step(replace(scene, points=scene.points + np.float32(by), first=scene.first.copy()))
-    assert live(engine.Engine) == 1
+def with_canvas(scene: Scene, **changed: Any) -> Scene:
+    return replace(scene, canvas=replace(scene.canvas, **changed))
 
 
 @pytest.mark.parametrize(
-    "other",
+    ("engines", "change"),
     [
-        lambda scene: random_scene(Kind.STROKE),
-        lambda scene: replace(scene, rule=1 - scene.rule),
-        lambda scene: replace(scene, canvas=replace(scene.canvas, background=np.zeros(3, np.float32))),
-        lambda scene: replace(scene, canvas=replace(scene.canvas, width=39)),
-        lambda scene: replace(scene, cap=scene.cap + 1),
+        (1, lambda scene: replace(scene, points=scene.points + np.float32(3), first=scene.first.copy())),
+        (2, lambda scene: random_scene(Kind.FILL)),
+        (2, lambda scene: replace(scene, rule=1 - scene.rule)),
+        (2, lambda scene: with_canvas(scene, background=np.zeros(3, np.float32))),
+        (2, lambda scene: with_canvas(scene, width=39)),
+        (2, lambda scene: replace(scene, cap=scene.cap + 1)),
+        (2, lambda scene: replace(scene, dashes=tuple((start, 2.0, 9.0) for start, *_ in scene.dashes))),
     ],
 )
-def test_another_structure_has_a_renderer_of_its_own(other: object) -> None:
-    assert callable(other)
-    scene = random_scene(Kind.FILL)
-    changed = other(scene)
-    images = [render(SceneTensors.of(each)) for each in (scene, changed, scene)]
-    assert torch.equal(images[0], images[2])
-    assert live(engine.Engine) == 2
-
-
-def test_patterns_of_dashes_belong_to_the_structure() -> None:
+def test_scenes_of_one_structure_share_an_engine(engines: int, change: Callable[[Scene], Scene]) -> None:
     scene = styled_scene(Cap.BUTT, Join.BEVEL, 1)
-    first = step(scene)
-    other = replace(scene, dashes=tuple((offset, 2.0, 9.0) for offset, *_ in scene.dashes))
-    assert step(other) != first
-    assert step(scene) == first
+    images = [render(SceneTensors.of(each)) for each in (scene, change(scene), scene)]
+    assert torch.equal(images[0], images[2])
+    assert live(engine.Engine) == engines
 
 
-def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changing_scenes_neither_compile_nor_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:
     step(random_scene(Kind.FILL, 2))
     monkeypatch.setattr(kernel_cache, "compile_by", None)
     monkeypatch.setattr(engine, "KEPT", 3)
@@ -92,9 +82,8 @@ def test_changing_scenes_neither_compile_nor_pile_up(monkeypatch: pytest.MonkeyP
     assert tensors[0] == tensors[1]
 
 
-def test_an_engine_keeps_no_picture_alive() -> None:
-    tensors = SceneTensors.of(random_scene(Kind.FILL), requires_grad=True)
-    image = render(tensors)
+def test_an_engine_keeps_no_image_alive() -> None:
+    image = render(SceneTensors.of(random_scene(Kind.FILL), requires_grad=True))
     gradient = torch.ones_like(image)
     image.backward(gradient)
     kept = [weakref.ref(image), weakref.ref(gradient)]
@@ -103,24 +92,20 @@ def test_an_engine_keeps_no_picture_alive() -> None:
     assert [each() for each in kept] == [None, None]
 
 
-def test_little_memory_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "KEPT_BYTES", 1)
-    for count in (2, 3, 4):
-        step(random_scene(Kind.FILL, count))
-    assert live(engine.Engine) == 1
-
-
-def test_the_bytes_are_counted_and_grow_with_the_picture() -> None:
+def test_bytes_are_counted_and_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = random_scene(Kind.FILL, 2)
     step(scene)
     step(scene, 800)
     small, large = (each.bytes for each in engine.ENGINES._kept.values())
     assert 50_000 < small < large / 20
+    monkeypatch.setattr(engine, "KEPT_BYTES", 1)
+    step(random_scene(Kind.FILL, 3))
+    assert live(engine.Engine) == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks the system for the size of the process")
 def test_many_steps_need_no_more_memory() -> None:
-    """Images of a quarter of a megabyte, and their gradients: one kept in five would be seen."""
+    """Images and gradients of a quarter of a megabyte: one in five that is kept would show."""
 
     def resident() -> int:
         with open("/proc/self/statm", encoding="ascii") as sizes:

@@ -17,7 +17,7 @@ from tests.scenes import (
     with_gradients,
     with_two_stops,
 )
-from tests.torch.helpers import compare
+from tests.torch.helpers import compare, compare_straight
 from warpsplat.scene import Canvas, Cap, Join, Kind, Rule, Scene
 from warpsplat.torch import SceneTensors, render
 
@@ -48,21 +48,32 @@ def test_transparent_canvas() -> None:
 
 @pytest.mark.parametrize(("name", "transparent"), [("mixed", False), ("holes", False), ("gradients", True)])
 def test_opacities_of_one(name: str, transparent: bool) -> None:
-    """What lies behind an opaque shape has no gradient, but says what the shape's opacity is worth."""
+    """Shapes behind an opaque one have no gradient, but determine that of its opacity."""
     scene = SCENES[name]()
     opacities = np.where(np.arange(len(scene)) % 3 == 1, scene.opacities, 1).astype(np.float32)
     scene = replace(scene, opacities=opacities)
     compare(clear(scene) if transparent else scene)
 
 
-def test_opaque_splats() -> None:
+@pytest.mark.parametrize("name", ["mixed", "opaque", "gradients"])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_colors_that_are_not_premultiplied(name: str, threads: int) -> None:
+    """Opaque shapes hide others, some of which are faint or invisible."""
+    scene = random_scene(Kind.FILL, 6, seed=4) if name == "opaque" else SCENES[name]()
+    if name == "opaque":
+        scene = replace(scene, opacities=np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32))
+    compare_straight(clear(scene), threads)
+
+
+@pytest.mark.parametrize("opaque", [False, True])
+def test_splats(opaque: bool) -> None:
     scene = mixed_scene(seed=0, splines=False)
-    compare(replace(scene, opacities=np.ones_like(scene.opacities)), "splat")
+    compare(replace(scene, opacities=np.ones_like(scene.opacities)) if opaque else scene, "splat")
 
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_opaque_shapes_behind_one_another(kind: Kind) -> None:
-    """Three in one place: the front one is seen, the next one says what its opacity is worth."""
+    """The front one of three in one place is seen; the next one determines its opacity's gradient."""
     one = random_scene(kind, 1, seed=2)
     scene = replace(one.append(one).append(one), opacities=np.ones(3, np.float32))
     scene = replace(scene, widths=np.full(3, 30 if kind == Kind.STROKE else 0, np.float32))
@@ -74,10 +85,6 @@ def test_opaque_shapes_behind_one_another(kind: Kind) -> None:
     assert abs(colors[2]).max() > 0
 
 
-def test_splats() -> None:
-    compare(mixed_scene(seed=0, splines=False), "splat")
-
-
 @pytest.mark.parametrize("kind", list(Kind))
 def test_soft_gaussians(kind: Kind) -> None:
     scene = random_scene(kind, 3, seed=7)
@@ -85,7 +92,7 @@ def test_soft_gaussians(kind: Kind) -> None:
     compare(replace(scene, fades=fades.astype(np.float32)), "gaussian", tolerance=2e-3)
 
 
-def test_only_what_is_asked_for_is_found_and_it_is_the_same() -> None:
+def test_some_gradients_are_those_of_all() -> None:
     scene = with_gradients(mixed_scene(seed=2))
     whole = SceneTensors.of(scene, requires_grad=True)
     render(whole).square().sum().backward()
@@ -97,8 +104,8 @@ def test_only_what_is_asked_for_is_found_and_it_is_the_same() -> None:
         torch.testing.assert_close(some.values[name].grad, whole.values[name].grad, rtol=0, atol=0)
 
 
-def test_through_what_made_the_attributes() -> None:
-    """A tensor that is no leaf, and a view that is not contiguous."""
+def test_gradients_flow_on_to_the_leaves() -> None:
+    """Through a computed tensor, and a view that is not contiguous."""
     scene = random_scene(Kind.FILL, 4)
     shift = torch.zeros(2, dtype=torch.float32, requires_grad=True)
     colors = torch.tensor(scene.colors.T.copy(), requires_grad=True)

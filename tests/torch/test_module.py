@@ -1,4 +1,4 @@
-"""``warpsplat.torch.Module``: rates, bounds, training, what becomes of it."""
+"""``warpsplat.torch.Module``: parameters, rates, bounds, training, files."""
 
 from __future__ import annotations
 
@@ -15,54 +15,59 @@ from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.svg.read import load_scene
 from warpsplat.torch import Module, SceneTensors, over, render
 
+NAMES = {"points", "colors", "opacities"}
+
 
 def twins() -> Scene:
-    """A path that is filled and stroked."""
+    """Return a path that is filled and stroked."""
     fill = random_scene(Kind.FILL, 1, seed=1)
-    stroke = replace(
-        fill, kind=np.array([Kind.STROKE], np.int32), widths=np.full(1, 2, np.float32), colors=1 - fill.colors
-    )
+    kind, widths = np.array([Kind.STROKE], np.int32), np.full(1, 2, np.float32)
+    stroke = replace(fill, kind=kind, widths=widths, colors=1 - fill.colors)
     return replace(fill.append(stroke), twin=np.array([0, 1], np.int32))
 
 
-def test_parameters_are_what_some_shape_has() -> None:
-    names = {name for name, _ in Module(random_scene(Kind.FILL)).named_parameters()}
-    assert names == {"points", "colors", "opacities"}
-    soft = {name for name, _ in Module(random_scene(Kind.STROKE), renderer="gaussian").named_parameters()}
-    assert soft == {*names, "widths", "fades"}
-    every = {name for name, _ in Module(with_gradients(mixed_scene())).named_parameters()}
-    assert every == {*names, "widths", "frames", "stop_offsets", "stop_colors", "stop_opacities"}
+@pytest.mark.parametrize(
+    ("scene", "renderer", "more"),
+    [
+        (random_scene(Kind.FILL), "exact", set()),
+        (random_scene(Kind.STROKE), "gaussian", {"widths", "fades"}),
+        (
+            with_gradients(mixed_scene()),
+            "exact",
+            {"widths", "frames", "stop_offsets", "stop_colors", "stop_opacities"},
+        ),
+    ],
+)
+def test_parameters_are_what_some_shape_has(scene: Scene, renderer: str, more: set[str]) -> None:
+    assert {name for name, _ in Module(scene, renderer=renderer).named_parameters()} == NAMES | more
 
 
 def test_rates_are_those_of_a_run() -> None:
-    """A canvas of 2000 px is trained at 1131: a pixel there is 1.77 units."""
-    scene = random_scene(Kind.STROKE, 2, 2000, 2000)
-    groups = {group["name"]: group["lr"] for group in Module(scene).parameter_groups(rate=0.5)}
-    assert groups["colors"] == pytest.approx(0.5 * 0.02)
-    assert groups["points"] == pytest.approx(0.5 * 3.0 * 2000 / 1265, rel=1e-3)
-    assert groups["points"] == pytest.approx(10 * groups["widths"])
-    settings = make_settings(rates={"points": 7.0})
-    own = {group["name"]: group["lr"] for group in Module(scene).parameter_groups(settings)}
+    """A canvas of 2000 px is trained at 1265."""
+    module = Module(random_scene(Kind.STROKE, 2, 2000, 2000))
+    rates = {group["name"]: group["lr"] for group in module.parameter_groups(rate=0.5)}
+    assert rates["colors"] == pytest.approx(0.5 * 0.02)
+    assert rates["points"] == pytest.approx(0.5 * 3.0 * 2000 / 1265, rel=1e-3)
+    assert rates["points"] == pytest.approx(10 * rates["widths"])
+    own = {g["name"]: g["lr"] for g in module.parameter_groups(make_settings(rates={"points": 7.0}))}
     assert own["points"] == pytest.approx(7.0 * 2000 / 1265, rel=1e-3)
 
 
-def test_project_brings_all_back_into_bounds() -> None:
+def test_project_clamps_to_the_bounds() -> None:
     module = Module(random_scene(Kind.STROKE))
     with torch.no_grad():
         for parameter in module.parameters():
             parameter.copy_(torch.where(torch.rand(parameter.shape) < 0.5, -1e6, 1e6))
     module.project()
-    shown = module.tensors().values
-    assert {round(x, 4) for x in shown["opacities"].tolist()} <= set(OPACITY_RANGE)
-    assert set(shown["colors"].flatten().tolist()) <= {0.0, 1.0}
-    assert set(shown["points"].flatten().tolist()) <= {-40.0, 80.0}
-    assert set(shown["widths"].tolist()) <= {1.0, 40.0}
+    found = {name: set(value.flatten().tolist()) for name, value in module.tensors().values.items()}
+    assert {round(x, 4) for x in found["opacities"]} <= set(OPACITY_RANGE)
+    assert found["colors"] <= {0.0, 1.0} and found["points"] <= {-40.0, 80.0}
+    assert found["widths"] <= {1.0, 40.0}
 
 
-def test_training_comes_near_to_its_target() -> None:
+def test_training_approaches_its_target() -> None:
     wanted = render(SceneTensors.of(disc(11, 40, 22)))
-    start = disc(6, 40, 14)
-    module = Module(replace(start, colors=np.full((1, 3), 0.5, np.float32)))
+    module = Module(replace(disc(6, 40, 14), colors=np.full((1, 3), 0.5, np.float32)))
     optimizer = torch.optim.Adam(module.parameter_groups(rate=0.5), betas=(0.9, 0.99))
     losses = []
     for _ in range(60):
@@ -75,27 +80,20 @@ def test_training_comes_near_to_its_target() -> None:
     assert losses[-1] < losses[0] / 30
 
 
-def test_twins_stay_one() -> None:
-    module = Module(twins())
+def test_twins_share_their_points_and_add_their_gradients() -> None:
+    module, both = Module(twins()), SceneTensors.of(twins(), requires_grad=True)
     optimizer = torch.optim.Adam(module.parameter_groups())
-    for _ in range(3):
-        optimizer.zero_grad()
-        module().square().sum().backward()
-        optimizer.step()
+    module().square().sum().backward()
+    render(both).square().sum().backward()
+    points, gradient = both.values["points"].grad, module.get_parameter("points").grad
+    assert points is not None and gradient is not None
+    half = len(points) // 2
+    torch.testing.assert_close(gradient[:half], points[:half] + points[half:])
+    optimizer.step()
     scene = module.scene()
     np.testing.assert_array_equal(scene.points_of(0), scene.points_of(1))
     assert scene.twin.tolist() == [0, 1]
     assert not np.array_equal(scene.points_of(0), twins().points_of(0))
-    both = SceneTensors.of(twins(), requires_grad=True)
-    render(both).square().sum().backward()
-    own = Module(twins())
-    own().square().sum().backward()
-    points = both.values["points"].grad
-    assert points is not None
-    half = len(points) // 2
-    gradient = dict(own.named_parameters())["points"].grad
-    assert gradient is not None
-    torch.testing.assert_close(gradient[:half], points[:half] + points[half:])
 
 
 def test_twins_that_part_are_two_shapes() -> None:
@@ -107,27 +105,18 @@ def test_twins_that_part_are_two_shapes() -> None:
 
 def test_the_scene_holds_what_a_file_can() -> None:
     tensors = SceneTensors.of(with_gradients(random_scene(Kind.FILL)))
-    tensors.values["opacities"].fill_(1.2)
-    tensors.values["stop_offsets"].fill_(-3)
-    tensors.values["colors"].fill_(2)
-    scene = tensors.scene()
-    assert (scene.opacities == 1).all()
-    assert (scene.stop_offsets == 0).all()
-    assert (scene.colors == 1).all()
-    assert (scene.paint[:-1] != Paint.FLAT).all()
+    for name, value, held in (("opacities", 1.2, 1), ("stop_offsets", -3, 0), ("colors", 2, 1)):
+        tensors.values[name].fill_(value)
+        assert (getattr(tensors.scene(), name) == held).all()
+    assert (tensors.scene().paint[:-1] != Paint.FLAT).all()
     tensors.values["points"][0, 0] = torch.nan
     with pytest.raises(ValueError, match="points holds numbers that are not finite"):
         tensors.scene()
 
 
-def test_the_file_shows_what_the_module_does() -> None:
-    module = Module(random_scene(Kind.FILL, 5, 64, 64))
-    read = load_scene(module.to_svg(), 64, 64, "a file")[0]
-    assert (render(SceneTensors.of(read)) - module()).abs().mean() < 2e-3
-
-
 def test_a_module_is_saved_and_loaded() -> None:
-    first = Module(random_scene(Kind.FILL, seed=1))
-    second = Module(replace(random_scene(Kind.FILL, seed=2)))
+    first, second = (Module(random_scene(Kind.FILL, 5, 64, 64, seed=seed)) for seed in (1, 2))
     second.load_state_dict(first.state_dict())
     assert torch.equal(first(), second())
+    read = load_scene(first.to_svg(), 64, 64, "a file")[0]
+    assert (render(SceneTensors.of(read)) - first()).abs().mean() < 2e-3

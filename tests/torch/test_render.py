@@ -1,9 +1,9 @@
-"""``warpsplat.torch.render``: the renderer's image; calls in any order; what is refused."""
+"""``warpsplat.torch.render``: the renderer's image, calls in any order, refusals."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -31,6 +31,10 @@ def points_grad(loss: torch.Tensor, scene: SceneTensors, **options: Any) -> torc
     return gradient
 
 
+def assert_equal(one: torch.Tensor | None, other: torch.Tensor | None) -> None:
+    torch.testing.assert_close(one, other, rtol=0, atol=0)
+
+
 def moved(scene: Scene, by: float) -> SceneTensors:
     return SceneTensors.of(replace(scene, points=scene.points + np.float32(by)), requires_grad=True)
 
@@ -54,15 +58,13 @@ def test_every_model_on_a_transparent_canvas(name: str, model: Model) -> None:
     np.testing.assert_allclose(render(SceneTensors.of(scene), renderer=name).numpy(), native, atol=1e-5)
 
 
-def test_what_has_no_tensor_is_the_layouts() -> None:
+def test_attributes_without_a_tensor_are_the_layouts() -> None:
     scene = random_scene(FILL)
     for changed in (scene, replace(scene, colors=1 - scene.colors)):
-        np.testing.assert_array_equal(
-            render(SceneTensors(changed, {})), render(SceneTensors.of(changed)), "the same engine"
-        )
+        assert_equal(render(SceneTensors(changed, {})), render(SceneTensors.of(changed)))
 
 
-def test_opaque_is_opaque_and_no_shape_is_no_trouble() -> None:
+def test_opaque_shapes_and_no_shapes() -> None:
     white = disc(60, 40, 20)
     assert (render(SceneTensors.of(white)) - 1).abs().max() < 1e-5
     nothing = SceneTensors.of(random_scene(FILL).take(np.arange(0)), requires_grad=True)
@@ -72,22 +74,21 @@ def test_opaque_is_opaque_and_no_shape_is_no_trouble() -> None:
     image.sum().backward()
 
 
-def test_values_without_sense_are_drawn_as_the_nearest_with_its_gradient() -> None:
-    scene = random_scene(FILL, 3)
-    beyond = SceneTensors.of(
-        replace(scene, opacities=np.array([1.5, -0.2, 0.5], np.float32)), requires_grad=True
-    )
-    within = SceneTensors.of(replace(scene, opacities=np.array([1, 0, 0.5], np.float32)), requires_grad=True)
-    for one in (beyond, within):
-        loss_of(one).backward()
-    torch.testing.assert_close(beyond.values["opacities"].grad, within.values["opacities"].grad)
+def test_values_are_clamped_and_have_the_gradient_there() -> None:
+    gradients = []
+    for opacities in ([1.5, -0.2, 0.5], [1, 0, 0.5]):
+        scene = replace(random_scene(FILL, 3), opacities=np.array(opacities, np.float32))
+        tensors = SceneTensors.of(scene, requires_grad=True)
+        loss_of(tensors).backward()
+        gradients.append(tensors.values["opacities"].grad)
+    torch.testing.assert_close(*gradients)
 
 
-def test_a_size_from_one_side() -> None:
-    scene = SceneTensors.of(random_scene(FILL))
-    assert render(scene, 80).shape == (72, 80, 4)
-    assert render(scene, height=18).shape == (18, 20, 4)
-    assert render(scene, 60, 54).shape == (54, 60, 4)
+@pytest.mark.parametrize("size", [{"width": 80}, {"height": 18}, {"width": 60, "height": 54}])
+def test_one_side_gives_the_other(size: dict[str, int]) -> None:
+    height, width, planes = render(SceneTensors.of(random_scene(FILL)), **size).shape
+    assert {"width": width, "height": height}.items() >= size.items()
+    assert (10 * height, planes) == (9 * width, 4)
 
 
 def test_a_list_of_scenes_is_each_of_them() -> None:
@@ -99,42 +100,24 @@ def test_a_list_of_scenes_is_each_of_them() -> None:
     assert images.shape == (3, 36, 40, 4)
     images.square().sum().backward()
     for image, scene in zip(images, scenes, strict=True):
-        torch.testing.assert_close(image, render(scene), rtol=0, atol=0)
-        alone = points_grad(loss_of(scene), scene)
-        torch.testing.assert_close(scene.values["points"].grad, alone, rtol=0, atol=0)
+        assert_equal(image, render(scene))
+        assert_equal(scene.values["points"].grad, points_grad(loss_of(scene), scene))
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_two_forwards_then_two_backwards(order: tuple[int, int]) -> None:
+def test_calls_do_not_disturb_one_another(order: tuple[int, int]) -> None:
+    """Two scenes of one engine: forward, forward, backward, backward, and one backward pass again."""
     scenes = [moved(random_scene(FILL), by) for by in (0.0, 3.0)]
     alone = [points_grad(loss_of(scene), scene) for scene in scenes]
-    losses = [loss_of(scene) for scene in scenes]
+    images = [render(scene) for scene in scenes]
+    copies = [image.detach().clone() for image in images]
+    losses = [image.square().sum() for image in images]
+    found = {i: points_grad(losses[i], scenes[i], retain_graph=True) for i in (*order, *order)}
     for i in order:
-        torch.testing.assert_close(points_grad(losses[i], scenes[i]), alone[i], rtol=0, atol=0)
+        assert_equal(found[i], alone[i])
+        assert_equal(points_grad(losses[i], scenes[i]), alone[i])
+        assert_equal(images[i], copies[i])
     assert not torch.equal(*alone)
-
-
-def test_two_backwards_of_one_forward() -> None:
-    scene = moved(random_scene(FILL), 0.0)
-    loss = loss_of(scene)
-    first = points_grad(loss, scene, retain_graph=True)
-    torch.testing.assert_close(points_grad(loss, scene), first, rtol=0, atol=0)
-
-
-def test_an_image_that_is_kept_stays_as_it_is() -> None:
-    scenes = [moved(random_scene(FILL), by) for by in (0.0, 3.0)]
-    first = render(scenes[0])
-    before = first.detach().clone()
-    render(scenes[1]).sum().backward()
-    assert torch.equal(first, before)
-
-
-def test_gradients_that_are_kept_stay_as_they_are() -> None:
-    scenes = [moved(random_scene(FILL), by) for by in (0.0, 3.0)]
-    first = points_grad(loss_of(scenes[0]), scenes[0])
-    before = first.clone()
-    points_grad(loss_of(scenes[1]), scenes[1])
-    assert torch.equal(first, before)
 
 
 def test_a_scene_changed_before_the_backward_pass_is_refused() -> None:
@@ -146,41 +129,33 @@ def test_a_scene_changed_before_the_backward_pass_is_refused() -> None:
         loss.backward()
 
 
-def test_double_backward_is_refused_in_one_line() -> None:
+def test_a_second_derivative_is_refused() -> None:
     scene = moved(random_scene(FILL), 0.0)
     gradient = points_grad(loss_of(scene), scene, create_graph=True)
-    with pytest.raises(RuntimeError, match=r"\Awarpsplat.torch.render has first derivatives only.*\Z"):
+    with pytest.raises(RuntimeError, match="differentiate twice"):
         gradient.sum().backward()
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_several_threads_find_what_one_finds(threads: int) -> None:
-    """Some of them with the same layout, and so the same buffers."""
+    """Some of them render the same layout, and so share buffers."""
     scenes = [moved(random_scene(FILL, 6, seed=k // 2), float(k % 2)) for k in range(6)]
     alone = [points_grad(loss_of(scene), scene) for scene in scenes]
-    found: list[list[torch.Tensor]] = [[] for _ in scenes]
 
-    def work(i: int) -> None:
-        for _ in range(8):
-            found[i].append(points_grad(loss_of(scenes[i], threads=threads), scenes[i]))
+    def work(scene: SceneTensors) -> list[torch.Tensor]:
+        return [points_grad(loss_of(scene, threads=threads), scene) for _ in range(8)]
 
-    crew = [threading.Thread(target=work, args=(i,)) for i in range(len(scenes))]
-    for each in crew:
-        each.start()
-    for each in crew:
-        each.join()
-    for gradients, want in zip(found, alone, strict=True):
-        assert len(gradients) == 8
-        for gradient in gradients:
-            torch.testing.assert_close(gradient, want, rtol=0, atol=0)
+    with ThreadPoolExecutor(len(scenes)) as pool:
+        for gradients, want in zip(pool.map(work, scenes), alone, strict=True):
+            for gradient in gradients:
+                assert_equal(gradient, want)
 
 
 def test_over() -> None:
     scene = random_scene(FILL)
     clear = render(SceneTensors.of(replace(scene, canvas=Canvas(40, 36, None))))
-    opaque = render(SceneTensors.of(scene))[..., :3]
-    assert scene.canvas.background is not None
-    torch.testing.assert_close(over(clear, scene.canvas.background.tolist()), opaque, rtol=0, atol=1e-5)
+    opaque, background = render(SceneTensors.of(scene))[..., :3], torch.tensor(scene.canvas.background)
+    torch.testing.assert_close(over(clear, background.tolist()), opaque, rtol=0, atol=1e-5)
     torch.testing.assert_close(over(clear, torch.zeros(36, 40, 3)), clear[..., :3])
 
 

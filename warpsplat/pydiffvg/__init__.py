@@ -1,7 +1,7 @@
 """DiffVG's Python interface on our renderer: ``import warpsplat.pydiffvg as pydiffvg``.
 
-``python -m warpsplat.pydiffvg SCRIPT ARGUMENTS`` runs a script that says ``import pydiffvg``, unchanged. What
-is there and what is not: docs/pydiffvg.md.
+``python -m warpsplat.pydiffvg SCRIPT ARGUMENTS`` runs a script that imports ``pydiffvg`` without changes. It
+renders with ``warpsplat.torch``; docs/pydiffvg.md lists what is supported.
 """
 
 from warpsplat.pydiffvg.color import LinearGradient as LinearGradient

@@ -1,4 +1,4 @@
-"""``python -m warpsplat.pydiffvg SCRIPT ARGUMENTS``: runs a script written for DiffVG."""
+"""``python -m warpsplat.pydiffvg SCRIPT ARGUMENTS``: run a script written for DiffVG."""
 
 from __future__ import annotations
 
@@ -16,23 +16,19 @@ USAGE = "usage: python -m warpsplat.pydiffvg SCRIPT [ARGUMENTS]"
 
 
 def install() -> None:
-    """Have ``import pydiffvg`` and ``import diffvg`` find the modules of this package."""
+    """Make ``import pydiffvg`` and ``import diffvg`` find the modules of this package."""
     package = warpsplat.pydiffvg
     sys.modules["pydiffvg"] = package
     for found in pkgutil.iter_modules(package.__path__):
         if found.name != "__main__":
-            sys.modules[f"pydiffvg.{found.name}"] = importlib.import_module(
-                f"{package.__name__}.{found.name}"
-            )
-    for bare in (
-        "diffvg",
-        "optimize_svg",
-    ):  # the latter from DiffVG's own folder, which scripts add to the path
+            module = importlib.import_module(f"{package.__name__}.{found.name}")
+            sys.modules[f"pydiffvg.{found.name}"] = module
+    for bare in ("diffvg", "optimize_svg"):  # scripts add the folder of the latter to the path
         sys.modules[bare] = sys.modules[f"pydiffvg.{bare}"]
 
 
 def main(arguments: list[str]) -> int:
-    """Run a script; what of it cannot be rendered is said in one line."""
+    """Run a script and return the exit status; an error of ours is one line with its place in the script."""
     if not arguments or arguments[0] in {"-h", "--help"}:
         print(USAGE, file=sys.stderr if not arguments else sys.stdout)
         return 0 if arguments else int(UsageError.exit_code)
@@ -46,11 +42,12 @@ def main(arguments: list[str]) -> int:
         runpy.run_path(str(script), run_name="__main__")
     except WarpsplatError as error:
         message, code = explain(error)
-        frames = traceback.extract_tb(error.__traceback__)
-        place = next(
-            (f"{f.filename}:{f.lineno}: " for f in reversed(frames) if Path(f.filename) == script), ""
-        )
-        print(f"error: {place}{message}", file=sys.stderr)
+        places = [
+            f"{frame.filename}:{frame.lineno}: "
+            for frame in traceback.extract_tb(error.__traceback__)
+            if Path(frame.filename) == script
+        ]
+        print(f"error: {places[-1] if places else ''}{message}", file=sys.stderr)
         return int(code)
     return 0
 

@@ -1,4 +1,4 @@
-"""What ``serialize_scene`` takes down: the tensors of shapes and groups, and what their structure is."""
+"""The scene that ``serialize_scene`` hands to ``apply``: its structure, hashable, and its tensors."""
 
 from __future__ import annotations
 
@@ -17,156 +17,175 @@ from warpsplat.svg.shapes import Line
 
 Tensor = torch.Tensor
 
-RING = (2, 2, 2, 2)
-"""Segments of an ellipse."""
-CORNERS = (0, 0, 0, 0)
-"""Segments of a rectangle."""
+ZERO, ONE, FIRST = 0, 1, 2
+"""Indices of a scene's numbers: the constants 0 and 1, then the values of its tensors one after the other."""
 
 IDENTITY = np.eye(3).tolist()
 
-UNIFORM = 1e-3
-"""By how much a map may stretch one direction more than another and strokes still be of one width."""
+UNIFORM_TOLERANCE = 1e-3
+"""Relative difference of a transform's two scales up to which a stroke keeps one width."""
 
 
-class Form(NamedTuple):
+class PaintStructure(NamedTuple):
+    """Structure of a colour or gradient."""
+
+    kind: str
+    """``flat``, ``linear`` or ``radial``."""
+    stops: int
+    first: int
+    """Index of its first number: four of a colour, or of a gradient's two points (or centre and radii); then
+    the stops' offsets and their colours."""
+
+
+class ShapeStructure(NamedTuple):
     """Structure of a shape."""
 
     kind: str
     """``path``, ``circle``, ``ellipse`` or ``rect``."""
     counts: tuple[int, ...]
-    """Control points of each segment."""
+    """Control points between the ends of each segment: 0, 1 or 2."""
     closed: bool
     points: int
-    """Ends and control points."""
+    """End and control points."""
     tapers: bool
-    """Whether the width of its stroke changes along it."""
+    """Whether the stroke has a width for each point."""
+    first: int
+    """Index of the first coordinate."""
+    width: int
+    """Index of the first width."""
 
 
-class Plan(NamedTuple):
+class GroupStructure(NamedTuple):
     """Structure of a group."""
 
-    shapes: tuple[int, ...]
-    fill: tuple[str, int] | None
-    """Kind of paint, and stops of a gradient."""
-    stroke: tuple[str, int] | None
+    shapes: tuple[ShapeStructure, ...]
+    fill: PaintStructure | None
+    stroke: PaintStructure | None
     even_odd: bool
+    transform: int | None
+    """Index of the first of its nine numbers; None: the identity."""
     uniform: bool
-    """Whether its map has one scale in all directions."""
+    """Whether the transform scales all directions alike."""
     one_width: bool
-    """Whether all its shapes have one and the same tensor as width."""
+    """Whether all its shapes share one tensor as their width."""
     line: Line | None
-    is_mapped: bool
-    """Whether its map changes anything."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """What of a scene is no tensor."""
+    """Everything about a scene but the values in its tensors."""
 
-    forms: tuple[Form, ...]
-    plans: tuple[Plan, ...]
+    groups: tuple[GroupStructure, ...]
 
     @functools.cached_property
     def _hash(self) -> int:
-        return hash((self.forms, self.plans))
+        return hash(self.groups)
 
     def __hash__(self) -> int:
-        """Computed once: a scene that stays asks for it every step."""
+        """Computed once: a scene that stays the same is looked up at every step."""
         return self._hash
 
 
 @dataclass(frozen=True)
 class SceneArguments:
-    """A scene as it was when it was serialized; its tensors are those of the shapes, not copies."""
+    """A serialized scene. Its tensors are those of the shapes and groups, not copies."""
 
     width: int
+    """[canvas units]"""
     height: int
+    """[canvas units]"""
     structure: Structure
     tensors: tuple[Tensor, ...]
-    """Of each shape the points of a path, centre and radius of an ellipse or corners of a rectangle, and the
-    width; then of each group those of its fill, of its stroke, and its map: see ``flat.places_of``."""
+    """For each shape its coordinates and width, then for each group its fill, stroke and transform."""
 
 
-def take_down(
+def serialize(
     width: int, height: int, shapes: Sequence[Shape], groups: Sequence[ShapeGroup], device: torch.device
 ) -> SceneArguments:
-    """Structure and tensors of a scene, on ``device``.
+    """Return the structure and the tensors of a scene, these on ``device``.
 
     Raises:
-        UsageError: something of it cannot be rendered.
+        UsageError: a shape or group that cannot be rendered.
     """
-    forms, plans, tensors = [], [], []
-    for number, shape in enumerate(shapes):
-        form, values = _shape(shape, f"shape {number}", device)
-        forms.append(form)
-        tensors += values
+    tensors = _Tensors(device)
+    forms = [_shape(shape, f"shape {number}", tensors) for number, shape in enumerate(shapes)]
     widths = [id(shape.stroke_width) for shape in shapes]
+    structures = []
     for number, group in enumerate(groups):
-        plan, values = _group(group, f"group {number}", widths, device)
-        plans.append(plan)
-        tensors += values
-    return SceneArguments(int(width), int(height), Structure(tuple(forms), tuple(plans)), tuple(tensors))
+        name, ids = f"group {number}", [int(i) for i in group.shape_ids.tolist()]
+        for i in ids:
+            if not 0 <= i < len(shapes):
+                raise UsageError(f"{name} names shape {i}, there are {len(shapes)}")
+        one_width = len({widths[i] for i in ids}) <= 1
+        structures.append(_group(group, name, tuple(forms[i] for i in ids), one_width, tensors))
+    return SceneArguments(int(width), int(height), Structure(tuple(structures)), tuple(tensors.found))
 
 
-def _tensor(value: Tensor, shape: tuple[int, ...], name: str, device: torch.device) -> Tensor:
-    """``value`` where it is rendered; -1 in ``shape`` stands for any number.
+class _Tensors:
+    """Collects the tensors of a scene."""
 
-    Raises:
-        UsageError: it is no tensor, or has another shape.
-    """
-    if not isinstance(value, Tensor):
-        raise UsageError(f"{name} is a {type(value).__name__}, not a tensor")
-    fits = value.dim() == len(shape) and all(w in {-1, n} for n, w in zip(value.shape, shape, strict=True))
-    if not fits:
-        wanted = ", ".join("n" if n < 0 else str(n) for n in shape)
-        raise UsageError(f"{name} has shape {tuple(value.shape)}, not ({wanted})")
-    if value.dtype == torch.float32 and value.device == device:
-        return value
-    return value.to(device, torch.float32)
+    def __init__(self, device: torch.device) -> None:
+        self.found: list[Tensor] = []
+        self._device = device
+        self._next = FIRST
+
+    def check(self, value: Tensor, shape: tuple[int, ...], name: str) -> Tensor:
+        """Return ``value`` as float32 on the device; -1 in ``shape`` stands for any length.
+
+        Raises:
+            UsageError: it is not a tensor, or has another shape.
+        """
+        if not isinstance(value, Tensor):
+            raise UsageError(f"{name} is a {type(value).__name__}, not a tensor")
+        if value.dim() != len(shape) or any(
+            w not in {-1, n} for n, w in zip(value.shape, shape, strict=True)
+        ):
+            wanted = ", ".join("n" if n < 0 else str(n) for n in shape)
+            raise UsageError(f"{name} has shape {tuple(value.shape)}, not ({wanted})")
+        return value.to(self._device, torch.float32)
+
+    def add(self, value: Tensor, shape: tuple[int, ...], name: str) -> int:
+        """Collect a tensor, see ``check``; return the index of its first number."""
+        self.found.append(self.check(value, shape, name))
+        at, self._next = self._next, self._next + value.numel()
+        return at
+
+    def add_number(self, value: Tensor, name: str) -> int:
+        """Collect a tensor that holds one number, in any shape."""
+        is_number = isinstance(value, Tensor) and value.numel() == 1
+        return self.add(value, tuple(value.shape) if is_number else (), name)
 
 
-def _shape(shape: Shape, name: str, device: torch.device) -> tuple[Form, list[Tensor]]:
+def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
     if isinstance(shape, (Path, Polygon)):
-        points = _tensor(shape.points, (-1, 2), f"points of {name}", device)
-        form = Form("path", _counts(shape, len(points), name), bool(shape.is_closed), len(points), False)
-        values = [points]
+        first = tensors.add(shape.points, (-1, 2), f"points of {name}")
+        kind, counts, closed = "path", _counts(shape, len(shape.points), name), bool(shape.is_closed)
     elif isinstance(shape, Rect):
-        form = Form("rect", CORNERS, True, 4, False)
-        values = [_tensor(p, (2,), f"corner of {name}", device) for p in (shape.p_min, shape.p_max)]
+        kind, counts, closed = "rect", (0, 0, 0, 0), True
+        first = tensors.add(shape.p_min, (2,), f"corner of {name}")
+        tensors.add(shape.p_max, (2,), f"corner of {name}")
     elif isinstance(shape, (Circle, Ellipse)):
-        kind = "circle" if isinstance(shape, Circle) else "ellipse"
-        form = Form(kind, RING, True, 12, False)
-        values = [
-            _tensor(shape.center, (2,), f"center of {name}", device),
-            _number(shape.radius, f"radius of {name}", device)
-            if isinstance(shape, Circle)
-            else _tensor(shape.radius, (2,), f"radius of {name}", device),
-        ]
+        kind, counts, closed = "ellipse", (2, 2, 2, 2), True
+        first = tensors.add(shape.center, (2,), f"center of {name}")
+        if isinstance(shape, Circle):
+            kind = "circle"
+            tensors.add_number(shape.radius, f"radius of {name}")
+        else:
+            tensors.add(shape.radius, (2,), f"radius of {name}")
     else:
         raise UsageError(f"{name} is a {type(shape).__name__}, no shape of pydiffvg")
-    width = shape.stroke_width
-    if isinstance(width, Tensor) and width.numel() != 1:
-        form = form._replace(tapers=True)
-        return form, [*values, _tensor(width, (form.points,), f"stroke_width of {name}", device)]
-    return form, [*values, _number(width, f"stroke_width of {name}", device)]
-
-
-def _number(value: Tensor, name: str, device: torch.device) -> Tensor:
-    """``value`` where it is rendered: one number, in whatever shape.
-
-    Raises:
-        UsageError: it is none.
-    """
-    if isinstance(value, Tensor) and value.numel() == 1:
-        return _tensor(value, tuple(value.shape), name, device)
-    return _tensor(value, (), name, device)
+    points = sum(counts) + len(counts) + (not closed)
+    width, name = shape.stroke_width, f"stroke_width of {name}"
+    tapers = isinstance(width, Tensor) and width.numel() != 1
+    at = tensors.add(width, (points,), name) if tapers else tensors.add_number(width, name)
+    return ShapeStructure(kind, counts, closed, points, tapers, first, at)
 
 
 def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
-    """Control points of each segment.
+    """Return the number of control points of each segment.
 
     Raises:
-        UsageError: they are not as many as there are points for.
+        UsageError: they do not fit the number of points.
     """
     is_open = not shape.is_closed
     if isinstance(shape, Polygon):
@@ -182,59 +201,32 @@ def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
 
 
 def _group(
-    group: ShapeGroup, name: str, widths: Sequence[int], device: torch.device
-) -> tuple[Plan, list[Tensor]]:
-    """``widths``: which tensor is each shape's width."""
-    ids = tuple(map(int, group.shape_ids.tolist()))
-    for i in ids:
-        if not 0 <= i < len(widths):
-            raise UsageError(f"{name} names shape {i}, there are {len(widths)}")
-    fill, fill_tensors = _paint(group.fill_color, f"fill_color of {name}", device)
-    stroke, stroke_tensors = _paint(group.stroke_color, f"stroke_color of {name}", device)
-    matrix = _matrix(group.shape_to_canvas, name, device)
-    plan = Plan(
-        ids,
-        fill,
-        stroke,
-        bool(group.use_even_odd_rule),
-        matrix is None or _is_uniform(matrix),
-        len({widths[i] for i in ids}) <= 1,
-        getattr(group, "line", None),
-        matrix is not None,
-    )
-    return plan, [*fill_tensors, *stroke_tensors, *([] if matrix is None else [matrix])]
+    group: ShapeGroup, name: str, shapes: tuple[ShapeStructure, ...], one_width: bool, tensors: _Tensors
+) -> GroupStructure:
+    fill = _paint(group.fill_color, f"fill_color of {name}", tensors)
+    stroke = _paint(group.stroke_color, f"stroke_color of {name}", tensors)
+    transform, uniform = None, True
+    matrix = tensors.check(group.shape_to_canvas, (3, 3), f"shape_to_canvas of {name}")
+    if matrix.requires_grad or matrix.tolist() != IDENTITY:
+        transform = tensors.add(matrix, (3, 3), name)
+        scales = np.linalg.svd(matrix[:2, :2].detach().cpu().numpy(), compute_uv=False)
+        uniform = bool(scales[1] >= (1 - UNIFORM_TOLERANCE) * scales[0])
+    even_odd, line = bool(group.use_even_odd_rule), getattr(group, "line", None)
+    return GroupStructure(shapes, fill, stroke, even_odd, transform, uniform, one_width, line)
 
 
-def _paint(color: Color, name: str, device: torch.device) -> tuple[tuple[str, int] | None, list[Tensor]]:
-    """Kind of a paint and the number of its stops; its tensors.
-
-    Raises:
-        UsageError: it is none.
-    """
+def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
     if color is None:
-        return None, []
-    if isinstance(color, Tensor):
-        return ("flat", 0), [_tensor(color, (4,), name, device)]
-    if not isinstance(color, (LinearGradient, RadialGradient)):
-        raise UsageError(f"{name} is a {type(color).__name__}, neither a tensor nor a gradient")
-    stops = len(color.offsets)
-    offsets = _tensor(color.offsets, (-1,), f"offsets of {name}", device)
-    colors = _tensor(color.stop_colors, (max(stops, 1), 4), f"stop_colors of {name}", device)
-    if isinstance(color, LinearGradient):
-        ends = [_tensor(p, (2,), f"end of {name}", device) for p in (color.begin, color.end)]
-        return ("linear", stops), [*ends, offsets, colors]
-    center = _tensor(color.center, (2,), f"center of {name}", device)
-    radius = _tensor(color.radius, (2,), f"radius of {name}", device)
-    return ("radial", stops), [center, radius, offsets, colors]
-
-
-def _matrix(matrix: Tensor, name: str, device: torch.device) -> Tensor | None:
-    found = _tensor(matrix, (3, 3), f"shape_to_canvas of {name}", device)
-    if not found.requires_grad and found.tolist() == IDENTITY:
         return None
-    return found
-
-
-def _is_uniform(matrix: Tensor) -> bool:
-    sizes = np.linalg.svd(matrix[:2, :2].detach().cpu().numpy(), compute_uv=False)
-    return bool(sizes[1] >= (1 - UNIFORM) * sizes[0])
+    if isinstance(color, Tensor):
+        return PaintStructure("flat", 0, tensors.add(color, (4,), name))
+    if isinstance(color, LinearGradient):
+        kind, points = "linear", {"begin": color.begin, "end": color.end}
+    elif isinstance(color, RadialGradient):
+        kind, points = "radial", {"center": color.center, "radius": color.radius}
+    else:
+        raise UsageError(f"{name} is a {type(color).__name__}, neither a tensor nor a gradient")
+    first, _ = (tensors.add(point, (2,), f"{what} of {name}") for what, point in points.items())
+    tensors.add(color.offsets, (-1,), f"offsets of {name}")
+    tensors.add(color.stop_colors, (len(color.offsets), 4), f"stop_colors of {name}")
+    return PaintStructure(kind, len(color.offsets), first)

@@ -1,4 +1,4 @@
-"""Gradients. They lie in canvas units, whatever the transform of the group that they paint."""
+"""Paints. Gradients are in canvas units, whatever the transform of the group that they paint."""
 
 from __future__ import annotations
 
@@ -9,29 +9,17 @@ import torch
 Tensor = torch.Tensor
 
 
-def _point() -> Tensor:
-    return torch.zeros(2)
-
-
-def _offset() -> Tensor:
-    return torch.zeros(1)
-
-
-def _transparent() -> Tensor:
-    return torch.zeros(1, 4)
-
-
 @dataclass(eq=False)
 class LinearGradient:
-    """Colours along a line; beyond its ends those of the first and last stop."""
+    """Colours along a line; before and after it those of the first and the last stop."""
 
-    begin: Tensor = field(default_factory=_point)
+    begin: Tensor = field(default_factory=lambda: torch.zeros(2))
     """[canvas units], shape (2,)."""
-    end: Tensor = field(default_factory=_point)
+    end: Tensor = field(default_factory=lambda: torch.zeros(2))
     """[canvas units], shape (2,)."""
-    offsets: Tensor = field(default_factory=_offset)
-    """Of the stops, ascending in [0, 1], shape (stop,)."""
-    stop_colors: Tensor = field(default_factory=_transparent)
+    offsets: Tensor = field(default_factory=lambda: torch.zeros(1))
+    """Stops in [0, 1], ascending, shape (stop,)."""
+    stop_colors: Tensor = field(default_factory=lambda: torch.zeros(1, 4))
     """sRGB and opacity in [0, 1], shape (stop, 4)."""
 
 
@@ -39,15 +27,15 @@ class LinearGradient:
 class RadialGradient:
     """Colours from a centre outwards; beyond the ellipse that of the last stop."""
 
-    center: Tensor = field(default_factory=_point)
+    center: Tensor = field(default_factory=lambda: torch.zeros(2))
     """[canvas units], shape (2,)."""
-    radius: Tensor = field(default_factory=_point)
+    radius: Tensor = field(default_factory=lambda: torch.zeros(2))
     """Along x and y [canvas units], shape (2,)."""
-    offsets: Tensor = field(default_factory=_offset)
-    """Of the stops, ascending in [0, 1], shape (stop,)."""
-    stop_colors: Tensor = field(default_factory=_transparent)
+    offsets: Tensor = field(default_factory=lambda: torch.zeros(1))
+    """Stops in [0, 1], ascending, shape (stop,)."""
+    stop_colors: Tensor = field(default_factory=lambda: torch.zeros(1, 4))
     """sRGB and opacity in [0, 1], shape (stop, 4)."""
 
 
 Color = Tensor | LinearGradient | RadialGradient | None
-"""Of a group's fill or stroke: shape (4,), sRGB and opacity; or a gradient; or nothing."""
+"""Fill or stroke of a group: sRGB and opacity, shape (4,); a gradient; or nothing."""

@@ -1,4 +1,4 @@
-"""What scripts take from DiffVG's compiled module, ``import diffvg``: its enumerations."""
+"""Enumerations that scripts import from DiffVG's compiled module, ``import diffvg``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class FilterType(IntEnum):
-    """What a pixel weighs the picture with. Here a pixel is the mean over its area: ``box``."""
+    """Kinds of pixel filters; only ``box`` can be rendered."""
 
     box = 0
     tent = 1

@@ -1,4 +1,4 @@
-"""Writing pictures."""
+"""Image files."""
 
 from __future__ import annotations
 
@@ -9,21 +9,24 @@ import numpy.typing as npt
 import torch
 from PIL import Image
 
-Pixels = torch.Tensor | npt.NDArray[np.floating]
-
-COMPRESSION = 1
-"""Of PNGs: scripts write one a step, and the best compression takes longer than the step."""
+PNG_COMPRESSION = 1
+"""Scripts write an image at each step, and the best compression takes longer than the step."""
 
 
-def imwrite(img: Pixels, filename: str | Path, gamma: float = 2.2, normalize: bool = False) -> None:
-    """Write a picture as 8 bits; folders that are missing are made.
+def imwrite(
+    img: torch.Tensor | npt.NDArray[np.floating],
+    filename: str | Path,
+    gamma: float = 2.2,
+    normalize: bool = False,
+) -> None:
+    """Write an image with 8 bits per channel; missing folders are made.
 
     Args:
-        img: shape (height, width), or with 1 to 4 channels (height, width, channel), the fourth of which is
-            opacity.
-        filename: its ending says the format.
-        gamma: the first three channels are raised to its inverse; 1 for colours that are sRGB already.
-        normalize: whether the least value is made 0 and the largest 1 before.
+        img: in [0, 1], shape (height, width) or (height, width, channel) with 1 to 4 channels, the fourth of
+            which is opacity.
+        filename: its extension is the format.
+        gamma: the first three channels are raised to the power 1 / gamma; 1 for colours that are sRGB.
+        normalize: whether to map the least value to 0 and the largest to 1 first.
     """
     values = img.detach().cpu().numpy() if isinstance(img, torch.Tensor) else np.asarray(img)
     values = values.astype(np.float32)
@@ -39,8 +42,5 @@ def imwrite(img: Pixels, filename: str | Path, gamma: float = 2.2, normalize: bo
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() in {".jpg", ".jpeg"}:
         pixels = pixels[:, :, :3]
-    made = Image.fromarray(pixels.squeeze(2) if pixels.shape[2] == 1 else pixels)
-    if path.suffix.lower() == ".png":
-        made.save(path, compress_level=COMPRESSION)
-    else:
-        made.save(path)
+    image = Image.fromarray(pixels.squeeze(2) if pixels.shape[2] == 1 else pixels)
+    image.save(path, compress_level=PNG_COMPRESSION)  # which other formats ignore

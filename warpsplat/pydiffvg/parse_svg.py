@@ -1,12 +1,11 @@
 """Any SVG of paths -> shapes and groups.
 
-Read by the program's own reader: transforms are applied to the points, styles and style sheets are resolved,
-basic shapes are paths. What it cannot show is refused by name.
+Our own reader applies transforms to the points, resolves styles and style sheets and turns basic shapes into
+paths. What it cannot show it names in an error.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path as FilePath
 from xml.etree import ElementTree
 
@@ -26,65 +25,70 @@ from warpsplat.svg.structure import read_shapes
 Tensor = torch.Tensor
 
 Scene = tuple[int, int, list[Shape], list[ShapeGroup]]
-"""Width and height of the canvas, shapes, and groups of them."""
+"""Width and height of the canvas [canvas units], shapes, and groups of them."""
 
 
 def svg_to_scene(filename: str | FilePath) -> Scene:
-    """Canvas width and height, shapes and groups of an SVG file; the canvas is the ``viewBox``.
+    """Return the scene of an SVG file; the canvas is its ``viewBox``.
 
     Raises:
-        ImageError: no SVG, or something in it that shapes and groups cannot hold.
+        ImageError: not an SVG, or with something that shapes and groups cannot hold.
     """
     path = FilePath(filename)
     text = read_svg_text(path)
     try:
-        return _scene_of(text)
+        return _read(text)
     except ImageError as error:
         raise ImageError(f"{path}: {error}") from error
 
 
 def parse_scene(node: ElementTree.Element) -> Scene:
-    """The same of the root element of a document, as ``ElementTree.fromstring`` gives it.
+    """Return the scene of a document's root element, as ``ElementTree.fromstring`` gives it.
 
     Raises:
         ImageError: see ``svg_to_scene``.
     """
-    return _scene_of(ElementTree.tostring(node, encoding="unicode"))
+    return _read(ElementTree.tostring(node, encoding="unicode"))
 
 
-def _scene_of(text: str) -> Scene:
-    width, height, scale = _canvas(text)
-    drawn = read_shapes(text, width, height, scale, see_through=True)
+def root_and_size(text: str) -> tuple[dict[str, str], tuple[float, float]]:
+    """Return the attributes of an SVG's root, and its width and height [px].
+
+    Raises:
+        ImageError: not an SVG, or one without a size.
+    """
+    root = inspect_svg(text).root
+    size = svg_size(root)
+    if size is None:
+        raise ImageError("says no size: neither viewBox nor width and height")
+    return root, size
+
+
+def _read(text: str) -> Scene:
+    root, size = root_and_size(text)
+    box = view_box(root)
+    units = box[2:] if box else size
+    width, height = (max(1, int(side)) for side in units)  # whole units, as in DiffVG
+    pairs: list[list[Drawn]] = []
+    for part in read_shapes(text, width, height, units[0] / size[0], see_through=True):
+        if part.is_twin and pairs[-1][-1].line is None:
+            pairs[-1].append(part)
+        else:
+            pairs.append([part])
     shapes: list[Shape] = []
     groups: list[ShapeGroup] = []
-    for one in _groups(drawn):
-        paths, group = _group(one, len(shapes))
+    for parts in pairs:
+        paths, group = _group(parts, len(shapes))
         shapes += paths
         groups.append(group)
     return width, height, shapes, groups
 
 
-def _canvas(text: str) -> tuple[int, int, float]:
-    """Width and height, whole units of the ``viewBox`` as in DiffVG, and how many of them a pixel has."""
-    root = inspect_svg(text).root
-    box, size = view_box(root), svg_size(root)
-    if size is None:
-        raise ImageError("says no size: neither viewBox nor width and height")
-    units = box[2:] if box else size
-    return max(1, int(units[0])), max(1, int(units[1])), units[0] / size[0]
+def _group(parts: list[Drawn], first: int) -> tuple[list[Path], ShapeGroup]:
+    """Return the paths and the group of a fill, a stroke, or a fill and its stroke above it.
 
-
-def _groups(drawn: list[Drawn]) -> list[tuple[Drawn, ...]]:
-    """What is one group: a fill, a stroke, or a fill and its stroke above it."""
-    together = [b.is_twin and a.line is None for a, b in pairwise(drawn)]
-    return [
-        (one, drawn[i + 1]) if i < len(together) and together[i] else (one,)
-        for i, one in enumerate(drawn)
-        if not (i and together[i - 1])
-    ]
-
-
-def _group(parts: tuple[Drawn, ...], first: int) -> tuple[list[Path], ShapeGroup]:
+    ``first``: index of the first path among all shapes.
+    """
     fill = next((part for part in parts if part.line is None), None)
     stroke = next((part for part in parts if part.line is not None), None)
     name = parts[0].element.get("id", "") if parts[0].element is not None else ""
@@ -111,38 +115,38 @@ def _is_plain(line: Line) -> bool:
 
 
 def _color(part: Drawn) -> Color:
-    """A fill's or stroke's paint.
+    """Return the paint of a fill or stroke.
 
     Raises:
-        ImageError: none that pydiffvg has.
+        ImageError: a paint that pydiffvg does not have.
     """
     paint = part.paint
     if isinstance(paint, Flat):
         return torch.tensor([*paint.color, part.opacity * paint.opacity])
     if not isinstance(paint, Gradient):
-        raise ImageError("shows a picture, which no paint of pydiffvg is")
+        raise ImageError("shows a picture, which is no paint of pydiffvg")
     return gradient_of(paint, part.opacity)
 
 
 def gradient_of(paint: Gradient, opacity: float) -> LinearGradient | RadialGradient:
-    """A gradient as pydiffvg has it, whose stops are ``opacity`` times as opaque.
+    """Return a gradient as pydiffvg's, its stops' opacities multiplied by ``opacity``.
 
     Raises:
-        ImageError: it cannot say it.
+        ImageError: a gradient that pydiffvg does not have.
     """
     if paint.spread != "pad":
-        raise ImageError(f"uses a gradient with spreadMethod {paint.spread}, which pydiffvg has not")
+        raise ImageError(f"uses a gradient with spreadMethod {paint.spread}, not supported by pydiffvg")
     offsets = torch.tensor(paint.offsets)
     colors = torch.tensor([[*stop.color, stop.opacity * opacity] for stop in paint.stops])
     origin, along, across = (paint.frame[:2, column] for column in (2, 0, 1))
     if not paint.is_radial:
-        # Lines of one colour run along the second axis: what counts of the first is what is at right angles.
+        # Lines of one colour run along the second axis: only the first one's part at right angles counts.
         side = np.array([-across[1], across[0]]) / np.hypot(*across)
         return LinearGradient(_tensor(origin), _tensor(origin + (along @ side) * side), offsets, colors)
     axes = np.stack([along, across], axis=1)
-    spans = axes @ axes.T  # the ellipse: that of any axes turned within their own space
+    spans = axes @ axes.T  # the ellipse, whichever way the axes are rotated in their own space
     if any(paint.focus) or abs(spans[0, 1]) > 1e-3 * np.trace(spans):
-        raise ImageError("uses a radial gradient with a focus or slanted axes, which pydiffvg has not")
+        raise ImageError("uses a radial gradient with a focus or slanted axes, not supported by pydiffvg")
     return RadialGradient(_tensor(origin), _tensor(np.sqrt(np.diag(spans))), offsets, colors)
 
 

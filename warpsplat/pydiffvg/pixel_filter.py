@@ -12,19 +12,21 @@ from warpsplat.pydiffvg.diffvg import FilterType
 
 @dataclass(eq=False)
 class PixelFilter:
-    """What a pixel weighs the picture with: the box of its own area, radius 0.5, is the one there is."""
+    """Weights of the image around a pixel; only the box of the pixel's own area is supported."""
 
     type: FilterType = FilterType.box
     radius: torch.Tensor = field(default_factory=lambda: torch.tensor(0.5))
     """[px], shape ()."""
 
     def check(self) -> None:
-        """Whether pictures can be rendered so.
+        """Check that the filter is supported.
 
         Raises:
-            UsageError: they cannot.
+            UsageError: it is not.
         """
         radius = float(self.radius)
         if self.type != FilterType.box or radius != 0.5:
             name = getattr(self.type, "name", self.type)
-            raise UsageError(f"pixel filter {name} of radius {radius:g} is not there, only box of radius 0.5")
+            raise UsageError(
+                f"pixel filter {name} of radius {radius:g} is not supported, only box of radius 0.5"
+            )

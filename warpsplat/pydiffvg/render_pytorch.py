@@ -3,44 +3,50 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Any
 
 import torch
 
 from warpsplat.errors import UsageError
+from warpsplat.kernels import constants
 from warpsplat.pydiffvg.arguments import SceneArguments
-from warpsplat.pydiffvg.assemble import LAYOUTS, assemble, outlines_only
+from warpsplat.pydiffvg.assemble import assemble
+from warpsplat.pydiffvg.cache import serialize_cached
 from warpsplat.pydiffvg.device import get_device
+from warpsplat.pydiffvg.layout import Layout, make_layout
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
-from warpsplat.pydiffvg.reading import read
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
-from warpsplat.pydiffvg.straight import over
 from warpsplat.torch import SceneTensors, render
+from warpsplat.torch.engine import check_memory
 from warpsplat.torch.function import draw
 
 Tensor = torch.Tensor
+
+FAINT = 1 / 256
+"""Opacity at which coverages add up: two shapes that each cover half of a pixel cover all of it, where opaque
+ones would leave a quarter."""
 
 print_timing = False
 
 
 def set_print_timing(val: bool) -> None:
-    """Whether each forward pass prints how long it took."""
+    """Set whether each forward pass prints how long it took."""
     global print_timing  # noqa: PLW0603 - DiffVG's interface
     print_timing = val
 
 
 class OutputType(IntEnum):
-    """What a picture shows."""
+    """Kinds of images."""
 
     color = 1
     sdf = 2
-    """Distances to the nearest outline: not there."""
+    """Distances to the nearest outline: not supported."""
 
 
 class RenderFunction:
-    """Used as DiffVG's autograd function is: ``RenderFunction.apply(width, ..., *serialize_scene(...))``."""
+    """Called as DiffVG's autograd function: ``RenderFunction.apply(width, ..., *serialize_scene(...))``."""
 
     @staticmethod
     def serialize_scene(
@@ -53,25 +59,27 @@ class RenderFunction:
         use_prefiltering: bool = False,
         eval_positions: Tensor | None = None,
     ) -> list[Any]:
-        """A scene as further arguments of ``apply``; the first two are width and height of its canvas.
+        """Return a scene as further arguments of ``apply``: its width, its height and ``SceneArguments``.
 
         Args:
             canvas_width: [canvas units]
             canvas_height: [canvas units]
-            shapes: that the groups name.
-            shape_groups: from the back to the front.
-            filter: default: the one there is.
-            output_type: ``color``.
-            use_prefiltering: not read; pictures are never sampled.
-            eval_positions: none.
+            shapes: all shapes that the groups refer to.
+            shape_groups: from back to front.
+            filter: only the default, the box of a pixel, is supported.
+            output_type: only ``color`` is supported.
+            use_prefiltering: ignored: images are never sampled.
+            eval_positions: must be empty.
 
         Raises:
-            UsageError: what cannot be rendered.
+            UsageError: something that cannot be rendered.
         """
         if output_type != OutputType.color or (eval_positions is not None and len(eval_positions)):
-            raise UsageError("signed distances (OutputType.sdf, eval_positions) are not there, only colours")
+            raise UsageError(
+                "signed distances (OutputType.sdf, eval_positions) are not supported, only colours"
+            )
         (filter or PixelFilter()).check()
-        scene = read(canvas_width, canvas_height, shapes, shape_groups, get_device())
+        scene = serialize_cached(canvas_width, canvas_height, shapes, shape_groups, get_device())
         return [canvas_width, canvas_height, scene]
 
     @staticmethod
@@ -84,23 +92,23 @@ class RenderFunction:
         background_image: Tensor | None,
         *args: Any,
     ) -> Tensor:
-        """A picture; gradients flow to all tensors of the scene, and to the background.
+        """Render a scene; gradients flow to all of its tensors and to the background.
 
         Args:
             width: [px]
             height: [px]
-            num_samples_x: not read: a pixel is the mean over its whole area.
-            num_samples_y: the same.
-            seed: not read: nothing is random.
+            num_samples_x: ignored: a pixel is the mean over its whole area.
+            num_samples_y: ignored.
+            seed: ignored: nothing is random.
             background_image: sRGB and opacity, shape (height, width, 4); or sRGB, (height, width, 3).
-            args: what ``serialize_scene`` gave.
+            args: the result of ``serialize_scene``.
 
         Returns:
-            sRGB and opacity, float32, shape (height, width, 4). As in DiffVG a pixel is the mean of colours
-            that are not premultiplied, and black where nothing is: at the edge of what is drawn it fades.
+            sRGB and opacity in [0, 1], float32, shape (height, width, 4). As in DiffVG a pixel is the mean of
+            colours that are not premultiplied, and black where nothing is: edges fade to black.
 
         Raises:
-            UsageError: arguments that are none, a background of another shape, points that are not finite.
+            UsageError: other arguments, a background of another shape, or points that are not finite.
         """
         if len(args) != 3 or not isinstance(args[2], SceneArguments):
             raise UsageError("RenderFunction.apply takes what RenderFunction.serialize_scene gave, unchanged")
@@ -108,46 +116,76 @@ class RenderFunction:
 
     @staticmethod
     def render_grad(*_: Any) -> Tensor:
-        """Not there.
+        """Refuse to render gradients of translations.
 
         Raises:
             UsageError: always.
         """
-        raise UsageError("RenderFunction.render_grad, gradients by pixel of translation, is not there")
+        raise UsageError("RenderFunction.render_grad, gradients of each pixel, is not supported")
 
 
 def render_scene(scene: SceneArguments, width: int, height: int, background: Tensor | None) -> Tensor:
-    """See ``RenderFunction.apply``."""
+    """Render a serialized scene, see ``RenderFunction.apply``."""
     began = time.perf_counter()
     device = get_device()
     if background is not None:
-        background = background.to(device, torch.float32)
-        if background.shape[2:] == (3,):
-            background = torch.nn.functional.pad(background, (0, 1), value=1.0)
-        if tuple(background.shape) != (height, width, 4):
-            raise UsageError(
-                f"background_image has shape {tuple(background.shape)}, not ({height}, {width}, 4)"
-            )
-    size = width, height
-    layout = LAYOUTS.get(scene, size, device)
+        background = _with_opacity(background.to(device, torch.float32), width, height)
+    uniform = scene.width * height == scene.height * width
+    layout = make_layout(scene.structure, (width, height), uniform, device, torch.get_num_threads())
     if not len(layout.scene):
         return torch.zeros(height, width, 4, device=device) if background is None else background
-    values = assemble(scene, layout, size, device)
+    values = assemble(scene, layout)
     if not bool(values["points"].isfinite().all()):
-        raise UsageError(
-            "a point of a shape is not finite: an optimiser has run away, or a shape has no size"
-        )
+        raise UsageError("a point of a shape is not finite: an optimiser diverged, or a shape has no size")
     if print_timing:
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")
         began = time.perf_counter()
     if background is None:
-        result = draw([layout.picture(torch.get_num_threads())], [values])[0]
+        check_memory(layout.spec)
+        result = draw(layout.spec, values)
     else:
-        image = render(SceneTensors(layout.scene, values), width, height)
+        result = render(SceneTensors(layout.scene, values))
         if bool((background[..., 3] >= 1).all()):
-            result = image + (1 - image[..., 3:]) * background
+            result = result + (1 - result[..., 3:]) * background
         else:
-            result = over(image, render(outlines_only(values, layout), width, height), background)
+            result = _on_translucent(result, values, layout, background)
     if print_timing:
         print(f"Forward pass, time: {time.perf_counter() - began:.5f} s")
     return result
+
+
+def _with_opacity(background: Tensor, width: int, height: int) -> Tensor:
+    """Return a background of shape (height, width, 3 or 4) with an opacity, shape (height, width, 4).
+
+    Raises:
+        UsageError: it has another shape.
+    """
+    if background.shape[2:] == (3,):
+        background = torch.nn.functional.pad(background, (0, 1), value=1.0)
+    if tuple(background.shape) != (height, width, 4):
+        raise UsageError(f"background_image has shape {tuple(background.shape)}, not ({height}, {width}, 4)")
+    return background
+
+
+def _on_translucent(
+    image: Tensor, values: Mapping[str, Tensor], layout: Layout, background: Tensor
+) -> Tensor:
+    """Composite a premultiplied image on a translucent background, which is not premultiplied.
+
+    As in DiffVG a pixel is the mean of colours that are not premultiplied. Arrays: shape (height, width, 4).
+    """
+    covered = _coverage(values, layout)
+    below, opacity = background[..., :3], background[..., 3:]
+    # Premultiplied opacity and colour of the covered part, behind which the background shows.
+    seen = covered - image[..., 3:]
+    total = image[..., 3:] + seen * opacity
+    color = (image[..., :3] + seen * opacity * below) * (covered / total.clamp_min(constants.NOTHING))
+    return torch.cat([color + (1 - covered) * below, total + (1 - covered) * opacity], dim=2)
+
+
+def _coverage(values: Mapping[str, Tensor], layout: Layout) -> Tensor:
+    """Return the share of each pixel that visible shapes cover, shape (height, width, 1)."""
+    own = {name: values[name] for name in ("points", "widths") if name in values}
+    own["opacities"] = FAINT * (values["opacities"].detach() > constants.SEEN).float()
+    own["colors"] = torch.zeros_like(values["colors"])
+    return (render(SceneTensors(layout.outlines, own))[..., 3:] / FAINT).clamp_max(1.0)

@@ -1,6 +1,7 @@
 """Shapes and groups of them, with the fields of DiffVG's classes.
 
-A ``stroke_width`` is half of what SVG calls so: a stroke covers what is nearer to its line.
+Shapes have units of their own, which ``ShapeGroup.shape_to_canvas`` maps to the canvas. A ``stroke_width`` is
+half of SVG's: how far the stroke reaches from its line [shape units], shape ().
 """
 
 from __future__ import annotations
@@ -27,47 +28,47 @@ class Circle:
     """A circle."""
 
     radius: Tensor
-    """Shape ()."""
+    """[shape units], shape ()."""
     center: Tensor
-    """Shape (2,)."""
+    """[shape units], shape (2,)."""
     stroke_width: Tensor = field(default_factory=_one)
     id: str = ""
 
 
 @dataclass(eq=False)
 class Ellipse:
-    """An ellipse with upright axes."""
+    """An ellipse whose axes are those of the coordinates."""
 
     radius: Tensor
-    """Along x and y, shape (2,)."""
+    """Along x and y [shape units], shape (2,)."""
     center: Tensor
-    """Shape (2,)."""
+    """[shape units], shape (2,)."""
     stroke_width: Tensor = field(default_factory=_one)
     id: str = ""
 
 
 @dataclass(eq=False)
 class Path:
-    """Lines, quadratics and cubics, one after the other."""
+    """A sequence of lines, quadratics and cubics."""
 
     num_control_points: Tensor
-    """Of each segment: 0 for a line, 1 for a quadratic, 2 for a cubic; shape (segment,)."""
+    """Of each segment: 0 of a line, 1 of a quadratic, 2 of a cubic; shape (segment,)."""
     points: Tensor
-    """Ends and control points in order, shape (point, 2). A closed path does not repeat its first point."""
+    """End and control points [shape units], shape (point, 2). A closed path does not repeat its first one."""
     is_closed: bool
     stroke_width: Tensor = field(default_factory=_one)
-    """Shape (), or (point,): it changes along the path as the points do."""
+    """Shape (), or (point,) for a width that changes along the path as the points do."""
     id: str = ""
     use_distance_approx: bool = False
-    """Not read: distances are not approximated here."""
+    """Ignored: distances are not approximated here."""
 
 
 @dataclass(eq=False)
 class Polygon:
-    """Straight lines."""
+    """A polygon, or a polyline."""
 
     points: Tensor
-    """Shape (point, 2)."""
+    """[shape units], shape (point, 2)."""
     is_closed: bool
     stroke_width: Tensor = field(default_factory=_one)
     id: str = ""
@@ -75,12 +76,12 @@ class Polygon:
 
 @dataclass(eq=False)
 class Rect:
-    """An upright rectangle."""
+    """A rectangle whose sides are parallel to the axes."""
 
     p_min: Tensor
-    """Shape (2,)."""
+    """Corner [shape units], shape (2,)."""
     p_max: Tensor
-    """Shape (2,)."""
+    """Opposite corner [shape units], shape (2,)."""
     stroke_width: Tensor = field(default_factory=_one)
     id: str = ""
 
@@ -90,29 +91,31 @@ Shape = Circle | Ellipse | Path | Polygon | Rect
 
 @dataclass(eq=False)
 class ShapeGroup:
-    """Shapes that are painted as one."""
+    """Shapes that are painted as one, the stroke above the fill."""
 
     shape_ids: Tensor
-    """Numbers of the shapes, shape (n,)."""
+    """Indices of the shapes, shape (n,)."""
     fill_color: Color
     use_even_odd_rule: bool = True
     stroke_color: Color = None
     shape_to_canvas: Tensor = field(default_factory=lambda: torch.eye(3))
-    """Affine map of the shapes, and of their strokes, to canvas units; shape (3, 3)."""
+    """Affine map of the shapes and their strokes to canvas units, shape (3, 3)."""
     id: str = ""
     line: Line | None = None
-    """How strokes end, join and are dashed, where a file said so; else they are round and solid. DiffVG has
-    no such field."""
+    """Caps, joins and dashes of strokes read from a file; None: round and solid. DiffVG has no such field."""
 
 
 def from_svg_path(
     path_str: str, shape_to_canvas: Tensor | None = None, force_close: bool = False
 ) -> list[Path]:
-    """The subpaths of an SVG path's data, arcs as cubics, in coordinates that ``shape_to_canvas`` maps."""
-    paths = [
-        path_of(subpath, is_closed=True if force_close else None)
-        for subpath in cubics(path_str, keep_dots=False)
-    ]
+    """Return the subpaths of SVG path data, with arcs as cubics.
+
+    Args:
+        path_str: value of a ``d`` attribute.
+        shape_to_canvas: affine map that the points are transformed by, shape (3, 3).
+        force_close: whether to close all subpaths.
+    """
+    paths = [path_of(subpath, is_closed=force_close or None) for subpath in cubics(path_str, keep_dots=False)]
     if shape_to_canvas is not None:
         for path in paths:
             matrix = shape_to_canvas.to(path.points)
@@ -121,15 +124,16 @@ def from_svg_path(
 
 
 CLOSE = 1e-5
-"""Distance of a path's ends below which it counts as closed."""
+"""Distance of a path's ends [path units] below which it counts as closed."""
 STRAIGHT = 1e-6
-"""How far from where a line or quadratic would have them the handles of a cubic may lie, over its size."""
+"""Distance of a cubic's control points from those of a line or quadratic, relative to its coordinates, below
+which it is one."""
 
 
 def path_of(subpath: Subpath, *, is_closed: bool | None = None) -> Path:
-    """A subpath, with the cubics that are lines or quadratics as such.
+    """Return a subpath, with lines and quadratics where its cubics are such.
 
-    Closed where ``is_closed`` says so; where nothing does, where the subpath is or its ends meet.
+    ``is_closed``: default: whether the subpath is closed or its ends meet.
     """
     points = subpath.points
     meets = bool(np.abs(points[0] - points[-1]).max() < CLOSE)
@@ -148,7 +152,10 @@ def path_of(subpath: Subpath, *, is_closed: bool | None = None) -> Path:
 
 
 def _segments(points: np.ndarray) -> tuple[list[int], list[Sequence[float]]]:
-    """Control points of each cubic as the simplest segment that it is, and all points in order."""
+    """Return the number of control points of each cubic in its simplest form, and all points in order.
+
+    ``points``: of the cubics, shape (1 + 3 x cubic, 2).
+    """
     counts: list[int] = []
     chain = [points[0]]
     for p0, p1, p2, p3 in zip(points[:-1:3], points[1::3], points[2::3], points[3::3], strict=True):

@@ -5,7 +5,7 @@
 """
 
 try:
-    import torch as _torch  # noqa: F401 - whether it is there
+    import torch as _torch  # noqa: F401 - only to say how to install it
 except ImportError as error:
     raise ImportError("warpsplat.torch needs PyTorch: pip install warpsplat[torch]") from error
 

@@ -1,4 +1,4 @@
-"""Renderers kept for the next call: recorded programs and buffers, by what they were recorded for."""
+"""Renderers that are kept for the next call: recorded programs and their buffers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 
 import torch
@@ -27,18 +27,18 @@ from warpsplat.scene import TRAITS, Scene
 from warpsplat.torch.tensors import attributes_of
 
 KEPT = 32
-"""Engines that are kept at the most."""
+"""Most engines that are kept."""
 
 KEPT_BYTES = 512 * 2**20
-"""Memory beyond which only the engine used last is kept."""
+"""Most memory of the engines that are kept; the one used last is kept in any case."""
 
-SENSIBLE = {"opacities": (0.0, 1.0), "stop_opacities": (0.0, 1.0), "widths": (0.0, None)}
-"""Values that mean something; what lies beyond is drawn as the nearest, and has its gradient."""
+VALID = {"opacities": (0.0, 1.0), "stop_opacities": (0.0, 1.0), "widths": (0.0, None)}
+"""Ranges that values are clamped to; the gradient is that at the clamped value."""
 
 
 @dataclass(frozen=True)
-class Picture:
-    """What an engine is recorded for."""
+class RenderSpec:
+    """Everything that an engine is recorded for."""
 
     layout: Scene
     viewport: Viewport
@@ -48,11 +48,11 @@ class Picture:
     opaque: bool
     """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
     straight: bool = False
-    """Whether colours are not premultiplied."""
+    """Whether the image's colours are not premultiplied."""
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
-        """Equal where the same engine serves."""
+        """Equal for specifications that the same engine serves."""
         return layout_key(self.layout), *(getattr(self, each.name) for each in fields(self)[1:])
 
 
@@ -60,7 +60,7 @@ STRUCTURE = ("kind", "basis", "first", "starts", "closed", "stop_first", *(trait
 
 
 def layout_key(scene: Scene) -> tuple[object, ...]:
-    """Equal for scenes that differ in the values of attributes alone."""
+    """Return a key that is equal for scenes that differ only in the values of their attributes."""
     arrays = [getattr(scene, name) for name in STRUCTURE]
     digest = hashlib.blake2b(b"".join(array.tobytes() for array in arrays), digest_size=16)
     background = scene.canvas.background
@@ -69,65 +69,55 @@ def layout_key(scene: Scene) -> tuple[object, ...]:
         tuple(map(len, arrays)),
         (scene.canvas.width, scene.canvas.height, None if background is None else background.tobytes()),
         scene.dashes,
-        tuple(map(id, scene.pictures)),  # kept alive by the engine's own layout
+        tuple(map(id, scene.pictures)),  # the engine's own layout keeps them alive
     )
 
 
 class Engine:
-    """A renderer with arrays of its own, into and out of which calls copy. One call at a time."""
+    """A renderer with buffers of its own that calls copy into and out of. It serves one call at a time."""
 
-    def __init__(self, picture: Picture) -> None:
-        backend = Backend.on(wp.device_from_torch(picture.device), picture.threads)
-        self._parameters = Parameters(picture.layout, backend)
+    def __init__(self, spec: RenderSpec) -> None:
+        backend = Backend.on(wp.device_from_torch(spec.device), spec.threads)
+        parameters = Parameters(spec.layout, backend)
         self._renderer = Renderer(
-            self._parameters,
-            picture.viewport,
-            model=picture.model,
-            opaque=picture.opaque,
-            straight=picture.straight,
+            parameters, spec.viewport, model=spec.model, opaque=spec.opaque, straight=spec.straight
         )
-        names = {attribute.name for attribute in attributes_of(picture.layout)}
-        for name in self._parameters.groups.keys() - names:
-            self._parameters.groups[name].value.zero_()  # whatever the layout says
-        self._values, self._grads = (
-            {name: wp.to_torch(getattr(self._parameters.groups[name], field)) for name in names}
-            for field in ("value", "grad")
-        )
-        self._record_pixels(backend, picture.viewport)
+        names = {attribute.name for attribute in attributes_of(spec.layout)}
+        for name in parameters.groups.keys() - names:
+            parameters.groups[name].value.zero_()  # whatever the layout holds
+        self._values = {name: wp.to_torch(parameters.groups[name].value) for name in names}
+        self._grads = {name: wp.to_torch(parameters.groups[name].grad) for name in names}
+        buffers = self._renderer.film.buffers
+        self._show = self._record(pixels.tiles_to_pixels, buffers.image, backend, spec.viewport)
+        self._take = self._record(pixels.pixels_to_tiles, buffers.image_grad, backend, spec.viewport)
         self.lock = threading.Lock()
         self.ticket: object = None
-        """Of the call whose forward pass the buffers hold."""
+        """Identifies the call whose forward pass is in the buffers."""
         self.bytes = self._renderer.bytes()
         self._graphs: dict[Program, wp.Graph] = {}
         self._stream: torch.cuda.Stream | None = None
 
-    def _record_pixels(self, backend: Backend, viewport: Viewport) -> None:
-        film = self._renderer.film
-        shape = (viewport.tile_count, film.planes, constants.TILE_PIXELS // constants.QUAD)
-        anything = backend.array(wp.vec4, 1, 1)
-
-        def record(kernel: wp.Kernel, tiles: wp.array) -> Program:
-            program = backend.program()
-            program.launch(
-                kernel,
-                (viewport.tile_count, constants.TILE // constants.QUAD),
-                viewport,
-                pixels=anything,
-                image_quads=view(tiles, wp.vec4, shape),
-                split=True,
-            )
-            return program
-
-        self._show = record(pixels.tiles_to_pixels, film.buffers.image)
-        self._take = record(pixels.pixels_to_tiles, film.buffers.image_grad)
+    def _record(self, kernel: wp.Kernel, tiles: wp.array, backend: Backend, viewport: Viewport) -> Program:
+        """Record a copy between tiles and an image, which ``_run`` binds as ``pixels``."""
+        shape = (viewport.tile_count, self._renderer.film.planes, constants.TILE_PIXELS // constants.QUAD)
+        program = backend.program()
+        program.launch(
+            kernel,
+            (viewport.tile_count, constants.TILE // constants.QUAD),
+            viewport,
+            pixels=backend.array(wp.vec4, 1, 1),
+            image_quads=view(tiles, wp.vec4, shape),
+            split=True,
+        )
+        return program
 
     def forward(self, values: Mapping[str, torch.Tensor]) -> None:
-        """Render the scene of these attributes, each in the shape of its field."""
+        """Render the scene of these attributes, by name, each in the shape of its field of ``Scene``."""
         self.ticket = None
         for name, own in self._values.items():
             own.copy_(values[name].reshape(own.shape))
-            if name in SENSIBLE:
-                own.clamp_(*SENSIBLE[name])
+            if name in VALID:
+                own.clamp_(*VALID[name])
         self._replay(self._renderer.forward_program)
         if self._renderer.make_room():
             self._graphs.clear()
@@ -135,12 +125,13 @@ class Engine:
             self.bytes = self._renderer.bytes()
 
     def show(self, image: torch.Tensor) -> None:
-        """Write what was rendered, shape (height, width, 4)."""
+        """Write the rendered image into ``image``, shape (height, width, 4)."""
         self._run(self._show, image)
 
     def backward(self, image_grad: torch.Tensor, names: Iterable[str]) -> dict[str, torch.Tensor]:
-        """From the gradient of the image, shape (height, width, 4), to those of the attributes ``names``. The
-        state of the forward pass is used up.
+        """Return the gradients of the attributes ``names``; this uses up the forward pass.
+
+        ``image_grad``: gradient of the image, shape (height, width, 4).
         """
         self.ticket = None
         self._run(self._take, image_grad)
@@ -148,7 +139,7 @@ class Engine:
         return {name: self._grads[name].clone() for name in names}
 
     def _replay(self, program: Program) -> None:
-        """Without Python in between where one thread of a CPU does all; a GPU does not wait for Python."""
+        """Run a program: as a graph, without Python, on one CPU thread; a GPU does not wait for Python."""
         if program.device.is_cpu and program not in self._graphs:
             graph = capture(program.device, [program])
             if graph is not None:
@@ -160,14 +151,14 @@ class Engine:
 
     @staticmethod
     def _run(program: Program, image: torch.Tensor) -> None:
-        """With the tensor's own memory as the rows of pixels."""
+        """Run a copy with the tensor's own memory as the image."""
         array = wp.from_torch(image, dtype=wp.vec4, requires_grad=False)
         assert isinstance(array, wp.array)
         program.rebind("pixels", array)
         program.run()
 
     def follow(self, device: torch.device) -> None:
-        """Work of the last call, on another stream perhaps, comes before that of torch's current one."""
+        """Make torch's current stream wait for the last call, which may have used another one."""
         if device.type == "cuda":
             stream = torch.cuda.current_stream(device)
             if self._stream not in (None, stream):
@@ -175,20 +166,18 @@ class Engine:
             self._stream = stream
 
 
-class Engines:
-    """Engines used last, as many as are allowed."""
+class EngineCache:
+    """The engines used last, as many as are allowed."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
         self._lock = threading.Lock()
 
-    def get(self, picture: Picture) -> Engine:
-        """The engine of ``picture``, made where there is none."""
+    def get(self, spec: RenderSpec) -> Engine:
+        """Return the engine of ``spec``, recorded if there is none."""
         with self._lock:
-            engine = self._kept.pop(picture.key, None)
-            if engine is None:
-                engine = Engine(picture)
-            self._kept[picture.key] = engine
+            engine = self._kept.pop(spec.key, None) or Engine(spec)
+            self._kept[spec.key] = engine
             while len(self._kept) > 1 and (
                 len(self._kept) > KEPT or sum(each.bytes for each in self._kept.values()) > KEPT_BYTES
             ):
@@ -196,55 +185,58 @@ class Engines:
             return engine
 
     def clear(self) -> None:
-        """Give up all of them."""
+        """Drop all engines."""
         with self._lock:
             self._kept.clear()
 
 
-ENGINES = Engines()
+ENGINES = EngineCache()
 
 
 def clear_cache() -> None:
-    """Free the renderers that are kept for further calls. They are made anew when they are needed."""
+    """Free the renderers that are kept for further calls. They are recorded again when they are needed."""
     ENGINES.clear()
 
 
-def check_pictures(pictures: Sequence[Picture]) -> None:
-    """Whether there is memory for pictures of one size and device.
+def check_memory(spec: RenderSpec, count: int = 1) -> None:
+    """Check that there is memory for ``count`` images.
 
     Raises:
         UsageError: the device is neither a CPU nor CUDA.
-        ResourceError: there is not.
+        ResourceError: there is not enough.
     """
-    check_room(pictures[0].viewport, _device_of(pictures[0]), len(pictures))
+    check_room(spec.viewport, _warp_device(spec.device), count)
 
 
 @contextlib.contextmanager
-def engine_of(picture: Picture) -> Iterator[Engine]:
-    """The engine of ``picture``, for this thread alone and on torch's current stream."""
-    device = _device_of(picture)
-    with turn(device), _on_stream(picture.device):
-        engine = ENGINES.get(picture)
+def engine_of(spec: RenderSpec) -> Iterator[Engine]:
+    """Yield the engine of ``spec``, for this thread alone and on torch's current stream."""
+    device = _warp_device(spec.device)
+    with turn(device), _on_stream(spec.device):
+        engine = ENGINES.get(spec)
         with engine.lock:
-            engine.follow(picture.device)
+            engine.follow(spec.device)
             yield engine
 
 
-def _device_of(picture: Picture) -> wp.Device:
-    if picture.device.type not in ("cpu", "cuda"):
-        raise UsageError(f"tensors are on {picture.device}, neither on the CPU nor on CUDA")
-    _start()
-    device: wp.Device = wp.device_from_torch(picture.device)
-    return device
-
-
-@functools.cache
-def _start() -> None:
-    start_warp()
-
-
 def _on_stream(device: torch.device) -> contextlib.AbstractContextManager[object]:
-    """Have Warp work where torch does."""
+    """Have Warp work on torch's current stream."""
     if device.type == "cpu":
         return contextlib.nullcontext()
     return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))
+
+
+_start = functools.cache(start_warp)
+
+
+def _warp_device(device: torch.device) -> wp.Device:
+    """Return Warp's device, starting Warp.
+
+    Raises:
+        UsageError: the device is neither a CPU nor CUDA.
+    """
+    if device.type not in ("cpu", "cuda"):
+        raise UsageError(f"tensors are on {device}, neither on the CPU nor on CUDA")
+    _start()
+    found: wp.Device = wp.device_from_torch(device)
+    return found

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import torch
+from torch.autograd.function import once_differentiable
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.rendering.backend import Viewport
@@ -13,11 +15,10 @@ from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
 from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
-from warpsplat.torch.engine import Picture, check_pictures, engine_of
+from warpsplat.torch.engine import RenderSpec, check_memory, engine_of
 from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
 
 Tensor = torch.Tensor
-Names = tuple[tuple[str, ...], ...]
 MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
 
 
@@ -29,88 +30,85 @@ def render(
     renderer: Literal["exact", "splat", "gaussian"] | Model = "exact",
     threads: int | None = None,
 ) -> Tensor:
-    """Draw a scene; gradients flow back to its attributes.
+    """Render a scene, or several; gradients flow back to the attributes.
 
     Args:
-        scene: one, or several.
-        width: of the picture [px]; default: the canvas', or what ``height`` makes it.
-        height: [px]; the same.
-        renderer: what covers the pixels: ``exact``, the area that a viewer computes; ``splat``, the
-            Gaussians of the paths; ``gaussian``, soft ones; or a model of ``warpsplat.rendering.models``.
-        threads: of the CPU, default: as many as torch uses.
+        scene: one scene, or several of one size and device.
+        width: of the image [px]; default: the canvas' width, or what fits ``height``.
+        height: of the image [px]; default: the canvas' height, or what fits ``width``.
+        renderer: what covers a pixel: ``exact``, the area that a viewer computes; ``splat``, Gaussians along
+            the paths; ``gaussian``, soft ones; or a model of ``warpsplat.rendering.models``.
+        threads: of the CPU; default: as many as torch uses.
 
     Returns:
         sRGB premultiplied by opacity, and opacity: float32, shape (height, width, 4), on the scene's device;
-        of several scenes (scene, height, width, 4). On a canvas with a background the opacity is 1.
+        for several scenes (scene, height, width, 4). On a canvas with a background the opacity is 1.
 
     Raises:
-        UsageError: no such size, renderer or device, or no scene.
-        ResourceError: a picture takes more memory than there is.
+        UsageError: an invalid size, renderer or device, or no scene.
+        ResourceError: the images take more memory than there is.
         ValueError: a scene that the model cannot show, or a number that is not finite.
     """
     scenes = [scene] if isinstance(scene, SceneTensors) else list(scene)
     if not scenes:
         raise UsageError("no scene to render")
-    model = model_of(renderer)
-    used = threads or torch.get_num_threads()
-    pictures = [
-        Picture(
-            one.layout, viewport_of(one.layout.canvas, width, height), model, one.device, used, is_opaque(one)
-        )
-        for one in scenes
-    ]
-    sizes = {(p.viewport.width, p.viewport.height, p.device) for p in pictures}
-    if len(sizes) > 1:
+    model, threads = model_of(renderer), threads or torch.get_num_threads()
+    specs = []
+    for one in scenes:
+        viewport = viewport_of(one.layout.canvas, width, height)
+        specs.append(RenderSpec(one.layout, viewport, model, one.device, threads, is_opaque(one)))
+    if len({(spec.viewport.width, spec.viewport.height, spec.device) for spec in specs}) > 1:
         raise UsageError("scenes of several sizes or devices in one call")
-    given = [[(a.name, one.value(a)) for a in attributes_of(one.layout)] for one in scenes]
-    for each in given:
+    values = [{a.name: one.value(a) for a in attributes_of(one.layout)} for one in scenes]
+    for each in values:
         check_finite(each)
-    images = draw(pictures, [dict(each) for each in given])
-    return images.squeeze(0) if isinstance(scene, SceneTensors) else images
+    check_memory(specs[0], len(specs))
+    images = [draw(*each) for each in zip(specs, values, strict=True)]
+    return images[0] if isinstance(scene, SceneTensors) else torch.stack(images)
 
 
-def draw(pictures: Sequence[Picture], values: Sequence[Mapping[str, Tensor]]) -> Tensor:
-    """Pictures of one size and device from all attributes that their shapes have, unchecked.
-
-    Shape (picture, height, width, 4).
-
-    Raises:
-        ResourceError: they take more memory than there is.
-    """
-    check_pictures(pictures)
-    names = tuple(map(tuple, values))
-    images: Tensor = _Render.apply(pictures, names, *(value for each in values for value in each.values()))
-    return images
+def draw(spec: RenderSpec, values: Mapping[str, Tensor]) -> Tensor:
+    """Render all attributes that the shapes have, by name, without a check; shape (height, width, 4)."""
+    image: Tensor = _Render.apply(spec, tuple(values), *values.values())
+    return image
 
 
 def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
-    """A picture of ``render``, shape (..., 4), on a colour or on a picture of sRGB: shape (..., 3)."""
+    """Composite an image of ``render`` on a background.
+
+    Args:
+        image: sRGB premultiplied by opacity, and opacity, shape (..., 4).
+        background: sRGB, of a shape that broadcasts to (..., 3).
+
+    Returns:
+        sRGB, shape (..., 3).
+    """
     below = torch.as_tensor(background, dtype=image.dtype, device=image.device)
     return image[..., :3] + (1 - image[..., 3:]) * below
 
 
-def check_finite(values: Sequence[tuple[str, Tensor]]) -> None:
-    """Whether all numbers are.
+def check_finite(values: Mapping[str, Tensor]) -> None:
+    """Check that all numbers are finite, with one transfer from the device.
 
     Raises:
         ValueError: one is not.
     """
-    finite = torch.stack([value.detach().isfinite().all() for _, value in values]).tolist()
+    finite = torch.stack([value.detach().isfinite().all() for value in values.values()]).tolist()
     if not all(finite):
-        wrong = (name for (name, _), fine in zip(values, finite, strict=True) if not fine)
-        raise ValueError(f"{', '.join(wrong)}: numbers that are not finite")
+        wrong = ", ".join(name for name, fine in zip(values, finite, strict=True) if not fine)
+        raise ValueError(f"{wrong}: numbers that are not finite")
 
 
 def is_opaque(scene: SceneTensors) -> bool:
-    """Whether some shape lets so little light through that one cannot divide by it."""
+    """Return whether a shape is so opaque that its adjoint cannot divide by what it lets through."""
     return bool((scene.value(TABLE["opacities"]).detach() > OPACITY_RANGE[1]).any())
 
 
 def model_of(renderer: str | Model) -> Model:
-    """The model that is meant.
+    """Return the model of a name, or the model itself.
 
     Raises:
-        UsageError: there is none of that name.
+        UsageError: there is no such model.
     """
     if not isinstance(renderer, str):
         return renderer
@@ -120,15 +118,14 @@ def model_of(renderer: str | Model) -> Model:
 
 
 def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewport:
-    """The picture of a canvas in a size of which one side, or both, may be left to the canvas.
+    """Return the viewport of an image of a canvas; see ``render``.
 
     Raises:
         UsageError: a side is not a number of pixels, or the two would stretch the canvas.
     """
     for name, side in (("width", width), ("height", height)):
-        if side is not None and (
-            isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= MOST_SIDE
-        ):
+        is_number = isinstance(side, int) and not isinstance(side, bool)
+        if side is not None and not (is_number and 1 <= side <= MOST_SIDE):
             raise UsageError(f"{name} must be a number of pixels, not {shown(side)}")
     if width is None and height is None:
         return Viewport(canvas.width, canvas.height)
@@ -144,62 +141,33 @@ def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewpo
 
 
 class _Render(torch.autograd.Function):
-    """Pictures, names of the attributes of each, and these one after the other -> images."""
+    """Attributes, in the order of ``names`` -> image."""
 
     @staticmethod
-    def forward(ctx: Any, pictures: Sequence[Picture], names: Names, *values: Tensor) -> Tensor:
-        viewport, device = pictures[0].viewport, pictures[0].device
-        shape = len(pictures), viewport.height, viewport.width, 4
-        images = torch.empty(shape, dtype=torch.float32, device=device)
-        tickets = []
-        for picture, own, image in zip(pictures, _parts(names, values), images, strict=True):
-            with engine_of(picture) as engine:
-                engine.forward(own)
-                engine.show(image)
-                tickets.append(ticket := object())
-                engine.ticket = ticket
-        ctx.state = (pictures, tickets, names)
+    def forward(ctx: Any, spec: RenderSpec, names: tuple[str, ...], *values: Tensor) -> Tensor:
+        shape = spec.viewport.height, spec.viewport.width, 4
+        image = torch.empty(shape, dtype=torch.float32, device=spec.device)
+        with engine_of(spec) as engine:
+            engine.forward(dict(zip(names, values, strict=True)))
+            engine.show(image)
+            ctx.ticket = engine.ticket = object()
+        ctx.spec, ctx.names = spec, names
         ctx.save_for_backward(*values)
         ctx.set_materialize_grads(False)
-        return images
+        return image
 
     @staticmethod
-    def backward(ctx: Any, images_grad: Tensor | None) -> tuple[Tensor | None, ...]:
-        if images_grad is None:
+    @once_differentiable
+    def backward(ctx: Any, image_grad: Tensor | None) -> tuple[Tensor | None, ...]:
+        if image_grad is None:
             return (None,) * len(ctx.needs_input_grad)
-        wanted = ctx.needs_input_grad[2:]
-        found: tuple[Tensor | None, ...] = _Adjoint.apply(ctx.state, wanted, images_grad, *ctx.saved_tensors)
-        return (None, None, *found)
-
-
-class _Adjoint(torch.autograd.Function):
-    """Gradients of images -> of attributes. A function of its own, as it is what has no derivative."""
-
-    @staticmethod
-    def forward(
-        ctx: Any, state: Any, wanted: Sequence[bool], images_grad: Tensor, *values: Tensor
-    ) -> tuple[Tensor | None, ...]:
-        pictures, tickets, names = state
-        found: list[Tensor | None] = []
-        each = zip(pictures, tickets, _parts(names, values), _parts(names, wanted), images_grad, strict=True)
-        for picture, ticket, own, asked, image_grad in each:
-            if not any(asked.values()):
-                found += [None] * len(asked)
-                continue
-            gradient = image_grad.contiguous()
-            with engine_of(picture) as engine:
-                if engine.ticket is not ticket:  # another call has used the buffers since
-                    engine.forward(own)
-                gradients = engine.backward(gradient, [name for name in asked if asked[name]])
-            found += [gradients[name].reshape(own[name].shape) if asked[name] else None for name in asked]
-        return tuple(found)
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:
-        raise RuntimeError("warpsplat.torch.render has first derivatives only: no double backward")
-
-
-def _parts(names: Names, values: Sequence[Any]) -> list[dict[str, Any]]:
-    """The values of each picture by name."""
-    rest = iter(values)
-    return [{name: next(rest) for name in own} for own in names]
+        values = dict(zip(ctx.names, ctx.saved_tensors, strict=True))
+        wanted = list(itertools.compress(ctx.names, ctx.needs_input_grad[2:]))
+        with engine_of(ctx.spec) as engine:
+            if engine.ticket is not ctx.ticket:  # another call has used the buffers since
+                engine.forward(values)
+            found = engine.backward(image_grad.contiguous(), wanted)
+        gradients = (
+            found[name].reshape(value.shape) if name in found else None for name, value in values.items()
+        )
+        return None, None, *gradients

@@ -16,41 +16,39 @@ from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attri
 
 
 class Module(torch.nn.Module):
-    """Holds a scene: a parameter for each attribute that some shape of it has."""
+    """A scene with a parameter for each attribute that some shape of it has."""
 
     def __init__(self, scene: Scene, *, renderer: Any = "exact", threads: int | None = None) -> None:
-        """``renderer``, ``threads``: see ``render``."""
+        """Copy the attributes of ``scene``; ``renderer``, ``threads``: see ``render``."""
         super().__init__()
         self._layout, self._renderer, self._threads = scene, renderer, threads
-        without = (
-            WITHOUT_GRADIENT if model_of(renderer) is MODELS["gaussian"] else (*WITHOUT_GRADIENT, "fades")
-        )
+        fixed = WITHOUT_GRADIENT if model_of(renderer) is MODELS["gaussian"] else (*WITHOUT_GRADIENT, "fades")
         for name in (attribute.name for attribute in attributes_of(scene)):
-            if name not in without:
+            if name not in fixed:
                 self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
         self._twins: torch.Tensor | None
         tied = torch.tensor(same_points(scene)) if scene.twin.any() else None
         self.register_buffer("_twins", tied, persistent=False)
 
     def tensors(self) -> SceneTensors:
-        """The scene of the parameters; what is done with it has gradients."""
+        """Return the scene of the parameters, through which gradients flow to them."""
         values: dict[str, torch.Tensor] = dict(self.named_parameters())
         if self._twins is not None:
             values["points"] = values["points"][self._twins]
         return SceneTensors(self._layout, values)
 
     def forward(self, width: int | None = None, height: int | None = None) -> torch.Tensor:
-        """See ``render``."""
+        """Render the scene, shape (height, width, 4); see ``render``."""
         return render(self.tensors(), width, height, renderer=self._renderer, threads=self._threads)
 
     def parameter_groups(
         self, settings: Settings | None = None, *, rate: float = 1.0
     ) -> list[dict[str, Any]]:
-        """What an optimiser takes: each attribute with the learning rate that it has in a run.
+        """Return an optimiser's parameter groups: each attribute with its learning rate in a run.
 
         Args:
-            settings: of the run; default: the usual one.
-            rate: what all of them are multiplied by.
+            settings: of the run; default: ``Settings()``.
+            rate: factor of all learning rates.
         """
         settings = settings or Settings()
         units = Units.of(settings, self._layout.canvas)
@@ -65,22 +63,22 @@ class Module(torch.nn.Module):
 
     @torch.no_grad()
     def project(self) -> None:
-        """Bring every attribute back within its bounds, as a run does after each step."""
+        """Clamp every attribute to its bounds, as a run does after each step."""
         units = Units.of(Settings(), self._layout.canvas)
         for name, parameter in self.named_parameters():
             parameter.clamp_(units.resolve(*TABLE[name].low), units.resolve(*TABLE[name].high))
 
     def scene(self) -> Scene:
-        """The scene as it is."""
+        """Return the scene of the current parameters."""
         return self.tensors().scene()
 
     def to_svg(self) -> str:
-        """The scene as an SVG file's text."""
+        """Return the text of an SVG file of the scene."""
         return write_svg(self.scene())
 
 
 def same_points(scene: Scene) -> IndexArray:
-    """For each point its own row, or that of the same point of the shape that its shape is the twin of."""
+    """Return for each point its own row, or that of the twin's point that it is tied to, shape (point,)."""
     rows = np.arange(len(scene.points))
     for i in np.flatnonzero(scene.twin):  # ascending: the shape before may be a twin itself
         rows[scene.first[i] : scene.first[i + 1]] = rows[scene.first[i - 1] : scene.first[i]]

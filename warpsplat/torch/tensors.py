@@ -14,7 +14,7 @@ from warpsplat.scene import ATTRIBUTES, Attribute, Scene, Unit
 TABLE = {attribute.name: attribute for attribute in ATTRIBUTES}
 
 WITHOUT_GRADIENT = ("focus",)
-"""Attributes that are drawn and that nothing is known about the gradient of."""
+"""Attributes whose gradient is not computed."""
 
 
 @dataclass(frozen=True)
@@ -22,16 +22,16 @@ class SceneTensors:
     """Shapes whose attributes are tensors, on one device."""
 
     layout: Scene
-    """What stays: canvas, kinds, contours, bases, styles, paints; and the attributes that have no tensor."""
+    """All that stays: canvas, kinds, contours, bases, styles, paints; and attributes that have no tensor."""
     values: Mapping[str, torch.Tensor]
     """By names of ``ATTRIBUTES``: float32, in the shapes and units of the fields of ``Scene``."""
 
     def __post_init__(self) -> None:
-        """Check that the tensors are the layout's.
+        """Check that the tensors fit the layout.
 
         Raises:
-            ValueError: a name is not in the table, a shape is not the layout's, or devices differ.
-            TypeError: no tensor, or not of float32.
+            ValueError: an unknown name, another shape than the layout's, or several devices.
+            TypeError: not a tensor, or not of float32.
         """
         for name, value in self.values.items():
             if name not in TABLE:
@@ -52,12 +52,12 @@ class SceneTensors:
     def of(
         scene: Scene, device: torch.device | str | None = None, *, requires_grad: bool = False
     ) -> SceneTensors:
-        """Copies of all attributes of ``scene``.
+        """Return copies of all attributes of ``scene``.
 
         Args:
-            scene: at which values to begin.
+            scene: structure and values.
             device: default: the CPU.
-            requires_grad: whether gradients are wanted, of all attributes that some shape has.
+            requires_grad: whether the attributes that some shape has require gradients.
         """
         values = {name: torch.tensor(getattr(scene, name), device=device) for name in TABLE}
         if requires_grad:
@@ -67,18 +67,18 @@ class SceneTensors:
 
     @property
     def device(self) -> torch.device:
-        """Where the tensors lie; without any, the CPU."""
+        """The tensors' device; the CPU if there are none."""
         return next((value.device for value in self.values.values()), torch.device("cpu"))
 
     def value(self, attribute: Attribute) -> torch.Tensor:
-        """The tensor of ``attribute``; a copy of the layout's array where it has none."""
+        """Return the tensor of ``attribute``, or a copy of the layout's array."""
         found = self.values.get(attribute.name)
         if found is None:
             return torch.tensor(getattr(self.layout, attribute.name), dtype=torch.float32)
         return found
 
     def scene(self) -> Scene:
-        """The current values, each within what a file can hold.
+        """Return a scene of the current values, clamped to what a file can hold.
 
         Raises:
             ValueError: a value is not finite.
@@ -89,28 +89,24 @@ class SceneTensors:
             if not np.isfinite(array).all():
                 raise ValueError(f"{name} holds numbers that are not finite")
             arrays[name] = np.clip(array, *limits(TABLE[name])).astype(np.float32)
-        return untied(replace(self.layout, **arrays))
-
-
-def untied(scene: Scene) -> Scene:
-    """The scene with only those twins whose points are still those of the shape before them."""
-    twin = scene.twin.copy()
-    for i in np.flatnonzero(twin).tolist():
-        twin[i] = np.array_equal(scene.points_of(i), scene.points_of(i - 1))
-    return replace(scene, twin=twin)
+        scene = replace(self.layout, **arrays)
+        twin = scene.twin.copy()
+        for i in np.flatnonzero(twin).tolist():  # twins whose points have come apart are two shapes
+            twin[i] = np.array_equal(scene.points_of(i), scene.points_of(i - 1))
+        return replace(scene, twin=twin)
 
 
 def limits(attribute: Attribute) -> tuple[float, float]:
-    """Least and largest value that a file can say."""
+    """Return the least and the largest value that a file can hold."""
     if attribute.name == "opacities":
-        return 0.0, 1.0  # those of the table keep shapes from vanishing, and their gradients
+        return 0.0, 1.0  # the table's bounds keep shapes, and their gradients, from vanishing in training
     if attribute.low[1] == Unit.ONE:
         return attribute.low[0], attribute.high[0]
     return (0.0 if attribute.name == "widths" else -np.inf), np.inf
 
 
 def attributes_of(scene: Scene) -> tuple[Attribute, ...]:
-    """Those that some shape of ``scene`` has, by its kind and paint; the others are 0. Points in any case."""
+    """Return the attributes that some shape of ``scene`` has, by its kind and paint; points always."""
     kinds, paints = (set(np.flatnonzero(np.bincount(row)).tolist()) for row in (scene.kind, scene.paint))
     return tuple(
         a for a in ATTRIBUTES if a.per == "point" or (kinds & set(a.kinds) and paints & set(a.paints))

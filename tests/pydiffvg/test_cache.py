@@ -1,0 +1,95 @@
+"""Scenes that stay the same are serialized once; every change is noticed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+import torch
+
+from tests.pydiffvg.helpers import SIZE, scene, tensor
+from warpsplat import pydiffvg
+from warpsplat.pydiffvg import cache
+from warpsplat.pydiffvg.arguments import SceneArguments, serialize
+from warpsplat.pydiffvg.shape import Shape, ShapeGroup
+
+CPU = torch.device("cpu")
+Scene = tuple[list[Shape], list[ShapeGroup]]
+
+
+def cached(shapes: list[Shape], groups: list[ShapeGroup]) -> SceneArguments:
+    return cache.serialize_cached(SIZE, SIZE, shapes, groups, CPU)
+
+
+def are_alike(one: SceneArguments, other: SceneArguments) -> bool:
+    """Whether structures are equal, and tensors one and the same."""
+    return one.structure == other.structure and list(map(id, one.tensors)) == list(map(id, other.tensors))
+
+
+def test_a_scene_that_stays_is_serialized_once() -> None:
+    shapes, groups = scene()
+    first = cached(shapes, groups)
+    with torch.no_grad():
+        shapes[4].points += 1  # type: ignore[union-attr]  # a path
+    assert cached(list(shapes), list(groups)) is first
+    assert cache.serialize_cached(SIZE, 2 * SIZE, shapes, groups, CPU).height == 2 * SIZE
+
+
+def _set(owner: Callable[[Scene], object], name: str, value: object) -> Callable[[Scene], None]:
+    return lambda made: setattr(owner(made), name, value)
+
+
+def _write(tensor: Callable[[Scene], torch.Tensor], value: object) -> Callable[[Scene], None]:
+    """Change values past the versions that torch counts, as programs do."""
+
+    def change(made: Scene) -> None:
+        tensor(made).data.copy_(torch.as_tensor(value))
+
+    return change
+
+
+CHANGES: dict[str, Callable[[Scene], None]] = {
+    "points": _set(lambda s: s[0][4], "points", torch.zeros(6, 2, dtype=torch.float32)),
+    "closed": _set(lambda s: s[0][3], "is_closed", False),
+    "width": _set(lambda s: s[0][1], "stroke_width", tensor(2.0)),
+    "fill": _set(lambda s: s[1][0], "fill_color", tensor(1, 0, 0, 1)),
+    "no fill": _set(lambda s: s[1][0], "fill_color", None),
+    "rule": _set(lambda s: s[1][3], "use_even_odd_rule", False),
+    "end of a gradient": _set(lambda s: s[1][2].fill_color, "end", tensor(9, 9)),
+    "segments": _write(lambda s: s[0][4].num_control_points, [2, 1, 0]),  # type: ignore[union-attr]
+    "which shape": _write(lambda s: s[1][3].shape_ids, [4]),
+    "map": _write(lambda s: s[1][3].shape_to_canvas, [[1.0, 0, 3], [0, 1, 0], [0, 0, 1]]),
+    "stretch": _write(lambda s: s[1][5].shape_to_canvas, [[1.0, 0, 3], [0, 2, 0], [0, 0, 1]]),
+    "trained map": lambda s: setattr(s[1][3].shape_to_canvas, "requires_grad", True),
+    "sizes": lambda s: setattr(s[0][3].points, "data", torch.ones(7, 2)),  # type: ignore[union-attr]
+    "more": lambda s: s[1].append(s[1][3]),
+    "order": lambda s: s[1].reverse(),
+    "another shape": lambda s: s[0].__setitem__(1, pydiffvg.Ellipse(tensor(2, 3), tensor(4, 5))),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_is_noticed(name: str) -> None:
+    made = scene()
+    before = cached(*made)
+    CHANGES[name](made)
+    after = cached(*made)
+    assert not are_alike(after, before)
+    assert are_alike(after, serialize(SIZE, SIZE, *made, CPU))
+
+
+@pytest.mark.parametrize("kind", ["double", "computed"])
+def test_copies_and_results_are_made_again(kind: str) -> None:
+    """Tensors of another type are copied; the graph of a computed one can be used only once."""
+    values = tensor([[4, 4], [40, 5], [22, 40]])
+    values = values.double() if kind == "double" else values.requires_grad_() * 1.0
+    made: Scene = (
+        [pydiffvg.Polygon(values, True)],
+        [pydiffvg.ShapeGroup(torch.tensor([0]), tensor(1, 0, 0, 1))],
+    )
+    first = cached(*made)
+    with torch.no_grad():
+        values += 3
+    second = cached(*made)
+    assert second is not first
+    assert torch.equal(second.tensors[0].detach(), values.detach().float())
