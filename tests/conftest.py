@@ -16,6 +16,7 @@ os.environ.setdefault("WARP_CACHE_PATH", str(Path(tempfile.gettempdir()) / "warp
 import numpy as np
 import pytest
 import warp as wp
+from PIL import Image
 
 from tests import smoke
 
@@ -69,6 +70,17 @@ def single_precision() -> Iterator[None]:
     torch.set_default_dtype(torch.float32)
     yield
     torch.set_default_dtype(before)
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    """With grain, so that it is taken for a photograph."""
+    path = tmp_path / "photo.png"
+    y, x = np.mgrid[:40, :60]
+    smooth = np.stack([4 * x, 6 * y, 0 * x + 90], axis=2)
+    grain = np.random.default_rng(0).normal(0, 4, smooth.shape)
+    Image.fromarray(np.clip(smooth + grain, 0, 255).astype(np.uint8)).save(path)
+    return path
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m selects

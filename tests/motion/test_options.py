@@ -11,9 +11,8 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run
-from warpsplat.cli import preview as cli_preview
 from warpsplat.cli import signals
-from warpsplat.motion.terminal import detect
+from warpsplat.motion.terminal import detect, start
 from warpsplat.svg.viewer import render_own
 
 SHORT = [*QUICK[:2], "--iterations", "40", *QUICK[4:]]
@@ -117,7 +116,7 @@ def test_without_a_terminal_a_line_says_so(
 def test_an_encoding_without_half_blocks(
     image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(cli_preview, "HALF", "\udc80")
+    monkeypatch.setattr(start, "HALF", "\udc80")
     assert run("vectorize", image, "-o", tmp_path / "a.svg", *QUICK, "--preview=blocks") == 0
     assert "has no half blocks" in one_line(capsys.readouterr().err)
 
@@ -127,7 +126,7 @@ def test_the_preview_knows_of_notices(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
     monkeypatch.setattr(detect, "_size", lambda stream, environ: (80, 24, 0, 0))
-    made = cli_preview.preview_on(sys.stderr, "blocks")
+    made = start.start_preview(sys.stderr, "blocks")
     assert made
     moved = []
     monkeypatch.setattr(made, "move_on", lambda: moved.append(1))
@@ -135,8 +134,8 @@ def test_the_preview_knows_of_notices(monkeypatch: pytest.MonkeyPatch) -> None:
     log.warning("a notice")
     log.warning("compiling", extra={"passing": True})
     assert len(moved) == 1
-    again = cli_preview.preview_on(sys.stderr, "blocks")
-    assert again and sum(type(handler).__name__ == "_Aside" for handler in log.handlers) == 1
+    again = start.start_preview(sys.stderr, "blocks")
+    assert again and sum(type(handler).__name__ == "_NoticeHandler" for handler in log.handlers) == 1
 
 
 @pytest.mark.parametrize("terminal", [True, False])

@@ -7,7 +7,7 @@ import sys
 
 import click
 
-from warpsplat.cli.say import say
+from warpsplat.cli.echo import echo
 from warpsplat.errors import ExitCode
 
 MARKS = {"ok": "ok", "note": "note", "broken": "BROKEN"}
@@ -31,13 +31,13 @@ def command(device: str, as_json: bool) -> None:
     for check in checks(device):
         found.append(check)
         if not as_json:
-            say(f"{MARKS[check.status]:7} {check.name}: {check.text}")
+            echo(f"{MARKS[check.status]:7} {check.name}: {check.text}")
             if check.hint:
-                say(f"{'':7} -> {check.hint}")
+                echo(f"{'':7} -> {check.hint}")
     broken = [check.name for check in found if check.status == "broken"]
     if as_json:
-        say(json.dumps({"ok": not broken, "checks": [check.as_dict() for check in found]}))
+        echo(json.dumps({"ok": not broken, "checks": [check.as_dict() for check in found]}))
     else:
-        say("broken: " + ", ".join(broken) if broken else "all that is needed is there and works")
+        echo("broken: " + ", ".join(broken) if broken else "all that is needed is there and works")
     if broken:
         sys.exit(ExitCode.RESOURCES)

@@ -6,13 +6,11 @@ import errno
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from warpsplat.batch.images import Found
-from warpsplat.batch.layers import Place
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.output import check_folder, check_target
 from warpsplat.files.remote import check_remote, is_remote, is_url, remote
@@ -25,6 +23,17 @@ FIELD = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
 
 LIKELY = "out/{stem}-{curves}.svg"
 """An example, for messages."""
+
+
+Place = Callable[[str], UsageError]
+"""Makes the error that names where something was given: a line of a file, or the command line."""
+
+
+class Found(NamedTuple):
+    """An image, and the folder under which it was looked for."""
+
+    path: Path
+    root: Path
 
 
 @dataclass(frozen=True)

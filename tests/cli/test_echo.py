@@ -9,8 +9,8 @@ import os
 import click
 import pytest
 
-from warpsplat.cli import say as voice
-from warpsplat.cli.say import _Notices
+from warpsplat.cli import echo as echo_module
+from warpsplat.cli.echo import _Notices
 from warpsplat.errors import OutputError
 from warpsplat.native import messages_hidden
 
@@ -21,20 +21,20 @@ def _failing(number: int) -> None:
 
 @pytest.fixture(autouse=True)
 def streams_stay(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(voice, "silence", lambda stream: None)
+    monkeypatch.setattr(echo_module, "silence", lambda stream: None)
 
 
 def test_a_full_stdout_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(click, "echo", lambda *_, **__: _failing(errno.ENOSPC))
     with pytest.raises(OutputError, match=r"^standard output: could not be written: No space left"):
-        voice.say("figures")
-    voice.say("a notice", err=True)
+        echo_module.echo("figures")
+    echo_module.echo("a notice", err=True)
 
 
 def test_a_reader_that_has_gone_is_for_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(click, "echo", lambda *_, **__: _failing(errno.EPIPE))
     with pytest.raises(BrokenPipeError):
-        voice.say("figures")
+        echo_module.echo("figures")
 
 
 class Passing(logging.LogRecord):

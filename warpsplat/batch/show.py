@@ -12,8 +12,8 @@ import click
 
 from warpsplat.batch.run import Report
 from warpsplat.batch.totals import Totals
+from warpsplat.cli.echo import echo
 from warpsplat.cli.run import SUBJECTS
-from warpsplat.cli.say import say
 from warpsplat.cli.summary import summary
 from warpsplat.errors import printable
 from warpsplat.run.formats import is_picture
@@ -46,15 +46,15 @@ class Show:
         if self._bar:
             click.echo(CLEAR, nl=False, err=True)
         if self._as_json:
-            say(json.dumps(report.as_dict()))
+            echo(json.dumps(report.as_dict()))
         count = f"[{self._seen}/{self._total}]"
         if report.error:
             again = " (in an earlier run; --retry-failed tries again)" if report.before else ""
-            say(f"{count} failed: {report.error}{again}", err=True)
+            echo(f"{count} failed: {report.error}{again}", err=True)
         elif not self._quiet and not self._as_json:
-            say(f"{count} {line(report)}")
+            echo(f"{count} {line(report)}")
         for goal in report.figures.get("missed", ()) if report.status == "made" else ():
-            say(f"{count} goal missed: {goal}", err=True)
+            echo(f"{count} goal missed: {goal}", err=True)
         self._draw()
 
     def advance(self, number: int, part: float) -> None:
@@ -90,23 +90,23 @@ class Show:
             click.echo(CLEAR, nl=False, err=True)
         if self._as_json:
             rest = {"elapsed": round(elapsed, 2), "workers": workers, "manifest": str(manifest)}
-            say(json.dumps({**self.totals.as_dict(), **rest}))
+            echo(json.dumps({**self.totals.as_dict(), **rest}))
         elif not self._quiet:
             counts = self.totals.shown_counts()
             did = ", ".join(f"{n} {name}" for name, n in counts.items())
             by = f", {workers} workers" if workers > 1 else ""
-            say(f"{self._total} images: {did} ({elapsed:.1f} s{by})")
+            echo(f"{self._total} images: {did} ({elapsed:.1f} s{by})")
             for row in self.totals.rows():
-                say("  ".join([f"  {row[0]:9}", *(f"{cell:>9}" for cell in row[1:])]).rstrip())
+                echo("  ".join([f"  {row[0]:9}", *(f"{cell:>9}" for cell in row[1:])]).rstrip())
         if self.totals.not_started and not self._quiet:
-            say("warpsplat: interrupted; the same command goes on with the rest", err=True)
+            echo("warpsplat: interrupted; the same command goes on with the rest", err=True)
         failures = self.totals.failures
         if failures and not self._quiet:
-            say("failed:", err=True)
+            echo("failed:", err=True)
             for error in failures[:NAMED]:
-                say(f"  {error}", err=True)
+                echo(f"  {error}", err=True)
             if len(failures) > NAMED:
-                say(f"  and {len(failures) - NAMED} more", err=True)
+                echo(f"  and {len(failures) - NAMED} more", err=True)
 
 
 def line(report: Report) -> str:

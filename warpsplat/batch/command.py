@@ -6,37 +6,39 @@ import contextlib
 import re
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.cli.cluster import Cluster, cluster_of, cluster_options
+from warpsplat.batch.cluster import Cluster, cluster_of, cluster_options
+from warpsplat.cli.echo import echo
 from warpsplat.cli.options import (
     FILE,
     importance_option,
     overwrite_option,
     quality_options,
     threads_option,
-    voice_options,
+    verbosity_options,
 )
-from warpsplat.cli.report import index_option
-from warpsplat.cli.say import say
 from warpsplat.errors import ExitCode, UsageError, shown
+from warpsplat.extensions import extensions
+from warpsplat.files.inputs import STANDARD
 from warpsplat.run.options import KINDS
 
 if TYPE_CHECKING:
     from warpsplat.batch.executors.tasks import Executor
     from warpsplat.batch.manifest import Manifest
     from warpsplat.batch.plan import Job
+    from warpsplat.cli.request import Request
     from warpsplat.cli.signals import Interrupt
 
 
 @dataclass(frozen=True)
-class Manner:
-    """How a batch is done: what does not change its results."""
+class BatchOptions:
+    """Options of a batch that do not change its results."""
 
     overwrite: bool = False
     retry_failed: bool = False
@@ -51,6 +53,19 @@ class Manner:
     """Other machines; None: this one."""
     quiet: bool = False
     as_json: bool = False
+
+
+def index_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--report`` if the extension pages is there."""
+    if "pages" not in extensions():
+        return function
+    option = click.option(
+        "--report",
+        type=FILE,
+        metavar="DIR",
+        help="Pages on the results, and DIR/index.html, which lists them; or a name that ends with .html.",
+    )
+    return option(function)
 
 
 class Shard(click.ParamType):
@@ -112,7 +127,7 @@ class Shard(click.ParamType):
 @importance_option
 @click.option("--device", help="auto (a GPU if there is one), cpu, or cuda:N.")
 @threads_option
-@voice_options
+@verbosity_options
 @click.option(
     "--json", "as_json", is_flag=True, help="Print a JSON object for each image, and one at the end."
 )
@@ -130,11 +145,11 @@ def command(
     gpus: float | None,
     shard: tuple[int, int],
     manifest: Path | None,
-    report: Path | None,
     threads: int | None,
     verbose: int,
     quiet: bool,
     as_json: bool,
+    report: Path | None = None,
     **given: Any,
 ) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
@@ -161,10 +176,41 @@ def command(
         "importance": None if importance is None else str(importance),
     }
     cluster = cluster_of(executor, gpus)
-    manner = Manner(
+    options = BatchOptions(
         overwrite, retry_failed, dry_run, workers, threads, shard, manifest, report, cluster, quiet, as_json
     )
-    perform(inputs, flags, sets, manner)
+    perform(inputs, flags, sets, options)
+
+
+def vectorize_images(
+    images: Sequence[Path], request: Request, given: Mapping[str, Any], hooked: Mapping[str, Any]
+) -> None:
+    """Make an SVG of each image, in the folder that ``request`` has as its output, or here.
+
+    ``given``: settings; ``hooked``: the options of hooks, as the command line has them.
+
+    Raises:
+        UsageError: an option that takes one image only.
+    """
+    from warpsplat.run.names import is_pattern
+
+    output = request.output
+    if STANDARD in images or STANDARD in (output, request.importance):
+        raise UsageError(
+            "of several images none can come from the standard input, or go to the standard output"
+        )
+    if output is not None and is_pattern(str(output)) and "{stem}" not in str(output):
+        raise UsageError(f"{output}: is not a folder, and of {len(images)} images each has a result")
+    device = None if request.device == "auto" else request.device
+    flags = flags_of({**given, "device": device, "importance": request.importance})
+    options = BatchOptions(
+        overwrite=request.overwrite,
+        threads=request.threads,
+        report=hooked.get("report"),
+        quiet=request.quiet,
+        as_json=request.as_json,
+    )
+    perform(list(map(str, images)), {**flags, "output": str(output or ".")}, (), options)
 
 
 def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -173,7 +219,9 @@ def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
     return flags | {name: True for name, kind in KINDS.items() if given.get("kind") == kind}
 
 
-def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str], manner: Manner) -> None:
+def perform(
+    inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str], options: BatchOptions
+) -> None:
     """Do a batch, and end the program with the code for it, if there is one to give.
 
     Raises:
@@ -185,25 +233,25 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
     from warpsplat.batch.plan import home_of, in_shard, plan_jobs
     from warpsplat.batch.reports import Reports
     from warpsplat.batch.run import Batch, Report
+    from warpsplat.batch.show import Show
     from warpsplat.cli import signals
-    from warpsplat.cli.batch_show import Show
 
     planned = plan_jobs(inputs, command_layer(flags, sets))
     home = home_of(planned, inputs)
-    jobs = [job for job in planned if in_shard(job, home, *manner.shard)]
-    show = Show(len(jobs), quiet=manner.quiet, as_json=manner.as_json)
+    jobs = [job for job in planned if in_shard(job, home, *options.shard)]
+    show = Show(len(jobs), quiet=options.quiet, as_json=options.as_json)
     interrupt, begun = signals.Interrupt(), time.monotonic()
-    with contextlib.closing(Manifest(manner.manifest or home / NAME)) as notes:
+    with contextlib.closing(Manifest(options.manifest or home / NAME)) as notes:
         notes.open(write=False)
         if notes.damaged:
-            say(f"warpsplat: {notes.path}: damaged lines are ignored: {notes.damaged}", err=True)
-        if not manner.overwrite:
+            echo(f"warpsplat: {notes.path}: damaged lines are ignored: {notes.damaged}", err=True)
+        if not options.overwrite:
             check_ours(jobs, notes)
-        executor, threads = executor_for(jobs, manner, interrupt)
+        executor, threads = executor_for(jobs, options, interrupt)
         reports = None
-        if manner.report and not manner.dry_run:
+        if options.report and not options.dry_run:
             taken = [notes.path, *(path for job in jobs for path in (job.output, job.image))]
-            reports = Reports.at(manner.report, home, taken=taken, overwrite=manner.overwrite)
+            reports = Reports.at(options.report, home, taken=taken, overwrite=options.overwrite)
         index = Index(planned, reports) if reports else None
 
         def hear(report: Report) -> None:
@@ -211,9 +259,9 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
                 index.hear(report)
             show.hear(report)
 
-        batch = Batch(jobs, notes, hear=hear, retry=manner.retry_failed, threads=threads, reports=reports)
+        batch = Batch(jobs, notes, hear=hear, retry=options.retry_failed, threads=threads, reports=reports)
         with interrupt.watching():
-            if manner.dry_run:
+            if options.dry_run:
                 batch.look(interrupt)
             else:
                 notes.open()
@@ -222,7 +270,7 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
                 if index:
                     index.write(notes)
     show.finish(time.monotonic() - begun, executor.workers, notes.path)
-    if manner.dry_run:
+    if options.dry_run:
         return
     if show.totals.failures:
         sys.exit(ExitCode.SOME_FAILED)
@@ -230,14 +278,16 @@ def perform(inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str]
         sys.exit(ExitCode.GOAL_MISSED)
 
 
-def executor_for(jobs: Sequence[Job], manner: Manner, interrupt: Interrupt) -> tuple[Executor, int | None]:
+def executor_for(
+    jobs: Sequence[Job], options: BatchOptions, interrupt: Interrupt
+) -> tuple[Executor, int | None]:
     """Who does the jobs, and the threads of each.
 
     Raises:
         UsageError: a device that is not here; that is found before the first image.
     """
-    if manner.cluster:
-        return manner.cluster.executor(manner.workers), manner.threads or 1
+    if options.cluster:
+        return options.cluster.executor(options.workers), options.threads or 1
     from warpsplat.batch.executors.pool import Pool
     from warpsplat.batch.executors.serial import Serial
     from warpsplat.batch.executors.split import divided
@@ -245,7 +295,9 @@ def executor_for(jobs: Sequence[Job], manner: Manner, interrupt: Interrupt) -> t
 
     start_warp()
     on_cpu = all(choose_device(name).is_cpu for name in {job.device for job in jobs})
-    workers, threads = divided([job.settings for job in jobs], manner.workers, manner.threads, on_cpu=on_cpu)
+    workers, threads = divided(
+        [job.settings for job in jobs], options.workers, options.threads, on_cpu=on_cpu
+    )
     return Serial(interrupt.watching) if workers == 1 else Pool(workers), threads
 
 
@@ -256,7 +308,7 @@ def check_ours(jobs: list[Job], manifest: Manifest) -> None:
         UsageError: there are some; the message names them.
     """
     from warpsplat.batch.run import not_ours
-    from warpsplat.cli.batch_show import NAMED
+    from warpsplat.batch.show import NAMED
 
     found = not_ours(jobs, manifest)
     if found:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from warpsplat.cli.echo import echo
 from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
-from warpsplat.cli.say import say
 from warpsplat.errors import Stopped, UsageError, printable, shown
 from warpsplat.run.options import BY_NAME, settings_from
 from warpsplat.tools.tracer import TRACERS, require
@@ -165,7 +165,7 @@ def command(
                 if output and row.svg:
                     write_result(output / svg_name(path, row.program, row.setting), row.svg.encode())
                 if verbose:
-                    say(f"{row.image}: {row.program}, {row.setting}: {row.seconds:.1f} s", err=True)
+                    echo(f"{row.image}: {row.program}, {row.setting}: {row.seconds:.1f} s", err=True)
     except Stopped as error:
         raise KeyboardInterrupt from error
     finally:
@@ -184,6 +184,6 @@ def publish(found: Comparison, output: Path | None, *, as_json: bool, quiet: boo
         write_result(output / FIGURES, f"{figures}\n".encode())
         write_result(output / PLOT, plot(found))
     if as_json:
-        say(figures)
+        echo(figures)
     elif not quiet:
-        say(tables)
+        echo(tables)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.say import say
+from warpsplat.cli.echo import echo
 
 
 @click.command("info", context_settings={"help_option_names": ["-h", "--help"]})
@@ -28,10 +28,10 @@ def command(as_json: bool) -> None:
         "kernel_cache": check_cache().values["folder"],
     }
     if as_json:
-        say(json.dumps(values))
+        echo(json.dumps(values))
         return
-    say(f"warpsplat {values['warpsplat']}, Warp {values['warp']}, Python {values['python']}")
+    echo(f"warpsplat {values['warpsplat']}, Warp {values['warp']}, Python {values['python']}")
     for found in values["devices"]:
         mark = "  (default)" if found["name"] == values["default_device"] else ""
-        say(f"  {found['name']:8} {found['description']}{mark}")
-    say(f"  {values['cpu_threads']} CPU threads; compiled kernels in {values['kernel_cache']}")
+        echo(f"  {found['name']:8} {found['description']}{mark}")
+    echo(f"  {values['cpu_threads']} CPU threads; compiled kernels in {values['kernel_cache']}")

@@ -1,4 +1,4 @@
-"""The picture in the terminal: on stderr, so that a file on stdout stays what it is."""
+"""Start a preview on a terminal, and end it with the finished picture."""
 
 from __future__ import annotations
 
@@ -8,41 +8,42 @@ import os
 from pathlib import Path
 from typing import Any, TextIO
 
-from warpsplat.cli.say import say
+from warpsplat.cli.echo import echo
 from warpsplat.errors import ImageError
 from warpsplat.motion.terminal.blocks import HALF
-from warpsplat.motion.terminal.detect import Terminal, measured, terminal
+from warpsplat.motion.terminal.detect import measured, terminal
 from warpsplat.motion.terminal.preview import Preview
 from warpsplat.run.result import Result
 
 LARGEST = 1600
-"""Longer side of a finished picture that is made to be shown [px]: more than any terminal takes."""
+"""Longer side of the finished picture [px]: more than any terminal shows."""
 
 
-def preview_on(stream: TextIO, protocol: Any) -> Preview | None:
-    """What draws on ``stream``, by a ``protocol`` or the best it knows; or None, and a line says why."""
+def start_preview(stream: TextIO, protocol: Any) -> Preview | None:
+    """Return a preview on ``stream``, drawn by ``protocol`` or else the best one the terminal knows.
+
+    Returns None, after a notice that says why, if the stream shows no pictures.
+    """
     found = terminal(stream, protocol)
     if found is None:
-        say(
+        echo(
             "warpsplat: --preview: stderr is no terminal that shows pictures; --preview=blocks prints them",
             err=True,
         )
         return None
     if found.protocol == "blocks" and not _has_blocks(stream):
-        say(f"warpsplat: --preview: the terminal's encoding, {stream.encoding}, has no half blocks", err=True)
+        echo(
+            f"warpsplat: --preview: the terminal's encoding, {stream.encoding}, has no half blocks", err=True
+        )
         return None
     if os.name == "nt":
         os.system("")  # has consoles of Windows read escape sequences
-    made = Preview(stream, lambda: _now(found, stream))
+    made = Preview(stream, lambda: measured(found, stream))
     log = logging.getLogger("warpsplat")
-    for earlier in [handler for handler in log.handlers if isinstance(handler, _Aside)]:
+    for earlier in [handler for handler in log.handlers if isinstance(handler, _NoticeHandler)]:
         log.removeHandler(earlier)
-    log.addHandler(_Aside(made))
+    log.addHandler(_NoticeHandler(made))
     return made
-
-
-def _now(found: Terminal, stream: TextIO) -> Terminal:
-    return measured(found, stream)
 
 
 def _has_blocks(stream: TextIO) -> bool:
@@ -53,8 +54,8 @@ def _has_blocks(stream: TextIO) -> bool:
     return True
 
 
-class _Aside(logging.Handler):
-    """Tells a preview that a notice was printed below its picture."""
+class _NoticeHandler(logging.Handler):
+    """Moves a preview on when a notice was printed below its picture."""
 
     def __init__(self, preview: Preview) -> None:
         super().__init__()
@@ -65,8 +66,8 @@ class _Aside(logging.Handler):
             self._preview.move_on()
 
 
-def finished(preview: Preview, result: Result, source: bytes | Path | None) -> None:
-    """Show a result, beside its ``source`` where that can be read: to show is not to fail."""
+def show_finished(preview: Preview, result: Result, source: bytes | Path | None) -> None:
+    """Show a result, beside its ``source`` if there is one; what cannot be read is left out."""
     import numpy as np
 
     from warpsplat.files.sources import image_of

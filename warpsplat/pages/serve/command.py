@@ -8,8 +8,8 @@ import webbrowser
 
 import click
 
+from warpsplat.cli.echo import echo, set_verbosity
 from warpsplat.cli.options import threads_option
-from warpsplat.cli.say import say, set_voice
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import UsageError
 from warpsplat.pages.serve.limits import Limits
@@ -85,11 +85,11 @@ def command(
     )
     if not is_loopback(host):
         risk = "others can reach it, and who has the address can use it; it is not encrypted"
-        say(f"warpsplat: --host {host}: {risk}", err=True)
-    set_voice(quiet=False)  # that kernels are being compiled is for the page as well
+        echo(f"warpsplat: --host {host}: {risk}", err=True)
+    set_verbosity(quiet=False)  # that kernels are being compiled is for the page as well
 
     def ready() -> None:
-        say(f"warpsplat: {server.address()} (Ctrl-C ends it)")
+        echo(f"warpsplat: {server.address()} (Ctrl-C ends it)")
         if opens:
             # Some browsers are programs of the terminal, which return when they are closed.
             threading.Thread(target=webbrowser.open, args=[server.ticket()], daemon=True).start()

@@ -9,7 +9,7 @@ import pytest
 
 from warpsplat.cli.main import cli
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.pages.reports.command import refine_command, several_command, vectorize_command
+from warpsplat.run.command_line import refine_command, several_command, vectorize_command
 from warpsplat.run.options import settings_from
 from warpsplat.scene import Kind
 

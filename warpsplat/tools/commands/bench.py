@@ -8,8 +8,8 @@ from typing import Any, get_args
 
 import click
 
+from warpsplat.cli.echo import echo
 from warpsplat.cli.options import threads_option
-from warpsplat.cli.say import say
 from warpsplat.errors import UsageError, shown
 from warpsplat.fit.settings import Renderer
 
@@ -111,4 +111,4 @@ def command(size: str, device: str, threads: int | None, verbose: int, as_json: 
 
     start_warp()
     values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)
-    say(json.dumps(values) if as_json else table(values, verbose))
+    echo(json.dumps(values) if as_json else table(values, verbose))

@@ -34,7 +34,7 @@ def open_standard_streams() -> None:
             reconfigure(errors="backslashreplace")
 
 
-def say(text: str, *, err: bool = False) -> None:
+def echo(text: str, *, err: bool = False) -> None:
     """Print lines, control characters escaped. A stderr that takes no more is no reason to fail.
 
     Raises:
@@ -80,7 +80,7 @@ class _Notices(logging.Handler):
 
 @contextlib.contextmanager
 def notices() -> Iterator[None]:
-    """Show the library's warnings, and on a terminal what it is busy with; ``set_voice`` changes that."""
+    """Show the library's warnings, and on a terminal what it is busy with; ``set_verbosity`` changes that."""
     log = logging.getLogger("warpsplat")
     before, handler = (log.propagate, log.level), _Notices(terminal=sys.stderr.isatty())
     log.addHandler(handler)
@@ -94,6 +94,6 @@ def notices() -> Iterator[None]:
         log.setLevel(before[1])
 
 
-def set_voice(*, quiet: bool) -> None:
+def set_verbosity(*, quiet: bool) -> None:
     """Show errors only, or everything."""
     logging.getLogger("warpsplat").setLevel(logging.ERROR if quiet else logging.INFO)
