@@ -18,7 +18,7 @@ import pytest
 import warp as wp
 from PIL import Image
 
-from tests import smoke
+from tests import needs, smoke
 
 wp.config.log_level = wp.LOG_ERROR
 
@@ -83,11 +83,20 @@ def image(tmp_path: Path) -> Path:
     return path
 
 
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    return needs.needs_missing(collection_path) or None
+
+
 @pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith(smoke.NAMES):
             item.add_marker("smoke")
+    for item in items:
+        marked = {mark.args[0] for mark in item.iter_markers("needs")}
+        words = set(needs.words_of(dict(item.callspec.params))) if hasattr(item, "callspec") else set()
+        if marked & needs.MISSING or words & needs.ABSENT_WORDS:
+            item.add_marker(pytest.mark.skip(reason="needs an extension that is not there"))
     if config.getoption("--fit-seed"):
         left_out = [item for item in items if item.get_closest_marker("usual_seed")]
         config.hook.pytest_deselected(items=left_out)

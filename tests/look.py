@@ -12,8 +12,9 @@ import numpy as np
 from PIL import Image
 
 from tests.scenes import disc, mixed_scene, random_scene
+from warpsplat.paper.models import GaussianModel, SplatModel
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg

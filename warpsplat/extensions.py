@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from warpsplat.errors import UsageError, shown
+
 
 class Command(NamedTuple):
     """A command of the command line."""
@@ -29,7 +31,7 @@ class Extension:
 
     commands: Mapping[str, Command] = field(default_factory=dict)
     renderers: Mapping[str, str] = field(default_factory=dict)
-    """Objects of ``fit.renderers.TrainingRenderer``, by the name that ``--renderer`` has for them."""
+    """Instances of ``fit.renderers.FitRenderer``, by the name that ``--renderer`` has for them."""
     run_hooks: tuple[str, ...] = ()
     """Classes of ``cli.hooks.RunHook``, which add options to ``vectorize``, ``refine`` and ``eval``."""
     provides: Mapping[str, str] = field(default_factory=dict)
@@ -70,3 +72,19 @@ def load(target: str) -> Any:
     """Import "module:attribute"."""
     module, _, name = target.partition(":")
     return getattr(importlib.import_module(module), name)
+
+
+def renderer_names() -> tuple[str, ...]:
+    """Return the names of all renderers, the core's first."""
+    return ("exact", *(name for name, _ in declared("renderers")))
+
+
+def load_renderer(name: str) -> Any:
+    """Return the ``fit.renderers.FitRenderer`` of a name.
+
+    Raises:
+        UsageError: there is none of that name.
+    """
+    if name not in renderer_names():
+        raise UsageError(f"renderer must be one of {', '.join(renderer_names())}, not {shown(name)}")
+    return load({"exact": "warpsplat.fit.renderers:EXACT", **dict(declared("renderers"))}[name])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from warpsplat.fit.schedule import (
-    fold_weight,
     mean_points_at,
     opacity_threshold,
     phase_at,
@@ -111,8 +110,3 @@ def test_coarse_first_then_fine() -> None:
     plan = phases(settings, 768, 512)
     found = [plan.index(phase_at(settings, plan, step)) for step in range(100)]
     assert found == [0] * 40 + [1] * 60
-
-
-def test_the_fold_weight_grows_geometrically() -> None:
-    settings = make_settings(iterations=100, fold_start=0.1, fold_end=10.0)
-    assert [fold_weight(settings, n) for n in (0, 50, 100)] == pytest.approx([0.1, 1.0, 10.0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from tests.fit.pictures import picture
 from tests.kernels.modules import kernel_modules, kernels_of
 from tests.scenes import mixed_scene, picture_scene, with_gradients
 from warpsplat.drawing.fit_outlines import Refinement, start
+from warpsplat.extensions import renderer_names
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase, phases
@@ -85,7 +85,7 @@ OF_TORCH = {"pixels", "composite_opaque", "composite_straight"}
 def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     """All that the package has, found by walking it: a graph can hold it, and something launches it."""
     launched = {"removal_cost", "visibility"}  # between steps
-    for renderer in get_args(Renderer):
+    for renderer in renderer_names():
         settings = make_settings(renderer=renderer, iterations=50, xing=0.01)
         scene = mixed_scene(64, 48, splines=renderer == "exact")
         step = step_for(picture(), settings, device, threads=1, scene=scene)

@@ -23,6 +23,7 @@ from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
 from warpsplat.batch.layers import KEYS
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
+from warpsplat.extensions import renderer_names
 from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.fit.settings import Settings, make_settings
@@ -234,7 +235,7 @@ options = st.fixed_dictionaries(
         "iterations": st.integers(1, 1_000_000),
         "seed": st.integers(0, 2**32 - 1),
         "precision": st.integers(0, 6),
-        "renderer": st.sampled_from(["exact", "splat"]),
+        "renderer": st.sampled_from([name for name in renderer_names() if name != "gaussian"]),
         "quality": st.sampled_from(["draft", "balanced", "high"]),
         "target-psnr": st.floats(1, 99, allow_nan=False).map(lambda x: round(x, 3)),
         "time-budget": st.integers(1, 500).map("{}s".format),

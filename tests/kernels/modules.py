@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from pathlib import Path
 from types import ModuleType
 
 import warp as wp
 
+import warpsplat
 from warpsplat import kernels
 
 
@@ -22,5 +24,9 @@ def kernels_of(module: ModuleType) -> list[wp.Kernel]:
 
 def kernel_modules() -> list[ModuleType]:
     """Modules that define a kernel."""
-    names = sorted(m.name for m in pkgutil.walk_packages(kernels.__path__, "warpsplat.kernels."))
+    names = [m.name for m in pkgutil.walk_packages(kernels.__path__, "warpsplat.kernels.")]
+    for folder in sorted(Path(warpsplat.__file__).parent.glob("*/kernels")):  # of extensions
+        prefix = f"warpsplat.{folder.parent.name}.kernels."
+        names += [m.name for m in pkgutil.walk_packages([str(folder)], prefix)]
+    names.sort()
     return [module for module in map(importlib.import_module, names) if kernels_of(module)]

@@ -16,6 +16,7 @@ from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.recover import mend
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.rounding import choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.saved import step_content, step_from
 from warpsplat.fit.schedule import (
@@ -268,7 +269,7 @@ class _Run:
                 state.per_pixel = task.per_pixel or choose_grid(step, staged=True, thrifty=task.thrifty)
                 state.rounding = True
             hold_stage(step, stage)
-        settles = settings.renderer == "exact" and not state.settled
+        settles = renderer_of(settings.renderer).exact and not state.settled
         if settles and state.step >= max(opacities_at(settings), task.begin + 1):
             hold_opacities(step)
             state.settled = True

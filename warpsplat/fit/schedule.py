@@ -61,12 +61,6 @@ def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
     return plan[0] if step < settings.coarse * settings.iterations else plan[-1]
 
 
-def fold_weight(settings: Settings, step: int) -> float:
-    """Weight of the fold loss; it grows geometrically over the run."""
-    growth = settings.fold_end / settings.fold_start
-    return float(settings.fold_start * elementary.power(growth, step / settings.iterations))
-
-
 def opacity_threshold(density: Density, progress: float) -> float:
     """Falls linearly with ``progress`` (fraction of the run) until the set of shapes is fixed."""
     t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0

@@ -8,9 +8,9 @@ import numpy as np
 
 from warpsplat.fit.density import densify, least_seen, prune_mask
 from warpsplat.fit.paints import choose_paints
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.schedule import mean_points_at, repaints_at, shapes_at
 from warpsplat.fit.simplify import simplify
-from warpsplat.fit.split import faded, split
 from warpsplat.fit.step import Step
 from warpsplat.scene import Basis, FloatArray, Scene
 from warpsplat.scene.geometry import areas
@@ -34,10 +34,7 @@ def operate(step: Step, *, grows: bool) -> Step:
     rank = np.where(np.arange(len(scene)) < state.base, np.inf, seen)
     gone = least_seen(doomed, max(replaced, len(scene) - wanted), np.asarray(rank, np.float32))
     keep = np.setdiff1d(np.arange(len(scene)), gone)
-    added = scene.take(np.arange(0))
-    if settings.renderer == "gaussian" and wanted > len(keep):
-        broken = np.intersect1d(faded(scene), keep)[: wanted - len(keep)]
-        keep, added = np.setdiff1d(keep, broken), split(scene, broken)
+    keep, added = renderer_of(settings.renderer).split(scene, keep, max(0, wanted - len(keep)))
     missing = wanted - len(keep) - len(added)
     if missing > 0:
         image = step.renderer.read_image()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import torch
 
 from warpsplat.errors import UsageError, shown
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Viewport
-from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.models import Model
 from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
@@ -18,7 +19,6 @@ from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
 
 Tensor = torch.Tensor
 Names = tuple[tuple[str, ...], ...]
-MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
 
 
 def render(
@@ -26,7 +26,7 @@ def render(
     width: int | None = None,
     height: int | None = None,
     *,
-    renderer: Literal["exact", "splat", "gaussian"] | Model = "exact",
+    renderer: str | Model = "exact",
     threads: int | None = None,
 ) -> Tensor:
     """Draw a scene; gradients flow back to its attributes.
@@ -112,11 +112,7 @@ def model_of(renderer: str | Model) -> Model:
     Raises:
         UsageError: there is none of that name.
     """
-    if not isinstance(renderer, str):
-        return renderer
-    if renderer not in MODELS:
-        raise UsageError(f"no renderer {shown(renderer)}; there are {', '.join(MODELS)}")
-    return MODELS[renderer]
+    return renderer_of(renderer).default_model if isinstance(renderer, str) else renderer
 
 
 def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewport:

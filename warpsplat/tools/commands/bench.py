@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Any, get_args
+from typing import Any
 
 import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.options import threads_option
 from warpsplat.errors import UsageError, shown
-from warpsplat.fit.settings import Renderer
+from warpsplat.extensions import renderer_names
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -67,7 +67,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 )
 @click.option(
     "--renderer",
-    type=click.Choice(get_args(Renderer)),
+    type=click.Choice(renderer_names()),
     default="exact",
     show_default=True,
     help="How shapes are seen, as in vectorize.",

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from tests.helpers import grid_of, plans_of, relative_error, renderer_for
+from tests.helpers import relative_error, renderer_for
+from tests.paper.helpers import grid_of, plans_of
+from tests.paper.reference.grid import fold_area, grids
 from tests.reference.curves import tensors
-from tests.reference.grid import fold_area, grids
 from tests.scenes import disc, points_by_shape, random_scene, with_points
-from warpsplat.rendering.models import SplatModel
+from warpsplat.paper.models import SplatModel
 from warpsplat.scene import Kind, Scene
 
 

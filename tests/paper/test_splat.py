@@ -13,24 +13,26 @@ from tests.helpers import (
     SPLAT,
     compare,
     coverage_images,
-    grid_of,
-    plans_of,
     relative_error,
     renderer_for,
     run,
 )
-from tests.reference import splat as reference
+from tests.paper.helpers import grid_of, plans_of
+from tests.paper.reference import splat as reference
+from tests.paper.reference.grid import grids, runs_of
 from tests.reference.curves import tensors
-from tests.reference.grid import grids, runs_of
-from tests.scenes import canvas, disc, random_scene
+from tests.scenes import canvas, disc, mixed_scene, random_scene
 from warpsplat.errors import CapacityError
-from warpsplat.kernels.constants import TILE, TILE_PIXELS
-from warpsplat.kernels.coverage import splat
+from warpsplat.kernels.constants import PLATEAU, TILE, TILE_PIXELS
+from warpsplat.metrics import psnr
+from warpsplat.paper.kernels import splat_coverage
+from warpsplat.paper.models import SplatModel
 from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.models import SplatModel
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer, render
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
 CASES = [(FILL, n, 1.0) for n in (2, 4, 6)] + [(STROKE, n, 1.0) for n in (1, 2, 3, 4, 5)]
@@ -84,7 +86,14 @@ def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
     inside = renderer.film.buffers.inside.numpy().reshape(-1, TILE_PIXELS)
     coverage_grad *= inside[np.minimum(bins.slot_tile.numpy(), len(inside) - 1)]
     coverage.coverage_pixels.assign(coverage_grad * (1 - coverage.coverage_pixels.numpy()))
-    run(splat.splat_backward, renderer.capacity.samples, device, bins, grid, sum_grad=coverage.coverage)
+    run(
+        splat_coverage.splat_backward,
+        renderer.capacity.samples,
+        device,
+        bins,
+        grid,
+        sum_grad=coverage.coverage,
+    )
     tiles = bins.slot_tile.numpy()
     for shape, places in enumerate(positions):
         runs = runs_of(scene, shape)
@@ -258,3 +267,18 @@ def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tupl
         )
         pictures.append(splatted(scene, device))
     assert np.abs(pictures[0] - pictures[1]).mean() < 3e-3
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("through_scales", [True, False])
+def test_mixed_scenes(device: str, seed: int, through_scales: bool) -> None:
+    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales))
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
+    """Of strong contrast: a splat's plateau is a little below its opacity."""
+    scene = random_scene(kind, count=10, width=96, height=80, seed=3)
+    shown = on_white(render_svg(write_svg(scene, opacity_scale=PLATEAU)))
+    mine = render(scene, model=SPLAT, backend=Backend.on(device)).astype(np.float64) * 255
+    assert psnr(mine, shown) > 30

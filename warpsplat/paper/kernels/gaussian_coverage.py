@@ -7,8 +7,8 @@ inside the product, so the shape is composited with its coverage alone.
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage.splat import gaussian_column, rows_of_tile
 from warpsplat.kernels.tile import column, total
+from warpsplat.paper.kernels.splat_coverage import gaussian_column, rows_of_tile
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 

@@ -18,10 +18,10 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights
-from warpsplat.kernels.grid.fill import chain_cubics, chain_point
-from warpsplat.kernels.grid.gaussians import difference, straightness
-from warpsplat.kernels.grid.strips import row_plan, station_plan
 from warpsplat.kernels.ranges import bounded_product, find_range
+from warpsplat.paper.kernels.fill import chain_cubics, chain_point
+from warpsplat.paper.kernels.gaussians import difference, straightness
+from warpsplat.paper.kernels.strips import row_plan, station_plan
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels.coverage import gaussian
-from warpsplat.kernels.grid import fill, gaussians, soft
+from warpsplat.paper.grid import Grid, GridBuffers
+from warpsplat.paper.kernels import fill, gaussians, soft
 from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.coverage import SplatCoverage
-from warpsplat.rendering.grid import Grid, GridBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.scene import GRADIENTS, Kind
@@ -92,9 +90,3 @@ class SoftGrid(Grid):
         if Kind.STROKE in p.kinds:
             program.launch(soft.soft_stroke_backward, p.point_count, *self._sources, split=True)
         program.launch(soft.soft_shapes_backward, p.shape_count, *self._sources, split=True)
-
-
-class GaussianCoverage(SplatCoverage):
-    """1 - product of 1 - o g."""
-
-    kernels = (gaussian.gaussian_forward, gaussian.gaussian_backward)

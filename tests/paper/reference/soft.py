@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import torch
 
+from tests.paper.reference.grid import Plan, differences, fill_grid
+from tests.paper.reference.splat import gaussian_values, straightness
 from tests.reference.curves import Tensors, bezier, points_of
-from tests.reference.grid import Plan, differences, fill_grid
-from tests.reference.splat import gaussian_values, straightness
 from warpsplat.kernels import constants as k
 from warpsplat.scene import Kind, Scene
 

@@ -10,10 +10,10 @@ from tests.fit.pictures import picture
 from tests.scenes import mixed_scene, points_by_shape, random_scene
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.split import FADED, faded, opacities_by_third, split
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.fit.surgery import operate
+from warpsplat.paper.split import FADED, faded, opacities_by_third, split
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Kind, Scene

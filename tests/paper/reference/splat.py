@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import torch
 
+from tests.paper.reference.grid import Plan, differences, grids, runs_of
 from tests.reference.curves import Tensors
-from tests.reference.grid import Plan, differences, grids, runs_of
 from warpsplat.kernels import constants as k
 from warpsplat.scene import Scene
 

@@ -9,27 +9,16 @@ import pytest
 import torch
 
 from tests.helpers import relative_error, renderer_for
-from tests.reference import soft as reference
-from tests.reference.composite import composite
-from tests.reference.curves import tensors
-from tests.reference.grid import Plan
+from tests.paper.helpers import soft_image
 from tests.scenes import mixed_scene, random_scene, with_gradients
-from warpsplat.rendering.models import GaussianModel
-from warpsplat.rendering.renderer import Renderer, render
-from warpsplat.rendering.soft import SoftGrid
+from warpsplat.paper.models import GaussianModel
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Kind, Scene
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
 SOFT = GaussianModel()
 CASES = [(FILL, 2, 1.0, True), (STROKE, 1, 1.0, True), (STROKE, 4, 1.0, True)]
 CASES += [(FILL, 4, 0.6, True), (STROKE, 3, 1.7, True), (FILL, 2, 1.0, False), (STROKE, 3, 1.0, False)]
-
-
-def plans_of(renderer: Renderer) -> list[Plan]:
-    assert isinstance(renderer.geometry, SoftGrid)
-    b = renderer.geometry.buffers
-    arrays = (b.shape_stations.numpy(), b.shape_rows.numpy(), b.shape_reach.numpy())
-    return [Plan(int(c), int(r), float(z)) for c, r, z in zip(*arrays, strict=True)]
 
 
 def faded(scene: Scene, seed: int = 5) -> Scene:
@@ -42,18 +31,7 @@ def faded(scene: Scene, seed: int = 5) -> Scene:
 def compare(scene: Scene, device: str, scale: float, model: GaussianModel, lanes: int | None = None) -> None:
     """Image and all gradients against the reference, for a random gradient of the image."""
     renderer = renderer_for(scene, device, scale, model=model, lanes=lanes)
-    p, v = tensors(scene), renderer.viewport
-    covers = reference.coverages(
-        scene,
-        p,
-        plans_of(renderer),
-        v.width,
-        v.height,
-        v.scale,
-        softness=model.softness,
-        detach=not model.through_scales,
-    )
-    image = composite(covers, p | {"opacities": torch.ones(len(scene))}, scene)
+    p, image = soft_image(scene, renderer, model.softness, detach=not model.through_scales)
     # The cut makes single pixels differ where float32 and float64 decide differently.
     np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-2)
     assert np.abs(renderer.read_image() - image.detach().numpy()).mean() < 5e-6

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.scenes import canvas, disc
-from warpsplat.fit.as_paths import as_paths
+from warpsplat.paper.as_paths import as_paths
+from warpsplat.paper.models import GaussianModel
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.models import GaussianModel
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Kind, Scene
 

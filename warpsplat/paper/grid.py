@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels.grid import fill, gaussians, stroke
+from warpsplat.paper.chains import check_chains
+from warpsplat.paper.kernels import fill, gaussians, stroke
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -100,7 +101,7 @@ class Grid:
         self._parameters, self._viewport = parameters, viewport
         self._through_scales, self._fold = through_scales, fold
         self._capacity, self._needed = capacity, needed
-        parameters.check_chains()
+        check_chains(parameters.structure)
         self.buffers = backend.allocate(self.owned, {"shapes": parameters.shape_count, "gaussians": capacity})
 
     def samples(self) -> dict[str, wp.array]:

@@ -10,8 +10,8 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cubic_tangent_weights, cubic_weights
 from warpsplat.kernels.elementary import sine_and_cosine
-from warpsplat.kernels.grid.strips import row_plan, row_position, station_plan
 from warpsplat.kernels.ranges import bounded_product, find_range
+from warpsplat.paper.kernels.strips import row_plan, row_position, station_plan
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 

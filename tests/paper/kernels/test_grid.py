@@ -9,14 +9,15 @@ import pytest
 import torch
 import warp as wp
 
-from tests.helpers import SPLAT, grid_of, plans_of, relative_error, renderer_for
-from tests.reference import splat as reference
+from tests.helpers import SPLAT, relative_error, renderer_for
+from tests.paper.helpers import grid_of, plans_of
+from tests.paper.reference import splat as reference
+from tests.paper.reference.grid import grids, runs_of
 from tests.reference.curves import tensors
-from tests.reference.grid import grids, runs_of
 from tests.scenes import disc, mixed_scene, points_by_shape, random_scene, with_points
 from warpsplat.kernels import constants
-from warpsplat.kernels.grid.strips import row_position
-from warpsplat.rendering.models import SplatModel
+from warpsplat.paper.kernels.strips import row_position
+from warpsplat.paper.models import SplatModel
 from warpsplat.scene import Kind, Scene
 
 SCENES = {

@@ -1,4 +1,4 @@
-"""Shapes as the splat renderer has them: one chain of cubics each, of fills an even number."""
+"""Scenes that grids of Gaussians can show: shapes of one chain of cubics each, of fills an even number."""
 
 from __future__ import annotations
 
@@ -68,3 +68,21 @@ def _halves(cubic: FloatArray) -> FloatArray:
     while len(rows[-1]) > 1:
         rows.append(np.float32(0.5) * (rows[-1][:-1] + rows[-1][1:]))
     return np.stack([[row[0] for row in rows], [row[-1] for row in reversed(rows)]]).astype(np.float32)
+
+
+def check_chains(scene: Scene) -> None:
+    """Check that all shapes are one contour of cubics, and that each fill can be halved into two chains.
+
+    Raises:
+        ValueError: one is a spline, or has several contours or an odd number of cubics.
+    """
+    for wrong, what in (
+        (
+            np.bincount(scene.contour_shapes(), minlength=len(scene)) > 1,
+            "has several contours, splats have one",
+        ),
+        (scene.basis != Basis.CUBIC, "is a spline, not cubics"),
+        ((scene.kind == Kind.FILL) & (scene.point_counts() % 6 != 0), "has an odd number of cubics"),
+    ):
+        if wrong.any():
+            raise ValueError(f"shape {int(np.flatnonzero(wrong)[0])} {what}")
