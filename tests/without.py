@@ -43,8 +43,8 @@ def installed(checkout: Path, environment: Path) -> Path:
     purelib = Path(subprocess.run(where, check=True, capture_output=True, text=True).stdout.strip())
     (purelib / "outer.pth").write_text("\n".join(site.getsitepackages()), encoding="utf-8")
     options = ["--quiet", "--no-index", "--no-deps", "--no-build-isolation", "--ignore-installed"]
-    pip = [sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check", "install"]
-    subprocess.run([*pip, *options, checkout], check=True)
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check", "install"]
+    subprocess.run([*pip, *options, str(checkout)], check=True)
     return programs
 
 
