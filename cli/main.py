@@ -68,7 +68,8 @@ class LazyGroup(click.Group):
             found = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"; did you mean {found[0]}?" if found else "; commands are " + ", ".join(COMMANDS)
             ctx.fail(f"no such command or file: {name}{hint}")
-        others = FOR_FILES.get(os.path.splitext(name)[1].lower())
+        commands = FOR_FILES.get(os.path.splitext(name)[1].lower(), ())
+        others = [words for words in commands if words.split()[0] in COMMANDS]
         if others:
             ctx.fail(f"{name}: with which command? " + " or ".join(f"warpsplat {o}" for o in others))
         echo(

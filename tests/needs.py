@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -26,30 +27,32 @@ ABSENT_WORDS = {word for name in MISSING for word in WORDS[name]}
 
 
 def needs_missing(path: Path) -> bool:
-    """Return whether a file of tests, or the folder that it is in, is for an extension that is not there."""
-    if not MISSING or not path.is_relative_to(ROOT / "tests"):
+    """Return whether tests are for an extension that is not there, or import one, maybe through helpers."""
+    tests = ROOT / "tests"
+    if not MISSING or not path.is_relative_to(tests):
         return False
-    if path.relative_to(ROOT / "tests").parts[0] in MISSING:
-        return True
-    if path.suffix != ".py":
-        return False
-    modules = [
-        name
-        for node in ast.parse(path.read_text("utf-8")).body
-        for name in (
-            [node.module or ""]
-            if isinstance(node, ast.ImportFrom)
-            else [alias.name for alias in node.names]
-            if isinstance(node, ast.Import)
-            else []
-        )
-    ]
-    return any(
-        module == f"{package}.{name}" or module.startswith(f"{package}.{name}.")
-        for module in modules
-        for package in ("warpsplat", "tests")
-        for name in MISSING
-    )
+    return path.relative_to(tests).parts[0] in MISSING or (path.suffix == ".py" and _imports_missing(path))
+
+
+@functools.cache
+def _imports_missing(path: Path) -> bool:
+    for name in _imported(path):
+        package, _, rest = name.partition(".")
+        if package in {"warpsplat", "tests"} and rest.partition(".")[0] in MISSING:
+            return True
+        helper = ROOT.joinpath(*name.split(".")).with_suffix(".py")
+        if package == "tests" and helper.exists() and _imports_missing(helper):
+            return True
+    return False
+
+
+def _imported(path: Path) -> Iterator[str]:
+    """Yield the modules that a file imports at its top, and the names it imports from modules."""
+    for node in ast.parse(path.read_text("utf-8")).body:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
 
 
 def words_of(value: Any) -> Iterator[str]:
