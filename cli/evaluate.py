@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
 
+from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, Hooks, hook_options
 from warpsplat.cli.options import FILE, overwrite_option
-from warpsplat.cli.report import check_report, report_option
-from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 
 
 @click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("image", type=FILE)
 @click.argument("svg", type=FILE)
-@report_option
+@hook_options("eval")
 @overwrite_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(image: Path, svg: Path, report: Path | None, overwrite: bool, as_json: bool) -> None:
+def command(image: Path, svg: Path, overwrite: bool, as_json: bool, **given: Any) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
 
     The SVG is rendered at the image's size, on white; where the image has
@@ -33,22 +34,19 @@ def command(image: Path, svg: Path, report: Path | None, overwrite: bool, as_jso
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")
-    check_report(report, (image, svg), STANDARD, overwrite=overwrite)
+    hooks = Hooks("eval", given)
+    hooks.check([image, svg], [], overwrite=overwrite)
     # The standard input can be read once.
     shown = read_input(image) if image == STANDARD else image
     text = read_input(svg, "an SVG") if svg == STANDARD else svg
     values = warpsplat.score(text, shown).as_dict()
-    if report:
-        named = "image" if image == STANDARD else image.name
-        svg_named = "image.svg" if svg == STANDARD else f"{svg.stem}.svg"
-        warpsplat.report(text, shown, report, name=named, svg_name=svg_named)
+    hooks.finish(Done(image, shown, [(svg, text)]))
     if as_json:
-        page = {"report": str(report)} if report else {}
-        say(json.dumps({"image": str(image), "svg": str(svg), **values, **page}))
+        echo(json.dumps({"image": str(image), "svg": str(svg), **values, **hooks.as_dict()}))
         return
     for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):
         unit = " dB" if name == "psnr" else ""
         value = "-" if values[name] is None else values[name]
-        say(f"{name:12}{value}{unit if values[name] is not None else ''}")
-    say(f"{'bytes':12}{values['bytes']}")
-    say(f"{'gzip_bytes':12}{values['gzip_bytes']}")
+        echo(f"{name:12}{value}{unit if values[name] is not None else ''}")
+    echo(f"{'bytes':12}{values['bytes']}")
+    echo(f"{'gzip_bytes':12}{values['gzip_bytes']}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import importlib
 import itertools
 import json
 import os
@@ -18,25 +17,18 @@ import click
 
 from warpsplat._version import __version__
 from warpsplat.cli import signals
-from warpsplat.cli.say import notices, open_standard_streams, say, silence
+from warpsplat.cli.echo import echo, notices, open_standard_streams, silence
 from warpsplat.errors import LONGEST_MESSAGE, ExitCode, OutputError, cut, explain, printable
+from warpsplat.extensions import Command, declared, load
 
-COMMANDS = {
-    "vectorize": "Turn an image into an SVG.",
-    "batch": "Vectorize many images: files, folders, patterns, lists.",
-    "refine": "Improve an SVG against an image.",
-    "eval": "Measure any SVG against an image.",
-    "render": "Render an SVG to a PNG.",
-    "serve": "Open a page to vectorize images in a browser.",
-    "compare": "Compare our files with another program's.",
-    "bench": "Time the stages of a training step.",
-    "info": "Show version and devices.",
-    "doctor": "Check that all that is needed is there and works.",
+COMMANDS: dict[str, Command] = {
+    "vectorize": Command("Turn an image into an SVG.", "warpsplat.cli.vectorize:command"),
+    "refine": Command("Improve an SVG against an image.", "warpsplat.cli.refine:command"),
+    "eval": Command("Measure any SVG against an image.", "warpsplat.cli.evaluate:command"),
+    "render": Command("Render an SVG to a PNG.", "warpsplat.cli.render:command"),
+    **dict(declared("commands")),
 }
-
-
-MODULES = {"eval": "evaluate"}
-"""Commands whose file has another name: ``eval`` is a built-in function."""
+"""All commands: those of the core, then those of the extensions."""
 
 
 FOR_FILES = {
@@ -51,14 +43,15 @@ class LazyGroup(click.Group):
     """Imports a command's file when the command is asked for; the list above is enough for ``--help``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """In the order of use."""
+        """Return the names in the order of ``COMMANDS``."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command, or None for an unknown name."""
         if cmd_name not in COMMANDS:
             return None
-        return getattr(importlib.import_module(f"warpsplat.cli.{MODULES.get(cmd_name, cmd_name)}"), "command")  # noqa: B009
+        command: click.Command = load(COMMANDS[cmd_name].target)
+        return command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -75,10 +68,11 @@ class LazyGroup(click.Group):
             found = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"; did you mean {found[0]}?" if found else "; commands are " + ", ".join(COMMANDS)
             ctx.fail(f"no such command or file: {name}{hint}")
-        others = FOR_FILES.get(os.path.splitext(name)[1].lower())
+        commands = FOR_FILES.get(os.path.splitext(name)[1].lower(), ())
+        others = [words for words in commands if words.split()[0] in COMMANDS]
         if others:
             ctx.fail(f"{name}: with which command? " + " or ".join(f"warpsplat {o}" for o in others))
-        say(
+        echo(
             f"warpsplat: {name}: no command given, so it is vectorized (warpsplat vectorize {name})", err=True
         )
         return super().resolve_command(ctx, ["vectorize", *args])
@@ -96,7 +90,7 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list, without importing the commands."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -165,10 +159,10 @@ def report(error: BaseException, objects: Literal["stdout", "stderr"] | None = N
     message, code = told(error)
     if isinstance(error, OSError) and error.filename is None:
         silence(sys.stdout)  # what is left in its buffer cannot be written either
-    say(f"warpsplat: {message}", err=True)
+    echo(f"warpsplat: {message}", err=True)
     if objects:
         with contextlib.suppress(Exception):  # what failed may be this as well
-            say(json.dumps({"error": message, "exit_code": int(code)}), err=objects == "stderr")
+            echo(json.dumps({"error": message, "exit_code": int(code)}), err=objects == "stderr")
     return code
 
 

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import click
 
-from warpsplat.cli.say import set_voice
+from warpsplat.cli.echo import set_verbosity
 from warpsplat.errors import shown
 from warpsplat.run.options import OPTIONS, Option
 
@@ -69,12 +69,12 @@ def checkpoint_options(function: Function) -> Function:
     return function
 
 
-def voice_options(function: Function) -> Function:
+def verbosity_options(function: Function) -> Function:
     """``-v`` and ``-q``."""
 
     def follow(context: click.Context, parameter: click.Parameter, value: int | bool) -> int | bool:
         if value:
-            set_voice(quiet=parameter.name == "quiet")
+            set_verbosity(quiet=parameter.name == "quiet")
         return value
 
     options = [
@@ -151,7 +151,7 @@ def run_options(function: Function) -> Function:
             help="auto (a GPU if there is one), cpu, or cuda:N.",
         ),
         threads_option,
-        voice_options,
+        verbosity_options,
     ]
     for option in reversed(options):
         function = option(function)

@@ -8,10 +8,9 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.motion import Motion, WithPreview, motion_options
+from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
-from warpsplat.cli.report import check_report, report_option, write_report
-from warpsplat.cli.say import say
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
 from warpsplat.files.output import check_output
@@ -19,7 +18,7 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.run.options import BY_NAME
 
 
-@click.command("refine", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("refine", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=FILE)
 @click.argument("image", type=FILE)
 @click.option(
@@ -46,8 +45,7 @@ from warpsplat.run.options import BY_NAME
     help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
 )
 @checkpoint_options
-@motion_options
-@report_option
+@hook_options("refine")
 @run_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
@@ -55,7 +53,6 @@ def command(
     image: Path,
     output: Path,
     overwrite: bool,
-    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -74,7 +71,7 @@ def command(
     IMAGE may be - for the standard input. The figures go to stderr where the
     SVG goes to stdout.
     """
-    motion = Motion.of(given)
+    hooks = Hooks("refine", given)
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
@@ -84,8 +81,7 @@ def command(
     check_format(output)
     if checkpoint:
         check_output(checkpoint, svg, image)
-    motion.check(svg, image, output, *filter(None, [checkpoint]), overwrite=overwrite)
-    check_report(report, (svg, image), output, overwrite=overwrite)
+    hooks.check([svg, image], [output, *filter(None, [checkpoint])], overwrite=overwrite)
     from warpsplat.api.refine import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
@@ -93,18 +89,18 @@ def command(
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
-    shown = read_input(image) if report else b""
+    shown = read_input(image) if hooks.need_image() else image
     interrupt = Interrupt()
     with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as tell:
         result = refine(
             data,
-            shown or image,
+            shown,
             settings=settings,
             keep=keep,
             output=output,
             device=device,
             threads=threads,
-            callback=motion.watch(tell),
+            callback=hooks.watch(tell),
             stop=interrupt,
             name=input_name(svg),
             checkpoint=checkpoint,
@@ -112,25 +108,21 @@ def command(
             checkpoint_every=checkpoint_every,
             overwrite=overwrite,
         )
-        motion.show(result, None if image == STANDARD else image)
-    motion.finish(result, quiet=quiet, device=device, threads=threads)
+        hooks.show(result, None if image == STANDARD else image)
     before = result.before or 0.0
     if result.kept and not quiet:
-        say(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)
+        echo(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)
     if not quiet:
         say_renewed(input_name(svg), result)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
-    if report:
-        values["report"] = str(report)
     if as_json:
-        say(json.dumps(values), err=output == STANDARD)
+        echo(json.dumps({**values, **hooks.as_dict()}), err=output == STANDARD)
     elif not quiet:
-        say(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
-    if report:
-        from warpsplat.pages.reports.command import refine_command
+        echo(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
+    from warpsplat.run.command_line import refine_command
 
-        line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
-        write_report(report, result, image, shown, output, line, device=device, threads=threads)
+    line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
+    hooks.finish(Done(image, shown, [(output, result)], line, device=device, threads=threads, quiet=quiet))
     leave(result)

@@ -9,6 +9,7 @@ import click
 
 from warpsplat.cli.options import FILE, overwrite_option, threads_option
 from warpsplat.errors import ImageError, UsageError
+from warpsplat.extensions import renderer_names
 
 
 @click.command("render", context_settings={"help_option_names": ["-h", "--help"]})
@@ -24,7 +25,7 @@ from warpsplat.errors import ImageError, UsageError
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
 @click.option(
     "--renderer",
-    type=click.Choice(["viewer", "exact", "splat", "gaussian"]),
+    type=click.Choice(["viewer", *renderer_names()]),
     default="viewer",
     show_default=True,
     help="viewer: resvg. exact, splat: those that shapes are fitted with, for SVGs of paths.",
@@ -44,12 +45,11 @@ def command(
     from warpsplat.files.marks import mark_png
     from warpsplat.files.output import check_output, write_result
     from warpsplat.run.formats import PICTURE_ENDINGS, check_format, write_named
-    from warpsplat.run.render import NO_GAUSSIANS, check_scale, to_png
+    from warpsplat.run.render import check_draws_files, check_scale, to_png
     from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
     from warpsplat.svg.viewer import draw_png
 
-    if renderer == "gaussian":
-        raise UsageError(NO_GAUSSIANS)
+    check_draws_files(renderer)
     check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=overwrite)
     check_format(output)
     if renderer != "viewer" and output.suffix.lower() == ".pdf":

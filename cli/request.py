@@ -12,15 +12,13 @@ from warpsplat.files.inputs import STANDARD, input_name
 
 @dataclass(frozen=True)
 class Request:
-    """One image, and how it is to be done and told of."""
+    """One image, and the options of its command that are no settings."""
 
     image: Path
     output: Path | None
     importance: Path | None
     """File of a mask."""
     overwrite: bool
-    report: Path | None
-    """Page on the result."""
     device: str
     threads: int | None
     verbose: int

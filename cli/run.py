@@ -15,9 +15,9 @@ import click
 from warpsplat.api.several import vectorize_several
 from warpsplat.api.suggest import suggest
 from warpsplat.api.vectorize import vectorize
-from warpsplat.cli.motion import Motion
+from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Hooks
 from warpsplat.cli.request import Request
-from warpsplat.cli.say import say
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
@@ -67,7 +67,7 @@ def progress_bar(
             if verbose > 1:
                 quality = f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
                 step = f"step {progress.step}/{progress.steps}"
-                say(f"{source}: {step}, {quality}, {progress.seconds:.1f} s", err=True)
+                echo(f"{source}: {step}, {quality}, {progress.seconds:.1f} s", err=True)
 
         yield tell
         return
@@ -106,11 +106,11 @@ def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Pr
 
 
 def run_file(
-    request: Request, output: Path, settings: Settings, data: bytes, *, motion: Motion, **keeping: Any
+    request: Request, output: Path, settings: Settings, data: bytes, *, hooks: Hooks, **keeping: Any
 ) -> Result:
     """``warpsplat.vectorize`` of the image, whose bytes are ``data``.
 
-    ``motion``: what shows the run besides. ``keeping``: how its state is kept, see there.
+    ``hooks``: what extensions add to the run. ``keeping``: how its state is kept, see there.
     """
     if request.verbose:
         say_start(request, _asked(settings))
@@ -120,12 +120,12 @@ def run_file(
             settings=settings,
             output=output,
             overwrite=request.overwrite,
-            callback=motion.watch(report),
+            callback=hooks.watch(report),
             stop=stop,
             **request.source,
             **keeping,
         )
-        motion.show(result, data)
+        hooks.show(result, data)
     if not request.quiet:
         say_about(request.image, settings, result, verbose=request.verbose)
     return result
@@ -161,7 +161,7 @@ def _asked(settings: Settings) -> str:
 def say_start(request: Request, what: str) -> None:
     """Say what is about to be made, and where."""
     start_warp()
-    say(f"{request.image}: {what} on {choose_device(request.device)}", err=True)
+    echo(f"{request.image}: {what} on {choose_device(request.device)}", err=True)
 
 
 def say_about(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
@@ -172,10 +172,10 @@ def say_about(source: Path, settings: Settings, result: Result, *, verbose: int)
     if result.why and (traced or verbose):
         other = "; --subject photo fits translucent shapes" if traced else ""
         taken = f"taken for a {SUBJECTS[result.subject]}"
-        say(f"warpsplat: {input_name(source)}: {taken}: {result.why}{other}", err=True)
+        echo(f"warpsplat: {input_name(source)}: {taken}: {result.why}{other}", err=True)
     if not traced and settings.simplify and not pursued and count < settings.curves:
         hint = f"a simple image: {count} shapes; --curves N for another number"
-        say(f"warpsplat: {input_name(source)}: {hint}", err=True)
+        echo(f"warpsplat: {input_name(source)}: {hint}", err=True)
     say_reduced(input_name(source), result)
     say_renewed(input_name(source), result)
 
@@ -183,19 +183,19 @@ def say_about(source: Path, settings: Settings, result: Result, *, verbose: int)
 def say_reduced(name: str, result: Result) -> None:
     """Say what was done on ``name`` to stay below the limit of memory, if something was."""
     if result.reduced:
-        say(f"warpsplat: {name}: {result.reduced}", err=True)
+        echo(f"warpsplat: {name}: {result.reduced}", err=True)
 
 
 def say_renewed(name: str, result: Result) -> None:
     """Say how many shapes had to be set anew in the training on ``name``, if there were some."""
     if result.renewed:
         found = f"numbers of shapes that are not finite, {result.renewed} times; these began anew"
-        say(f"warpsplat: {name}: {found}", err=True)
+        echo(f"warpsplat: {name}: {found}", err=True)
 
 
 def leave(result: Result) -> None:
     """Name missed goals and end the program with the code for it, if there is one to give."""
     for goal in result.missed:
-        say(f"warpsplat: goal missed: {goal}", err=True)
+        echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.missed:
         sys.exit(ExitCode.GOAL_MISSED)

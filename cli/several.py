@@ -8,20 +8,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from warpsplat.batch.images import Found
-from warpsplat.batch.layers import Place
-from warpsplat.batch.names import Wanted, check_outputs, fields_of, name_results
-from warpsplat.cli.report import check_report
+from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, Hooks
 from warpsplat.cli.request import Request
 from warpsplat.cli.run import run_several, say_about
-from warpsplat.cli.say import say
 from warpsplat.errors import UsageError, printable
 from warpsplat.files.inputs import STANDARD, read_input
-from warpsplat.files.output import check_output, write_result
+from warpsplat.files.output import check_output
 from warpsplat.fit.settings import Settings
-from warpsplat.pages.reports.command import several_command
-from warpsplat.pages.reports.several import Version, several_page
+from warpsplat.run.command_line import several_command
 from warpsplat.run.formats import ENDINGS
+from warpsplat.run.names import Found, Place, Wanted, check_outputs, fields_of, name_results
 from warpsplat.run.options import settings_from
 from warpsplat.run.result import Result
 from warpsplat.run.several import check_several
@@ -30,7 +27,7 @@ COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Of the table."""
 
 
-def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]) -> None:
+def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any], hooks: Hooks) -> None:
     """Make a file for each number of shapes, and say how good each is.
 
     Raises:
@@ -45,7 +42,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     for path in outputs:
         if path.parent.exists():
             check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
-        check_report(request.report, inputs, path, overwrite=request.overwrite)
+    hooks.check(inputs, outputs, overwrite=request.overwrite)
     results = run_several(request, outputs, numbers, settings, data)
     begun = sorted(numbers)[: len(results)]  # where it was stopped, the fewest shapes are there
     paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]
@@ -57,24 +54,13 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
             {"image": str(image), "output": str(path), "device": request.device, **result.as_dict()}
             for path, result in made
         ]
-        say(json.dumps(each))
+        echo(json.dumps(each))
         for line in _missing(numbers, begun):
-            say(f"warpsplat: {line}", err=True)
+            echo(f"warpsplat: {line}", err=True)
     elif not request.quiet:
-        say("\n".join([table(made), *_missing(numbers, begun)] if made else _missing(numbers, begun)))
-    if request.report and made:
-        line = several_command(settings, numbers, str(image), request.output, *request.flags)
-        _write_report(request.report, made, image, data, line)
-
-
-def _write_report(
-    report: Path, made: Sequence[tuple[Path, Result]], image: Path, data: bytes, line: str
-) -> None:
-    """Write the page that compares what ``line``, a command, made of ``image``, whose bytes are ``data``."""
-    versions = [Version(result, f"{path.stem}.svg") for path, result in made]  # a result may be its picture
-    versions.sort(key=lambda version: version.shapes)
-    name = "image" if image == STANDARD else image.name
-    write_result(report, several_page(versions, data, name=name, command=line).encode())
+        echo("\n".join([table(made), *_missing(numbers, begun)] if made else _missing(numbers, begun)))
+    line = several_command(settings, numbers, str(image), request.output, *request.flags)
+    hooks.finish(Done(image, data, made, line, several=True))
 
 
 def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Settings) -> list[Path]:

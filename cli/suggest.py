@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.cli.say import say
+from warpsplat.cli.echo import echo
 from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
         UsageError: settings that say how many shapes there are, or an output.
         Abort: interrupted.
     """
-    if request.output or request.report:
+    if request.output:
         raise UsageError(NOTHING_ELSE)
     if given["curves"] is not None:
         raise UsageError("--suggest and --curves do not go together")
@@ -47,9 +47,9 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
         raise click.Abort  # which says "interrupted"
     command = _command(request, settings, made)
     if request.as_json:
-        say(json.dumps({"image": str(image), "command": command, **made.as_dict()}))
+        echo(json.dumps({"image": str(image), "command": command, **made.as_dict()}))
     else:
-        say("\n".join([*_lines(input_name(image), made), f"  {command}"]))
+        echo("\n".join([*_lines(input_name(image), made), f"  {command}"]))
 
 
 NOTHING_ELSE = "--suggest takes one image, and writes nothing"
@@ -60,7 +60,7 @@ def _command(request: Request, settings: Settings, made: Suggestion) -> str:
     from dataclasses import replace
 
     from warpsplat.files.inputs import STANDARD
-    from warpsplat.pages.reports.command import vectorize_command
+    from warpsplat.run.command_line import vectorize_command
 
     image = request.image
     output = "FILE.svg" if image == STANDARD else str(Path(image.name).with_suffix(".svg"))

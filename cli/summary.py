@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat.errors import printable
+from warpsplat.extensions import load_renderer
 
 
 def summary(output: Path, values: dict[str, Any]) -> str:
@@ -22,7 +23,7 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
     ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
     psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
-    if values["renderer"] == "gaussian":
+    if load_renderer(values["renderer"]).soft:
         psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
     levels = ", ".join(_level(level) for level in values["levels"][:-1])
     note += f"; the first {levels}" if levels else ""

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.batch import Manner, flags_of, perform
-from warpsplat.cli.motion import Motion, WithPreview, motion_options
+from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     FILE,
     checkpoint_options,
@@ -18,16 +18,15 @@ from warpsplat.cli.options import (
     run_options,
     several_quality_options,
 )
-from warpsplat.cli.report import check_report, report_option, write_report
 from warpsplat.cli.request import Request
-from warpsplat.cli.say import say
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
+from warpsplat.extensions import declared, load
 from warpsplat.run.options import settings_from
 
 
-@click.command("vectorize", cls=WithPreview, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("vectorize", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
@@ -40,8 +39,7 @@ from warpsplat.run.options import settings_from
 @several_quality_options
 @importance_option
 @checkpoint_options
-@motion_options
-@report_option
+@hook_options("vectorize")
 @run_options
 @click.option(
     "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
@@ -53,7 +51,6 @@ def command(
     output: Path | None,
     overwrite: bool,
     importance: Path | None,
-    report: Path | None,
     device: str,
     threads: int | None,
     verbose: int,
@@ -73,13 +70,11 @@ def command(
     goes to stdout. Several images are made as batch makes them. Several numbers
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
-    motion = Motion.of(given)
+    hooks = Hooks("vectorize", given)
     numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
-    request = Request(
-        images[0], output, importance, overwrite, report, device, threads, verbose, quiet, as_json
-    )
+    request = Request(images[0], output, importance, overwrite, device, threads, verbose, quiet, as_json)
     if suggest:
-        motion.for_several("a run that makes a file")
+        hooks.check_mode("suggestion")
         if len(images) > 1 or as_uri or checkpoint or resume:
             raise UsageError(NOTHING_ELSE)
         suggest_number(request, given)
@@ -89,37 +84,35 @@ def command(
                 "several images, each with several numbers of shapes: a batch file, with "
                 f"matrix: {{curves: {list(numbers)}}}"
             )
-        motion.for_several()
-        device_given = None if device == "auto" else device
-        several(
-            images,
-            output,
-            {**given, "device": device_given, "importance": importance},
-            Manner(overwrite=overwrite, threads=threads, report=report, quiet=quiet, as_json=as_json),
-            as_uri=as_uri,
-        )
+        hooks.check_mode("several images")
+        if as_uri:
+            raise UsageError("--data-uri takes one image")
+        vectorize_images = dict(declared("provides")).get("vectorize_images")
+        if vectorize_images is None:
+            raise UsageError("several images need warpsplat's folder batch, which is not installed")
+        load(vectorize_images)(images, request, given, hooks.values)
     elif numbers:
-        motion.for_several("one number of shapes")
+        hooks.check_mode("several numbers")
         if as_uri or checkpoint or resume:
             flag = "--data-uri" if as_uri else "--checkpoint" if checkpoint else "--resume"
             raise UsageError(f"several numbers of shapes and {flag} do not go together")
         from warpsplat.cli.several import make_several
 
-        make_several(request, numbers, given)
+        make_several(request, numbers, given, hooks)
     else:
         keeping = {"checkpoint": checkpoint, "resume": resume, "checkpoint_every": checkpoint_every}
-        single(request, given, motion, keeping, as_uri=as_uri)
+        single(request, given, hooks, keeping, as_uri=as_uri)
 
 
 def single(
-    request: Request, given: dict[str, Any], motion: Motion, keeping: dict[str, Any], *, as_uri: bool
+    request: Request, given: dict[str, Any], hooks: Hooks, keeping: dict[str, Any], *, as_uri: bool
 ) -> None:
     """Make a file of one image, and all that is asked for besides.
 
     Args:
         request: what is to be done.
         given: settings.
-        motion: what shows the run.
+        hooks: what extensions add to the run.
         keeping: how its state is kept: ``checkpoint`` and what goes with it, see ``warpsplat.vectorize``.
         as_uri: whether the file is printed.
 
@@ -131,7 +124,7 @@ def single(
     from warpsplat.files.output import check_output
     from warpsplat.run.formats import ENDINGS, check_format
 
-    image, overwrite, report = request.image, request.overwrite, request.report
+    image = request.image
     if request.output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
     if as_uri and request.output == STANDARD:
@@ -139,56 +132,38 @@ def single(
     inputs = request.inputs
     data = read_input(image)
     output = request.output or Path(image.name).with_suffix(".svg")
-    check_output(output, *inputs, endings=ENDINGS, overwrite=overwrite)
+    check_output(output, *inputs, endings=ENDINGS, overwrite=request.overwrite)
     check_format(output)
-    kept = [path for path in (keeping["checkpoint"],) if path]
-    for path in kept:
-        check_output(path, *inputs)
-    motion.check(*inputs, output, *kept, overwrite=overwrite)
-    check_report(report, inputs, output, overwrite=overwrite)
+    outputs = [output]
+    if checkpoint := keeping["checkpoint"]:
+        check_output(checkpoint, *inputs)
+        outputs.append(checkpoint)
+    hooks.check(inputs, outputs, overwrite=request.overwrite)
     from warpsplat.cli.run import leave, run_file
 
-    result = run_file(request, output, settings, data, motion=motion, **keeping)
-    motion.finish(result, quiet=request.quiet, device=request.device, threads=request.threads)
+    result = run_file(request, output, settings, data, hooks=hooks, **keeping)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 
-        say(data_uri(result.svg))
+        echo(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": request.device, **result.as_dict()}
-    if report:
-        values["report"] = str(report)
     aside = as_uri or output == STANDARD
     if request.as_json:
-        say(json.dumps(values), err=aside)
+        echo(json.dumps({**values, **hooks.as_dict()}), err=aside)
     elif not request.quiet:
-        say(summary(output, values), err=aside)
-    if report:
-        from warpsplat.pages.reports.command import vectorize_command
+        echo(summary(output, values), err=aside)
+    from warpsplat.run.command_line import vectorize_command
 
-        line = vectorize_command(settings, str(image), str(output), *request.flags)
-        write_report(
-            report, result, image, data, output, line, device=request.device, threads=request.threads
+    line = vectorize_command(settings, str(image), str(output), *request.flags)
+    hooks.finish(
+        Done(
+            image,
+            data,
+            [(output, result)],
+            line,
+            device=request.device,
+            threads=request.threads,
+            quiet=request.quiet,
         )
+    )
     leave(result)
-
-
-def several(
-    images: tuple[Path, ...], output: Path | None, given: dict[str, Any], manner: Manner, *, as_uri: bool
-) -> None:
-    """Make an SVG of each image, in the folder ``output``, or here.
-
-    Raises:
-        UsageError: what can be said of one image only.
-    """
-    from warpsplat.batch.names import is_pattern
-    from warpsplat.files.inputs import STANDARD
-
-    if as_uri:
-        raise UsageError("--data-uri takes one image")
-    if STANDARD in images or STANDARD in (output, given["importance"]):
-        raise UsageError(
-            "of several images none can come from the standard input, or go to the standard output"
-        )
-    if output is not None and is_pattern(str(output)) and "{stem}" not in str(output):
-        raise UsageError(f"{output}: is not a folder, and of {len(images)} images each has a result")
-    perform(list(map(str, images)), {**flags_of(given), "output": str(output or ".")}, (), manner)

@@ -16,8 +16,9 @@ os.environ.setdefault("WARP_CACHE_PATH", str(Path(tempfile.gettempdir()) / "warp
 import numpy as np
 import pytest
 import warp as wp
+from PIL import Image
 
-from tests import smoke
+from tests import needs, smoke
 
 wp.config.log_level = wp.LOG_ERROR
 
@@ -71,11 +72,31 @@ def single_precision() -> Iterator[None]:
     torch.set_default_dtype(before)
 
 
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    """With grain, so that it is taken for a photograph."""
+    path = tmp_path / "photo.png"
+    y, x = np.mgrid[:40, :60]
+    smooth = np.stack([4 * x, 6 * y, 0 * x + 90], axis=2)
+    grain = np.random.default_rng(0).normal(0, 4, smooth.shape)
+    Image.fromarray(np.clip(smooth + grain, 0, 255).astype(np.uint8)).save(path)
+    return path
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    return needs.needs_missing(collection_path) or None
+
+
 @pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith(smoke.NAMES):
             item.add_marker("smoke")
+    for item in items:
+        marked = {mark.args[0] for mark in item.iter_markers("needs")}
+        words = set(needs.words_of(dict(item.callspec.params))) if hasattr(item, "callspec") else set()
+        if marked & needs.MISSING or words & needs.ABSENT_WORDS:
+            item.add_marker(pytest.mark.skip(reason="needs an extension that is not there"))
     if config.getoption("--fit-seed"):
         left_out = [item for item in items if item.get_closest_marker("usual_seed")]
         config.hook.pytest_deselected(items=left_out)

@@ -10,20 +10,20 @@ import numpy as np
 import torch
 import warp as wp
 
-from tests.reference import exact, splat
+from tests.reference import exact
 from tests.reference.composite import composite
 from tests.reference.curves import Tensors, tensors
-from tests.reference.grid import Plan
+from warpsplat.extensions import load_renderer, renderer_names
 from warpsplat.kernels.constants import TILE
 from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.grid import Grid, GridBuffers
-from warpsplat.rendering.models import EXACT, Model, SplatModel
+from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import Scene
 
-SPLAT = SplatModel()
+SPLAT: Model = load_renderer("splat").default_model if "splat" in renderer_names() else EXACT
+"""Tests with it, whose parameter is called splat, are skipped where it is not there."""
 
 
 def renderer_for(
@@ -45,20 +45,9 @@ def renderer_for(
     return renderer
 
 
-def grid_of(renderer: Renderer) -> GridBuffers:
-    assert isinstance(renderer.geometry, Grid)
-    return renderer.geometry.buffers
-
-
 def outline_of(renderer: Renderer) -> OutlineBuffers:
     assert isinstance(renderer.geometry, Outline)
     return renderer.geometry.buffers
-
-
-def plans_of(renderer: Renderer) -> list[Plan]:
-    b = grid_of(renderer)
-    arrays = (b.shape_stations.numpy(), b.shape_rows.numpy(), b.shape_reach.numpy())
-    return [Plan(int(c), int(r), float(z)) for c, r, z in zip(*arrays, strict=True)]
 
 
 def pieces_of(renderer: Renderer) -> list[list[int]]:
@@ -71,10 +60,13 @@ def pieces_of(renderer: Renderer) -> list[list[int]]:
 def reference_image(scene: Scene, renderer: Renderer, detach: bool = False) -> tuple[Tensors, torch.Tensor]:
     """Return the parameters, and the image that the reference renders with the renderer's plans."""
     p, v = tensors(scene), renderer.viewport
-    if isinstance(renderer.geometry, Grid):
-        covers = splat.coverages(scene, p, plans_of(renderer), v.width, v.height, v.scale, detach)
-    else:
+    if isinstance(renderer.geometry, Outline):
         covers = exact.coverages(scene, p, pieces_of(renderer), v.width, v.height, v.scale)
+    else:
+        from tests.paper.helpers import plans_of
+        from tests.paper.reference import splat
+
+        covers = splat.coverages(scene, p, plans_of(renderer), v.width, v.height, v.scale, detach)
     return p, composite(covers, p, scene, v.scale)
 
 
@@ -89,8 +81,8 @@ def compare(
 ) -> None:
     """Compare image and all gradients with the reference, for a random gradient of the image."""
     renderer = renderer_for(scene, device, scale, model=model, lanes=lanes)
-    splats = isinstance(model, SplatModel)
-    detach = isinstance(model, SplatModel) and not model.through_scales
+    splats = not isinstance(renderer.geometry, Outline)
+    detach = not getattr(model, "through_scales", True)
     p, image = reference_image(scene, renderer, detach)
     # The cut at Q_MAX makes single pixels differ where float32 and float64 decide differently.
     np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-3 if splats else 2e-4)

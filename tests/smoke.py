@@ -4,14 +4,11 @@ SMOKE = {
     "kernels": (
         "kernels/test_composite.py::test_blending_and_adjoint",
         "kernels/test_adam.py::test_matches_torch",
-        "kernels/grid/test_grid.py::test_adjoint_of_positions",
         "kernels/loss/test_image.py::test_squared_error",
         "kernels/loss/test_shape.py::test_bending",
     ),
     "rendering": (
         "rendering/test_mixed.py::test_exact",
-        "rendering/test_mixed.py::test_splat",
-        "rendering/test_soft.py::test_image_and_gradients",
         "rendering/test_paint.py::test_gradients",
         "rendering/test_stroker.py::test_image_and_gradients_of_dashes",
     ),
@@ -52,6 +49,9 @@ SMOKE = {
         "cli/test_main.py::test_help_is_quick",
     ),
     "others": (
+        "paper/kernels/test_grid.py::test_adjoint_of_positions",
+        "paper/test_splat.py::test_mixed_scenes",
+        "paper/test_soft.py::test_image_and_gradients",
         "torch/test_gradients.py::test_exact",
         "pydiffvg/test_render.py::test_area_of_a_circle",
         "motion/test_recorder.py::test_a_film_ends_with_the_file",

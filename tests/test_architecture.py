@@ -15,10 +15,13 @@ from pathlib import Path
 import pytest
 
 from tests import ROOT
+from warpsplat import extensions
+from warpsplat.cli.main import COMMANDS
 
 CORE = ("errors", "native", "portable", "scene", "kernels")
 
 ALLOWED: dict[str, tuple[str, ...]] = {
+    "extensions": ("errors",),
     "errors": (),
     "native": (),
     "alpha": (),
@@ -36,15 +39,16 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "search": ("alpha", "fit", "metrics", "rendering", "svg", *CORE),
     "run": ("alpha", "drawing", "files", "fit", "metrics", "rendering", "search", "svg", *CORE),
     "api": ("run", "files", "fit", "metrics", "rendering", "svg", *CORE),
-    "pages": ("api", "run", "files", "fit", "metrics", "rendering", "search", "svg", "warpsplat", *CORE),
-    "batch": ("pages", "run", "files", "fit", "metrics", "rendering", "svg", *CORE),
-    "tools": ("api", "run", "torch", "files", "fit", "metrics", "rendering", "svg", *CORE),
-    "motion": ("run", "files", "fit", "rendering", "svg", *CORE),
-    "torch": ("fit", "rendering", "svg", *CORE),
-    "pydiffvg": ("torch", "files", "rendering", "svg", *CORE),
 }
-"""What each folder or module may import, itself and the version aside; a name stands for all that is in it.
-Those that are not named may import all but ``cli``."""
+"""What each folder or module of the core may import; a name stands for all that is in it."""
+
+ANYTHING = {"", "__main__", "_version", "cli", "configs"}
+"""Modules of the core that may import all of it."""
+
+ANYWHERE = {"", "_version", "extensions"}
+"""Modules that all others may import."""
+
+EXTENSIONS = extensions.extensions()
 
 HEAVY = {
     "numpy",
@@ -116,17 +120,42 @@ def within(module: str, name: str) -> bool:
     return module == name or module.startswith(f"{name}.")
 
 
-def test_imports_point_one_way() -> None:
+def extension_of(module: str) -> str | None:
+    name = module.partition(".")[0]
+    return name if name in EXTENSIONS else None
+
+
+def test_the_core_imports_no_extension() -> None:
+    """The package's ``__init__`` names some for type checkers, and loads them through the registry."""
+    wrong = [
+        f"{module} imports {other}"
+        for module, tree in modules().items()
+        if module and not extension_of(module)
+        for other in own(imported(ast.walk(tree)))
+        if extension_of(other)
+    ]
+    assert not wrong
+
+
+def test_extensions_import_only_those_they_declare() -> None:
+    wrong = []
+    for module, tree in modules().items():
+        if name := extension_of(module):
+            allowed = {name, None, *EXTENSIONS[name].requires, *EXTENSIONS[name].uses}
+            others = own(imported(ast.walk(tree)))
+            wrong += [f"{module} imports {other}" for other in others if extension_of(other) not in allowed]
+    assert not wrong
+
+
+def test_imports_in_the_core_point_one_way() -> None:
     wrong = []
     for module, tree in modules().items():
         homes = (".".join(module.split(".")[:2]), module.partition(".")[0])
-        home = next((name for name in homes if name in ALLOWED), homes[-1])
-        for other in own(imported(ast.walk(tree))) - {"", "_version"}:
-            if home in ALLOWED:
-                right = any(within(other, name) for name in (home, *ALLOWED[home]))
-            else:
-                right = home in ("cli", "__main__") or not within(other, "cli")
-            if not right:
+        if extension_of(module) or homes[-1] in ANYTHING:
+            continue
+        home = next(name for name in homes if name in ALLOWED)
+        for other in own(imported(ast.walk(tree))) - ANYWHERE:
+            if not any(within(other, name) for name in (home, *ALLOWED[home])):
                 wrong.append(f"{module} imports {other}")
     assert not wrong
 
@@ -134,7 +163,7 @@ def test_imports_point_one_way() -> None:
 def test_the_table_names_what_there_is() -> None:
     for name, others in ALLOWED.items():
         for module in (name, *others):
-            assert module in (*modules(), "warpsplat"), module
+            assert module in modules(), module
 
 
 def test_no_import_circles() -> None:
@@ -157,13 +186,21 @@ def test_the_command_line_starts_light() -> None:
         parents = {module.rpartition(".")[0] for module in own(names)}
         waiting |= (own(names) | parents) - reached
     assert len(reached) > 3
+    commands = {command.target.partition(":")[0] for command in COMMANDS.values()}
+    hooks = {target.partition(":")[0] for one in EXTENSIONS.values() for target in one.run_hooks}
+    light = {name.removeprefix("warpsplat.") for name in commands | hooks}
     for module, tree in modules().items():
-        if within(module, "cli"):
+        if within(module, "cli") or module in light or module.endswith(".extension"):
             assert not {name.partition(".")[0] for name in imported(at_import(tree))} & HEAVY, module
 
 
 # Kernels.
 
+KERNEL_FILES = sorted(
+    path
+    for folder in (ROOT / "kernels", *(ROOT / "warpsplat").glob("*/kernels"))
+    for path in folder.rglob("*.py")
+)
 IN, OUT = "# In:", "# Out:"
 SHAPE = re.compile(r"\[[^\[\]]+\]")
 
@@ -175,11 +212,11 @@ def is_kernel(node: ast.AST) -> bool:
 def kernels() -> dict[str, tuple[ast.FunctionDef, list[str]]]:
     """Each kernel with the lines of its file."""
     found = {}
-    for path in sorted((ROOT / "kernels").rglob("*.py")):
+    for path in KERNEL_FILES:
         text = path.read_text(encoding="utf-8")
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef) and is_kernel(node):
-                name = f"{path.relative_to(ROOT / 'kernels').with_suffix('')}.{node.name}"
+                name = f"{path.relative_to(ROOT).with_suffix('')}.{node.name}"
                 found[name] = (node, text.splitlines())
     return found
 
@@ -248,7 +285,7 @@ def written(kernel: ast.FunctionDef, parameters: set[str]) -> set[str]:
 
 FUNCTIONS = {
     node.name: node
-    for path in sorted((ROOT / "kernels").rglob("*.py"))
+    for path in KERNEL_FILES
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
     if isinstance(node, ast.FunctionDef) and "wp.func" in map(ast.unparse, node.decorator_list)
 }
@@ -267,7 +304,7 @@ def test_kernels_are_launched_by_name_only() -> None:
     homes = []
     launches = 0
     for module, tree in modules().items():
-        if within(module, "kernels"):
+        if "kernels" in module.split("."):
             continue
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):

@@ -7,6 +7,7 @@ import ast
 import pytest
 
 from tests import ROOT
+from tests.needs import needs_missing
 from tests.smoke import NAMES
 
 
@@ -14,6 +15,8 @@ from tests.smoke import NAMES
 def test_the_list_names_what_there_is(name: str) -> None:
     path, _, test = name.partition("::")
     place = ROOT / path
+    if needs_missing(place):
+        pytest.skip("an extension that is not there")
     assert place.exists()
     if test:
         tree = ast.parse(place.read_text(encoding="utf-8"))

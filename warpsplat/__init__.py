@@ -10,6 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from warpsplat._version import __version__ as __version__
+from warpsplat.extensions import declared
 
 if TYPE_CHECKING:
     from warpsplat.api.images import load_image as load_image
@@ -47,7 +48,6 @@ _HOMES = {
     "suggest": "warpsplat.api.suggest",
     "refine": "warpsplat.api.refine",
     "render": "warpsplat.api.render",
-    "report": "warpsplat.pages.report",
     **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.api.images"),
     **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.api.svg"),
     **dict.fromkeys(
@@ -56,13 +56,14 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
-    "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.run.render",
     "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",
     **dict.fromkeys(("Expected", "Suggestion"), "warpsplat.run.suggest"),
+    **dict(declared("api")),
 }
-"""Where each name comes from. They are imported when they are asked for: the command line starts light."""
+"""Where each name comes from, those of extensions included. They are imported when they are asked for: the
+command line starts light."""
 
 __all__ = ["__version__", *sorted(_HOMES)]  # noqa: PLE0604 - all are strings
 

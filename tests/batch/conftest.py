@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.files.memory_store import store  # noqa: F401
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:

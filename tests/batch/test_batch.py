@@ -21,7 +21,7 @@ from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, Stop, Ta
 from warpsplat.batch.executors.work import do
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.batch.run import Batch, Report
-from warpsplat.cli.batch_show import Show
+from warpsplat.batch.show import Show
 
 
 def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from tests.batch.helpers import load_jobs, write
 from tests.cli.helpers import run
+from warpsplat.batch.command import flags_of
 from warpsplat.batch.layers import assigned, command_layer
 from warpsplat.batch.plan import Job, home_of, in_shard, plan_jobs
-from warpsplat.cli.batch import flags_of
 from warpsplat.errors import UsageError
 from warpsplat.scene import Kind
 

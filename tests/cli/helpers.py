@@ -11,6 +11,9 @@ import pytest
 
 from warpsplat.cli.main import main
 
+MANIFEST = "warpsplat-manifest.jsonl"
+"""File that batches keep their notes in."""
+
 QUICK = ["--curves", "8", "--iterations", "12", "--device", "cpu"]
 
 

@@ -18,9 +18,8 @@ import warp as wp
 from PIL import Image
 
 from tests import ROOT
-from tests.cli.helpers import run
+from tests.cli.helpers import MANIFEST, run
 from tests.fuzz.corpus import own_svg
-from warpsplat.batch.manifest import NAME
 from warpsplat.errors import ExitCode
 
 CPU = "--device cpu"
@@ -202,7 +201,7 @@ def test_exit_code(
     if code not in (ExitCode.DONE, ExitCode.SOME_FAILED) and not line.startswith("batch"):
         assert re.fullmatch(r"\n?warpsplat: .*\n", said), "one line on stderr"
     assert {n: (tmp_path / n).read_bytes() for n in inputs} == inputs, "inputs are as they were"
-    written = set(os.listdir(tmp_path)) - set(inputs) - {"folder.svg", NAME}
+    written = set(os.listdir(tmp_path)) - set(inputs) - {"folder.svg", MANIFEST}
     whole = code in (ExitCode.DONE, ExitCode.GOAL_MISSED, ExitCode.SOME_FAILED)
     assert all(whole and Path(name).suffix in (".svg", ".png") for name in written), "nothing is half written"
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.helpers import MANIFEST
 from tests.forks import CLOSED, QUICK, Forks, make_image
 from tests.fuzz.corpus import own_svg
-from warpsplat.batch.manifest import NAME
 
 pytestmark = pytest.mark.slow
 
@@ -61,7 +61,7 @@ def test_a_limit_on_the_size_of_files_in_a_batch(forks: Forks, folder: Path) -> 
     assert code == 5, err
     assert "1 failed" in out
     assert "Traceback" not in err
-    assert os.listdir(folder / "out") == [NAME]
+    assert os.listdir(folder / "out") == [MANIFEST]
 
 
 @pytest.mark.parametrize("command", WRITING)

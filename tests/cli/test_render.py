@@ -115,14 +115,6 @@ def test_nothing_but_paper(body: str, tmp_path: Path) -> None:
         assert picture.convert("RGBA").getpixel((15, 10)) == expected
 
 
-def test_soft_gaussians_are_in_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
-    svg.write_text(SHAPES)
-    assert run("render", svg, "-o", png, "--renderer", "gaussian") == 2
-    assert "vectorize --renderer gaussian" in one_line(capsys.readouterr().err)
-    assert not png.exists()
-
-
 def test_an_svg_of_very_many_pixels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Whose fault it is, the SVG's or the scale's, says the exit code."""
     svg, png = tmp_path / "a.svg", tmp_path / "a.png"

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from tests import ROOT
+from tests.cli.helpers import MANIFEST
 from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
-from warpsplat.batch.manifest import NAME
 from warpsplat.svg.viewer import render_own
 
 pytestmark = pytest.mark.slow
@@ -66,7 +66,7 @@ def assert_whole(folder: Path) -> None:
     for data in results(folder).values():
         assert data.rstrip().endswith(b"</svg>")
         assert render_own(data.decode()).size == (32, 24)
-    stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml", NAME))]
+    stray = [n for n in os.listdir(folder) if not n.endswith((".png", ".svg", ".yaml", MANIFEST))]
     assert not stray
 
 

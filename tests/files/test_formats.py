@@ -14,11 +14,9 @@ from PIL import EpsImagePlugin, Image, ImageFile
 import warpsplat
 from tests import ROOT
 from tests.cli.helpers import one_line, run
-from warpsplat.batch.images import ENDINGS
 from warpsplat.errors import ExitCode, ImageError
 from warpsplat.files.image import FORMATS, image_facts, load_image
 from warpsplat.files.importance import load_importance
-from warpsplat.pages.serve.pictures import read_picture
 
 ENDLESS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 16 16\n%%EndComments\n{} loop\nshowpage\n%%EOF\n"
 """A program that does not end."""
@@ -55,7 +53,6 @@ def test_postscript_is_run_by_nothing_that_reads_images(tmp_path: Path, programs
         lambda: load_image(path),
         lambda: load_image(ENDLESS, "x.png"),
         lambda: load_importance(path, 16, 16),
-        lambda: read_picture(ENDLESS, "x.png"),
         lambda: warpsplat.load_image(path),
     ):
         with pytest.raises(ImageError, match=said):
@@ -96,11 +93,6 @@ def test_no_format_that_is_read_starts_a_program(form: str, monkeypatch: pytest.
     monkeypatch.setattr(subprocess, "Popen", refuse)
     monkeypatch.setattr(os, "system", refuse)
     assert load_image(data.getvalue(), form).shape == (16, 16, 3)
-
-
-def test_the_formats_of_folders_are_read() -> None:
-    Image.init()
-    assert {Image.registered_extensions()[ending] for ending in ENDINGS if ending != ".jfif"} <= PIXELS
 
 
 def test_files_of_unknown_origin_are_opened_in_one_place() -> None:

@@ -115,7 +115,7 @@ def test_a_mixed_run_has_both_kinds(device: str) -> None:
     assert result.score.psnr > 15, "20 to 22 dB over five seeds"
 
 
-@pytest.mark.parametrize("given", [{"kind": Kind.STROKE}, {"renderer": "splat"}])
+@pytest.mark.parametrize("given", [{"kind": Kind.STROKE}])
 def test_mixed_excludes(given: dict[str, object]) -> None:
     with pytest.raises(UsageError, match="mixed and"):
         make_settings(mixed=True, **given)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from warpsplat.fit.schedule import (
-    fold_weight,
     mean_points_at,
     opacity_threshold,
     phase_at,
@@ -96,8 +95,3 @@ def test_splines_lose_points_once_all_shapes_are_there() -> None:
     falling = [means[s] for s in means if s >= 500]
     assert falling == sorted(set(falling), reverse=True)
     assert falling[-1] == 8
-
-
-def test_the_fold_weight_grows_geometrically() -> None:
-    settings = make_settings(iterations=100, fold_start=0.1, fold_end=10.0)
-    assert [fold_weight(settings, n) for n in (0, 50, 100)] == pytest.approx([0.1, 1.0, 10.0])

@@ -12,7 +12,7 @@ from warpsplat.fit.settings import (
     make_settings,
 )
 from warpsplat.fit.texts import parse_bytes, parse_duration
-from warpsplat.scene import Basis, Kind
+from warpsplat.scene import Kind
 
 
 def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
@@ -23,20 +23,14 @@ def test_presets_differ_from_the_defaults_only_where_they_say() -> None:
 
 
 def test_splined_fills_take_larger_steps() -> None:
-    """Strokes and splats do not; nor does anything else differ; rates that are given stay."""
+    """Strokes do not; nor does anything else differ; rates that are given stay."""
     plain = Settings().rates
     assert (
         make_settings().rates == make_settings(kind=Kind.FILL).rates == {**plain, "points": FILL_POINT_RATE}
     )
     assert plain["points"] < FILL_POINT_RATE
     assert make_settings(kind=Kind.STROKE).rates == plain
-    assert make_settings(renderer="splat").rates == plain
     assert make_settings(rates={**plain, "points": 1.0}).rates["points"] == 1
-
-
-def test_splats_get_fewer_iterations_unless_told() -> None:
-    assert make_settings(renderer="splat").iterations < make_settings().iterations
-    assert make_settings(renderer="splat", iterations=77).iterations == 77
 
 
 def test_rates_and_density_may_be_given_in_part() -> None:
@@ -47,17 +41,6 @@ def test_rates_and_density_may_be_given_in_part() -> None:
     for bad in ({"rates": {"point": 1.0}}, {"density": {"intervall": 3}}):
         with pytest.raises(UsageError, match=r"unknown setting .(point|intervall)"):
             make_settings(**bad)
-
-
-def test_soft_gaussians_are_trained_on_their_own_render() -> None:
-    settings = make_settings(renderer="gaussian")
-    assert (settings.basis, settings.order, settings.viewer) == (Basis.CUBIC, "area", False)
-    assert make_settings(renderer="gaussian", order="age").order == "age"
-
-
-def test_splats_and_splines_do_not_go_together() -> None:
-    with pytest.raises(UsageError, match="splat needs the basis cubic"):
-        make_settings(renderer="splat", basis="spline")
 
 
 def test_overrides_win_and_none_is_left_out() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,11 +13,12 @@ from tests.fit.pictures import picture, step_for
 from tests.kernels.modules import all_kernels
 from tests.scenes import mixed_scene, picture_scene, with_gradients
 from warpsplat.drawing.fit_outlines import Refinement, start
+from warpsplat.extensions import renderer_names
 from warpsplat.fit.evaluate_file import evaluate_file
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import Renderer, Settings, make_settings
+from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.step import Step, Target
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
@@ -71,7 +71,7 @@ NOT_IN_STEPS = {
 
 def steps_of_all_kinds(device: str) -> Iterator[Step]:
     """Yield steps that launch every kernel of a step between them."""
-    for renderer in get_args(Renderer):
+    for renderer in renderer_names():
         settings = make_settings(renderer=renderer, iterations=50, xing=0.01)
         scene = mixed_scene(64, 48, splines=renderer == "exact")
         yield step_for(scene, picture(), device, settings, threads=1)
@@ -120,7 +120,7 @@ def test_a_mixed_scene_comes_nearer_to_the_image(device: str) -> None:
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])
-def test_evaluating_a_file_that_outgrows_the_arrays(device: str, renderer: Renderer) -> None:
+def test_evaluating_a_file_that_outgrows_the_arrays(device: str, renderer: str) -> None:
     """The step is recorded again, and its loss is then that of the file, whatever the render shows."""
     settings = make_settings(curves=20, iterations=100, renderer=renderer)
     scene = new_scene(settings, picture())

@@ -18,16 +18,16 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from PIL import Image
 
-from tests.batch.helpers import load_jobs
 from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
-from warpsplat.batch.layers import KEYS
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
+from warpsplat.extensions import renderer_names
 from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.texts import parse_bytes, parse_duration
 from warpsplat.metrics import psnr
+from warpsplat.run.options import BY_NAME
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
 from warpsplat.svg.write import write_svg
@@ -192,7 +192,7 @@ def test_bytes_are_an_image_or_refused(head: bytes, rest: bytes) -> None:
         assert_named(error)
 
 
-keys = st.sampled_from([*KEYS, "images", "jobs", "defaults"]) | st.text(max_size=3)
+keys = st.sampled_from([*BY_NAME, "images", "jobs", "defaults"]) | st.text(max_size=3)
 tree = st.recursive(
     anything, lambda t: st.lists(t, max_size=3) | st.dictionaries(keys, t, max_size=3), max_leaves=6
 )
@@ -207,6 +207,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def refused_with_its_line(path: Path, data: bytes) -> None:
+    from tests.batch.helpers import load_jobs
+
     path.write_bytes(data)
     try:
         assert load_jobs(path)
@@ -215,12 +217,14 @@ def refused_with_its_line(path: Path, data: bytes) -> None:
         assert message.startswith(f"{path}:")
 
 
+@pytest.mark.needs("batch")
 @examples(100)
 @given(file)
 def test_batch_files_of_any_content_are_jobs_or_refused(folder: Path, content: Any) -> None:
     refused_with_its_line(folder / "jobs.yaml", yaml.safe_dump(content).encode())
 
 
+@pytest.mark.needs("batch")
 @examples(100)
 @given(st.binary(max_size=30) | st.text("jobs: []{}-&*!|>'\"\n\t#%?,images", max_size=40).map(str.encode))
 def test_batch_files_of_any_bytes_are_jobs_or_refused(folder: Path, data: bytes) -> None:
@@ -234,7 +238,7 @@ options = st.fixed_dictionaries(
         "iterations": st.integers(1, 1_000_000),
         "seed": st.integers(0, 2**32 - 1),
         "precision": st.integers(0, 6),
-        "renderer": st.sampled_from(["exact", "splat"]),
+        "renderer": st.sampled_from([name for name in renderer_names() if name != "gaussian"]),
         "quality": st.sampled_from(["draft", "balanced", "high"]),
         "target-psnr": st.floats(1, 99, allow_nan=False).map(lambda x: round(x, 3)),
         "time-budget": st.integers(1, 500).map("{}s".format),
@@ -243,11 +247,14 @@ options = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.needs("batch")
 @examples(100)
 @given(options, options)
 def test_settings_of_a_batch_are_those_of_the_flags(
     folder: Path, defaults: dict[str, Any], own: dict[str, Any]
 ) -> None:
+    from tests.batch.helpers import load_jobs
+
     path = folder / "jobs.yaml"
     path.write_text(yaml.safe_dump({"defaults": defaults, "jobs": [{"images": "a.png", **own}]}))
     flags = {key.replace("-", "_"): value for key, value in {**defaults, **own}.items()}

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from pathlib import Path
 from types import ModuleType
 
 import warp as wp
 
+import warpsplat
 from warpsplat import kernels
 
 
@@ -21,6 +23,10 @@ def kernels_of(module: ModuleType) -> list[wp.Kernel]:
 
 
 def all_kernels() -> list[wp.Kernel]:
-    """Return all kernels of the package."""
-    names = sorted(m.name for m in pkgutil.walk_packages(kernels.__path__, "warpsplat.kernels."))
-    return [kernel for module in map(importlib.import_module, names) for kernel in kernels_of(module)]
+    """Return all kernels of the package and of its extensions."""
+    names = [m.name for m in pkgutil.walk_packages(kernels.__path__, "warpsplat.kernels.")]
+    for folder in sorted(Path(warpsplat.__file__).parent.glob("*/kernels")):
+        prefix = f"warpsplat.{folder.parent.name}.kernels."
+        names += [m.name for m in pkgutil.walk_packages([str(folder)], prefix)]
+    modules = map(importlib.import_module, sorted(names))
+    return [kernel for module in modules for kernel in kernels_of(module)]

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from warpsplat.kernels import bezier
-from warpsplat.kernels.grid import gaussians
+from warpsplat.kernels import bezier, pixels
 
 
 def test_weights() -> None:
@@ -21,7 +20,7 @@ def test_weights() -> None:
 
 
 def test_modules_are_installed_under_the_package() -> None:
-    assert gaussians.gaussians_forward.module.name == "warpsplat.kernels.grid.gaussians"
+    assert pixels.tiles_to_pixels.module.name == "warpsplat.kernels.pixels"
 
 
 @pytest.mark.parametrize("pieces", [1, 2, 7])

@@ -13,7 +13,7 @@ from tests.reference import exact
 from tests.reference.composite import composite
 from tests.scenes import MIXED_CUBICS, Outline, mixed_scene, ragged_scene, random_scene
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.models import EXACT, Model, SplatModel
+from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.renderer import Capacity, render
 from warpsplat.scene import Basis, Kind, Scene
 
@@ -52,12 +52,6 @@ def test_exact(device: str, seed: int) -> None:
 @pytest.mark.parametrize("scale", [1.0, 1.6])
 def test_exact_of_any_lengths(device: str, shapes: list[Outline], scale: float) -> None:
     compare(ragged_scene(shapes, seed=1), device, scale)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("through_scales", [True, False])
-def test_splat(device: str, seed: int, through_scales: bool) -> None:
-    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales))
 
 
 @pytest.mark.slow

@@ -5,21 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-import torch
 
 import warpsplat
 from tests.scenes import random_scene
-from warpsplat import pydiffvg
 from warpsplat.errors import ResourceError, UsageError
 from warpsplat.rendering import backend, room
 from warpsplat.scene import Kind
-from warpsplat.torch import SceneTensors
-from warpsplat.torch import render as render_tensors
 
 SCENE = random_scene(Kind.FILL, width=40, height=40)
 
 
+def by_torch(side: int, count: int) -> object:
+    from warpsplat.torch import SceneTensors, render
+
+    return render([SceneTensors.of(SCENE)] * count, side, side)
+
+
 def by_pydiffvg(side: int) -> object:
+    import torch
+
+    from warpsplat import pydiffvg
+
     path = pydiffvg.Path(
         num_control_points=torch.tensor([0, 0, 0]),
         points=torch.tensor([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0]]),
@@ -34,8 +40,8 @@ WAYS: dict[str, Callable[[int], object]] = {
     "scene": lambda side: warpsplat.render(SCENE, side, device="cpu"),
     "splat": lambda side: warpsplat.render(SCENE, side, side, device="cpu", renderer="splat"),
     "scale": lambda side: warpsplat.render(SCENE, scale=side / 40, device="cpu"),
-    "tensors": lambda side: render_tensors(SceneTensors.of(SCENE), side, side),
-    "several": lambda side: render_tensors([SceneTensors.of(SCENE)] * 3, side),
+    "tensors": lambda side: by_torch(side, 1),
+    "several tensors": lambda side: by_torch(side, 3),
     "pydiffvg": by_pydiffvg,
 }
 
@@ -60,7 +66,6 @@ def test_what_no_memory_holds(way: str, side: int, monkeypatch: pytest.MonkeyPat
 def test_what_is_small_is_drawn_without_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "machine_memory", lambda: pytest.fail("asked"))
     assert warpsplat.render(SCENE, 80, device="cpu").shape == (80, 80, 4)
-    assert render_tensors(SceneTensors.of(SCENE), 80).shape == (80, 80, 4)
 
 
 def test_sides_beyond_any_number() -> None:

@@ -9,7 +9,6 @@ import click
 import pytest
 
 from tests import ROOT
-from warpsplat.batch.layers import KEYS
 from warpsplat.cli.vectorize import command
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import Settings, make_settings
@@ -28,7 +27,6 @@ def test_flags_keys_and_readme(option: Option) -> None:
     flag = flags[f"--{option.name}"]
     assert option.kind is not None or command.make_context("vectorize", ["a.png"]).params[flag.name] is None
     assert option.help.rstrip(".") in (flag.help or "")
-    assert option.name in KEYS
     rows = [row for row in ROWS if re.search(rf"`--{option.name}[ `]", row[0])]
     assert len(rows) == 1, "a row of the table"
     if option.default and option.kind is None:

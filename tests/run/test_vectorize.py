@@ -5,21 +5,18 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import replace
-from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from tests import ROOT
 from tests.fit.pictures import picture
-from warpsplat.cli.summary import summary
+from warpsplat.extensions import renderer_names
 from warpsplat.files.image import load_image
 from warpsplat.fit.settings import Density, Renderer, make_settings
 from warpsplat.fit.work import Progress
-from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_eyes, render_figures
+from warpsplat.run.figures import has_time_for_eyes
 from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
@@ -29,7 +26,7 @@ CAT = ROOT / "docs" / "images" / "cat.jpg"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("renderer", get_args(Renderer))
+@pytest.mark.parametrize("renderer", renderer_names())
 def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: Renderer) -> None:
     settings = make_settings(
         kind=kind, renderer=renderer, curves=16, iterations=40, seed=3, coarse_pixels=1000
@@ -52,21 +49,6 @@ def test_the_loss_falls_and_the_count_stays(device: str, kind: Kind) -> None:
     assert seen[-1].psnr > seen[0].psnr + 2
     assert result.score.psnr > 24
     assert abs(result.score.psnr - result.render_psnr) < 2
-
-
-def test_paper_options_run(device: str) -> None:
-    settings = make_settings(
-        kind=Kind.STROKE,
-        renderer="splat",
-        curves=8,
-        iterations=30,
-        order="area",
-        through_scales=False,
-    )
-    result = vectorize(picture(), settings, Backend.on(device))
-    assert result.score
-    assert len(result.scene) == 8
-    assert result.score.paths == 8
 
 
 def test_stop_ends_the_run_early_with_a_file(device: str) -> None:
@@ -201,39 +183,6 @@ def test_a_simple_image_gets_fewer_shapes_unless_told(device: str) -> None:
     assert len(vectorize(target, settings, Backend.on(device)).scene) == 32
     told = make_settings(iterations=5, curves=50)
     assert len(vectorize(target, told, Backend.on(device)).scene) == 50
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-def test_soft_gaussians_have_two_figures(device: str, kind: Kind) -> None:
-    """That of their own render, which the scene gives again, and that of the file."""
-    settings = make_settings(curves=60, iterations=60, renderer="gaussian", kind=kind)
-    result = vectorize(picture(), settings, Backend.on(device))
-    assert result.score
-    assert result.score.paths == 60
-    values = result.as_dict()
-    assert (values["renderer"], values["psnr"]) == ("gaussian", round(result.score.psnr, 3))
-    again = render_figures(result.scene, picture(), settings, Backend.on(device))
-    assert (result.render_psnr, result.render_ssim) == again
-    assert result.render_psnr > 24
-    assert result.render_psnr > result.score.psnr > 14
-    reduced = vectorize(picture(), replace(settings, fine_pixels=500, iterations=3), Backend.on(device))
-    assert reduced.render_ssim is None, "an image that is larger than what was trained on"
-    larger, _ = render_figures(result.scene, picture(), settings, Backend.on(device), scale=2)
-    assert larger == pytest.approx(result.render_psnr, abs=1)
-    said = summary(Path("a.svg"), values)
-    assert f"the soft render {values['render_psnr']:.2f} dB, the file {values['psnr']:.2f} dB" in said
-
-
-def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str) -> None:
-    """The render is of splats; the file has paths, as every viewer shows them."""
-    settings = make_settings(curves=30, iterations=40, renderer="splat")
-    result = vectorize(picture(), settings, Backend.on(device))
-    values = result.as_dict()
-    assert values["psnr"] == round(score_svg(result.svg, picture(), eyes=False).psnr, 3)
-    # After its last step the numbers are rounded for the file: 0.01 to 0.04 dB over five seeds.
-    splats, _ = render_figures(result.scene, picture(), settings, Backend.on(device))
-    assert values["render_psnr"] == pytest.approx(splats, abs=0.2)
-    assert values["estimated_psnr"] == round(result.estimated_psnr, 3)
 
 
 def test_shapes_of_one_colour_are_named_groups(device: str) -> None:

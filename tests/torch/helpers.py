@@ -6,40 +6,34 @@ import numpy as np
 import torch
 
 from tests.helpers import pieces_of, reference_image, relative_error, renderer_for
-from tests.reference import exact, soft
-from tests.reference.composite import composite, straight
+from tests.reference import exact
+from tests.reference.composite import straight
 from tests.reference.curves import Tensors, tensors
-from tests.reference.grid import Plan
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.models import EXACT
-from warpsplat.rendering.renderer import Renderer
-from warpsplat.rendering.soft import SoftGrid
 from warpsplat.scene import Scene
 from warpsplat.torch import SceneTensors, render
 from warpsplat.torch.engine import RenderSpec
-from warpsplat.torch.function import MODELS, draw
+from warpsplat.torch.function import draw
 from warpsplat.torch.tensors import attributes_of
-
-
-def soft_image(scene: Scene, renderer: Renderer) -> tuple[Tensors, torch.Tensor]:
-    """Return the parameters and the image of soft Gaussians, as ``reference_image``."""
-    assert isinstance(renderer.geometry, SoftGrid)
-    b, v, p = renderer.geometry.buffers, renderer.viewport, tensors(scene)
-    arrays = (b.shape_stations.numpy(), b.shape_rows.numpy(), b.shape_reach.numpy())
-    plans = [Plan(int(c), int(r), float(z)) for c, r, z in zip(*arrays, strict=True)]
-    covers = soft.coverages(scene, p, plans, v.width, v.height, v.scale, softness=0.6, detach=False)
-    return p, composite(covers, p | {"opacities": torch.ones(len(scene))}, scene)
 
 
 def compare(
     scene: Scene, name: str = "exact", scale: float = 1.0, *, tolerance: float = 1e-3
 ) -> SceneTensors:
     """Compare the image, and all gradients for a random gradient of the image."""
-    plan = renderer_for(scene, "cpu", scale, model=MODELS[name])
-    p, image = (soft_image if name == "gaussian" else reference_image)(scene, plan)
+    model = renderer_of(name).default_model
+    plan = renderer_for(scene, "cpu", scale, model=model)
+    if name == "gaussian":
+        from tests.paper.helpers import soft_image
+
+        p, image = soft_image(scene, plan)
+    else:
+        p, image = reference_image(scene, plan)
     planes = image.shape[2]
     weights = torch.tensor(np.random.default_rng(1).normal(size=tuple(image.shape)))
     found = SceneTensors.of(scene, requires_grad=True)
-    shown = render(found, plan.viewport.width, renderer=MODELS[name])[..., :planes]
+    shown = render(found, plan.viewport.width, renderer=model)[..., :planes]
     # The cut makes single pixels differ where float32 and float64 decide differently.
     atol = {"exact": 2e-4, "splat": 2e-3, "gaussian": 2e-2}[name]
     difference = (shown - image).detach().abs()

@@ -13,8 +13,9 @@ import torch
 
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.errors import UsageError
+from warpsplat.paper.models import GaussianModel, SplatModel
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.torch import SceneTensors, over, render
@@ -176,7 +177,7 @@ REFUSED: dict[str, tuple[type[Exception], str, Callable[[], object]]] = {
     "focus": (ValueError, "focus has no gradient", values(focus=torch.zeros(4, 3).float().requires_grad_())),
     "width": (UsageError, "width must be a number of pixels", lambda: render(SceneTensors(SPLINES, {}), 0)),
     "size": (UsageError, "would stretch", lambda: render(SceneTensors(SPLINES, {}), 40, 72)),
-    "model": (UsageError, "no renderer 'fast'", lambda: render(SceneTensors(SPLINES, {}), renderer=FAST)),
+    "model": (UsageError, "not 'fast'", lambda: render(SceneTensors(SPLINES, {}), renderer=FAST)),
     "spline": (ValueError, "is a spline", lambda: render(SceneTensors(SPLINES, {}), renderer="splat")),
     "none": (UsageError, "no scene", lambda: render([])),
 }  # fmt: skip

@@ -10,12 +10,11 @@ import numpy.typing as npt
 from warpsplat.api.run import backend_on
 from warpsplat.api.svg import SvgSource, save_svg, svg_name_of, text_of
 from warpsplat.errors import ImageError, UsageError, shown
-from warpsplat.fit.settings import Settings
-from warpsplat.fit.step import model_for
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render_into
 from warpsplat.rendering.room import MOST_SIDE
-from warpsplat.run.render import RendererName, drawn
+from warpsplat.run.render import drawn
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size
 
@@ -26,7 +25,7 @@ def render(
     height: int | None = None,
     *,
     scale: float | None = None,
-    renderer: RendererName = "exact",
+    renderer: str = "exact",
     device: str = "auto",
     threads: int | None = None,
 ) -> FloatArray:
@@ -64,7 +63,7 @@ def render(
         return render(save_svg(scene), scale=zoom, renderer="viewer")
     viewport = Viewport(width or max(1, round(size[0] * zoom)), height or max(1, round(size[1] * zoom)), zoom)
     with backend_on(device, threads) as backend:
-        model = model_for(Settings(renderer=renderer), 0)
+        model = renderer_of(renderer).default_model
         return _with_opacity(render_into(scene, viewport, model=model, backend=backend))
 
 

@@ -5,24 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from warpsplat.errors import UsageError
 from warpsplat.files.marks import HEAD, is_result
 from warpsplat.files.remote import WILD, find_remote, is_remote, is_url, remote
+from warpsplat.run.names import Found
 
 ENDINGS = (
     *(".png", ".jpg", ".jpeg", ".jfif", ".webp", ".avif", ".gif", ".bmp", ".tif", ".tiff"),
     *(".ppm", ".pgm", ".pbm", ".pnm", ".tga", ".jp2", ".ico"),
 )
 """Of names that are taken for images in a folder that is given as a whole."""
-
-
-class Found(NamedTuple):
-    """An image, and the folder under which it was looked for."""
-
-    path: Path
-    root: Path
 
 
 def find_images(name: str, base: Path) -> list[Found]:

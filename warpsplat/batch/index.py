@@ -14,8 +14,6 @@ from warpsplat.batch.run import Report
 from warpsplat.errors import printable
 from warpsplat.files.output import write_result
 from warpsplat.files.remote import is_remote
-from warpsplat.pages import page
-from warpsplat.pages.environment import address
 
 ASSETS = ("index.css", "index.js")
 
@@ -46,6 +44,8 @@ class Index:
         """
         with_thumbnails = len(self._jobs) <= MOST_THUMBNAILS
         rows = [self._row(job, manifest, with_thumbnail=with_thumbnails) for job in self._jobs]
+        from warpsplat.pages import page
+
         text = page("index.html.j2", assets=ASSETS, totals=totals(rows), data={"rows": rows})
         write_result(self._reports.index, text.encode())
 
@@ -82,6 +82,8 @@ class Index:
         if is_remote(path):
             return ""
         try:
+            from warpsplat.pages.environment import address
+
             return address(Path(os.path.relpath(path, self._reports.index.parent)).as_posix())
         except ValueError:  # on another drive
             return ""

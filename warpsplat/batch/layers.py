@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import yaml
 
 from warpsplat.batch.file import BatchFile, plain
 from warpsplat.errors import UsageError, cut, shown
+from warpsplat.run.names import Place
 from warpsplat.run.options import BY_NAME, KINDS, settings_from
 from warpsplat.run.research import NESTED, RESEARCH_KEYS
 
@@ -27,9 +28,6 @@ MATRIX = "matrix"
 
 MOST_COMBINATIONS = 1000
 """Of the values of a matrix."""
-
-Place = Callable[[str], UsageError]
-"""Makes an error of a message, which names where it happened."""
 
 
 @dataclass(frozen=True)

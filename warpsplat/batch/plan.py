@@ -30,13 +30,13 @@ from typing import Any
 import yaml
 
 from warpsplat.batch.file import BatchFile
-from warpsplat.batch.images import Found, find_images
-from warpsplat.batch.layers import KEYS, MATRIX, Layer, Place, Value, combinations, layer_of
-from warpsplat.batch.names import Wanted, check_outputs, fields_of, name_results, root_of
+from warpsplat.batch.images import find_images
+from warpsplat.batch.layers import KEYS, MATRIX, Layer, Value, combinations, layer_of
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.remote import is_remote, is_url, remote
 from warpsplat.fit.settings import Settings
+from warpsplat.run.names import Found, Place, Wanted, check_outputs, fields_of, name_results, root_of
 from warpsplat.run.options import KINDS, settings_from
 from warpsplat.run.research import NESTED
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.rounding import STAGES, stage_steps
 from warpsplat.fit.schedule import EVALUATE_FROM, EVALUATE_INTERVAL, Phase, phases, shapes_at
 from warpsplat.fit.settings import Settings
@@ -42,8 +43,6 @@ class Law:
 
 FILLS = Law(0.34, 0.66, 0.235, 0.49, 0.656)
 STROKES = Law(20.0, 0.64, 0.033, 0.69)
-SPLATS = Law(38.0, 0.59, 0.052, 0.85)
-SOFT = Law(14.0, 1.1, 0.075, 1.0)
 
 TURN, TURN_PIXELS, TURN_SHAPE = 8.0, 15.0, 0.115
 """Of surgery: of each turn, of ``PIXELS``, of a shape."""
@@ -72,8 +71,8 @@ PARTS = 24
 
 def law_of(settings: Settings) -> Law:
     """Of the steps of a run."""
-    if settings.renderer != "exact":
-        return SOFT if settings.renderer == "gaussian" else SPLATS
+    if cost := renderer_of(settings.renderer).step_cost:
+        return Law(*cost)
     return STROKES if settings.kind == Kind.STROKE else FILLS
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from warpsplat.fit.grow import new_shapes
 from warpsplat.fit.paints import choose_paints
 from warpsplat.fit.prune import choose_removed, prune_mask
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.schedule import mean_points_at, repaints_at, shapes_at
 from warpsplat.fit.simplify import simplify
-from warpsplat.fit.split import faded, split
 from warpsplat.fit.step import Step
 from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas
@@ -34,10 +34,7 @@ def densify(step: Step, *, grows: bool) -> Step:
     scene = state.scene()
     wanted = state.base + shapes_at(settings, state.step) if grows else len(scene)
     keep = _kept(step, scene, costs, wanted)
-    added = scene.take(np.arange(0))
-    if settings.renderer == "gaussian" and wanted > len(keep):
-        broken = np.intersect1d(faded(scene), keep)[: wanted - len(keep)]
-        keep, added = np.setdiff1d(keep, broken), split(scene, broken)
+    keep, added = renderer_of(settings.renderer).split(scene, keep, max(0, wanted - len(keep)))
     replace_shapes(step, scene, keep, added, wanted)
     if grows:
         _reduce_points(step, costs[keep])

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from warpsplat.fit.as_paths import as_paths
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.kernels import constants
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own, render_svg
 from warpsplat.svg.write import minified, shortened, write_svg
@@ -17,13 +16,12 @@ from warpsplat.svg.write import minified, shortened, write_svg
 
 def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
     """Return the SVG of ``scene``, with ``per_pixel`` units of its view box per pixel."""
-    if settings.renderer == "gaussian":
-        scene = as_paths(scene, settings.softness)
+    renderer = renderer_of(settings.renderer)
     return write_svg(
-        scene,
+        renderer.to_paths(scene, settings),
         per_pixel=per_pixel,
         metadata=metadata,
-        opacity_scale=_opacity_scale(settings),
+        opacity_scale=renderer.opacity_scale,
         title=settings.title,
         ids=settings.ids,
     )
@@ -40,14 +38,9 @@ def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str =
 
 def shown_paths(scene: Scene, settings: Settings) -> Scene:
     """Return the paths of ``scene``'s file with their opacities there; nothing is rounded."""
-    if settings.renderer == "gaussian":
-        return as_paths(scene, settings.softness)
-    return replace(scene, opacities=scene.opacities * np.float32(_opacity_scale(settings)))
-
-
-def _opacity_scale(settings: Settings) -> float:
-    """Return the opacity of a path over that of its shape."""
-    return constants.PLATEAU if settings.renderer == "splat" else 1.0
+    renderer = renderer_of(settings.renderer)
+    paths = renderer.to_paths(scene, settings)
+    return replace(paths, opacities=paths.opacities * np.float32(renderer.opacity_scale))
 
 
 def show(text: str, scene: Scene) -> Image.Image:

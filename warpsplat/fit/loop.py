@@ -18,6 +18,7 @@ from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.recover import recover
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.rounding import choose_grid, freeze_opacities, freeze_stage, opacities_at, stage_at
 from warpsplat.fit.saved import step_content, step_from
 from warpsplat.fit.schedule import (
@@ -270,7 +271,7 @@ class _Run:
                 )
                 state.rounding = True
             freeze_stage(step, stage)
-        settles = settings.renderer == "exact" and not state.opacities_frozen
+        settles = renderer_of(settings.renderer).exact and not state.opacities_frozen
         if settles and state.step >= max(opacities_at(settings), task.begin + 1):
             freeze_opacities(step)
             state.opacities_frozen = True

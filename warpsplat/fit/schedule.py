@@ -65,12 +65,6 @@ def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
     return plan[0] if step < settings.coarse * settings.iterations else plan[-1]
 
 
-def fold_weight(settings: Settings, step: int) -> float:
-    """Return the weight of the fold loss, which grows geometrically over the run."""
-    growth = settings.fold_end / settings.fold_start
-    return float(settings.fold_start * elementary.power(growth, step / settings.iterations))
-
-
 def opacity_threshold(density: Density, progress: float) -> float:
     """Return the opacity below which shapes are pruned after ``progress`` (share of the run)."""
     t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0

@@ -14,13 +14,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from warpsplat.errors import UsageError, shown
+from warpsplat.extensions import load_renderer, renderer_names
 from warpsplat.fit.texts import parse_bytes, parse_duration, parse_levels, parse_palette
 from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
-Renderer = Literal["exact", "splat", "gaussian"]
+Renderer = str
 Painting = Literal["flat", "linear", "radial", "auto"]
 
 
@@ -263,8 +264,6 @@ class Settings:
             check_whole("colors", self.colors, 1, MOST_COLORS)
         if len(self.palette) > MOST_COLORS:
             raise UsageError(f"palette has {len(self.palette)} colours, more than {MOST_COLORS}")
-        if (self.opaque or self.is_limited) and self.renderer == "gaussian":
-            raise UsageError("opaque fills and the renderer gaussian do not go together")
         fitted = self.fitted_options()
         if self.subject == "line":
             fitted = [name for name in fitted if name != "mixed"]
@@ -273,7 +272,7 @@ class Settings:
         choices = (
             ("subject", self.subject, get_args(Subject)),
             ("order", self.order, get_args(Order)),
-            ("renderer", self.renderer, get_args(Renderer)),
+            ("renderer", self.renderer, renderer_names()),
             ("paint", self.paint, get_args(Painting)),
         )
         if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
@@ -281,8 +280,6 @@ class Settings:
             raise UsageError(f"background must be auto, none or a colour as #ffffff, not {given}")
         if self.mixed and self.kind != Kind.FILL:
             raise UsageError("mixed and open do not go together")
-        if self.mixed and self.renderer != "exact":
-            raise UsageError(f"mixed and the renderer {self.renderer} do not go together")
         for name, choice, allowed in choices:
             if choice not in allowed:
                 raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {shown(choice)}")
@@ -376,16 +373,6 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
-SPLAT_SHARE = 0.5
-"""Iterations with Gaussians over those of the exact renderer: a step takes several times as long."""
-
-GAUSSIAN: dict[str, Any] = {
-    "order": "area",
-    "texture": 0.0,
-    "viewer": False,
-}
-"""What the soft renderer changes in every preset: its own render is what counts, by its squared error."""
-
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 DEFAULT_QUALITY: Quality = "balanced"
@@ -426,9 +413,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     if given.get("colors") or given.get("palette"):
         given["opaque"] = True
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
-    if given.get("renderer") in ("splat", "gaussian"):
-        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations), basis=Basis.CUBIC)
-        preset = replace(preset, **(GAUSSIAN if given["renderer"] == "gaussian" else {}))
+    if given.get("renderer", "exact") != "exact":
+        preset = load_renderer(given["renderer"]).preset(preset)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
     if given.get("opaque"):
@@ -449,10 +435,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
             raise UsageError(f"basis must be one of {choices}, not {shown(given['basis'])}")
         given["basis"] = Basis[given["basis"].upper()]
     settings = replace(preset, **given)
-    if settings.renderer != "exact" and settings.basis != Basis.CUBIC:
-        raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
-    if settings.renderer == "gaussian" and settings.paint != "flat":
-        raise UsageError("renderer gaussian needs the paint flat")
+    if settings.renderer != "exact":
+        load_renderer(settings.renderer).check(settings)
     if settings.size or settings.page or settings.units:
         from warpsplat.svg.page import check_placing  # brings what writes files
 

@@ -11,14 +11,15 @@ from warpsplat.fit.importance import weights_at
 from warpsplat.fit.levels import Level
 from warpsplat.fit.losses import LossInputs, LossTarget
 from warpsplat.fit.optimizer import record_adam
-from warpsplat.fit.schedule import Phase, fold_weight
+from warpsplat.fit.renderers import renderer_of
+from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
 from warpsplat.fit.work import Snapshot
 from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
-from warpsplat.rendering.models import ExactModel, GaussianModel, Model, SplatModel
+from warpsplat.rendering.models import Model
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.scene import FloatArray
@@ -49,12 +50,7 @@ class Target:
 
 def model_for(settings: Settings, step: int, slack: float = 1.0) -> Model:
     """Return the coverage model of the settings after ``step`` steps, with a phase's ``slack``."""
-    if settings.renderer == "exact":
-        return ExactModel(slack=slack)
-    fold = fold_weight(settings, step)
-    if settings.renderer == "splat":
-        return SplatModel(settings.through_scales, fold)
-    return GaussianModel(settings.softness, settings.gaussian_density, settings.through_scales, fold)
+    return renderer_of(settings.renderer).model(settings, step, slack)
 
 
 class Step:

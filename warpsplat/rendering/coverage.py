@@ -1,21 +1,17 @@
-"""The coverage stage: how much of each pixel a shape covers, and the adjoint.
-
-Two models fill the same arrays: the area that a viewer computes for a path, and the paper's Gaussians.
-"""
+"""The coverage stage: how much of each pixel a shape covers, as a viewer computes it, and the adjoint."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage import fill, splat, stroke
+from warpsplat.kernels.coverage import fill, stroke
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
-from warpsplat.rendering.grid import Grid
 from warpsplat.rendering.outline import Outline
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -228,40 +224,3 @@ class ExactCoverage:
         for part in self.parts:
             part.backward(program)
         self._outline.backward(program)
-
-
-class SplatCoverage:
-    """The paper's Gaussians: 1 - product of 1 - g."""
-
-    mapping = constants.PRODUCT
-    kernels: ClassVar[tuple[wp.Kernel, wp.Kernel]] = (splat.splat_forward, splat.splat_backward)
-    """Gaussians -> coverages, and its adjoint."""
-
-    def __init__(self, backend: Backend, grid: Grid, bins: Bins, slots: int) -> None:
-        self._backend, self._grid, self._slots = backend, grid, slots
-        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
-        self._sources = (self.buffers, bins.buffers, grid.buffers)
-
-    def states(self, program: Program) -> None:
-        """See ``Coverage``."""
-        program.launch(
-            self.kernels[0],
-            (self._slots, self._backend.lanes),
-            *self._sources,
-            lanes=self._backend.lanes,
-            split=True,
-        )
-
-    def values(self, program: Program) -> None:
-        """See ``Coverage``: all are there."""
-
-    def backward(self, program: Program) -> None:
-        """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
-        program.launch(
-            self.kernels[1],
-            self._grid.buffers.mean.shape[0],
-            *self._sources,
-            sum_grad=self.buffers.coverage,
-            split=True,
-        )
-        self._grid.backward(program)

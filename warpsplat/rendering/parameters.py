@@ -16,7 +16,6 @@ from warpsplat.rendering.backend import Backend, view
 from warpsplat.scene import (
     ATTRIBUTES,
     Attribute,
-    Basis,
     Canvas,
     FloatArray,
     IndexArray,
@@ -177,6 +176,11 @@ class Parameters:
         return self._scene.pictures
 
     @property
+    def structure(self) -> Scene:
+        """The scene as it was last uploaded: its attributes may have changed since, the rest not."""
+        return self._scene
+
+    @property
     def level_ends(self) -> tuple[int, ...]:
         """Of the scene."""
         return level_ends(self._scene)
@@ -185,22 +189,6 @@ class Parameters:
     def canvas(self) -> Canvas:
         """What the shapes lie on."""
         return self._scene.canvas
-
-    def check_chains(self) -> None:
-        """Whether all shapes are cubics of one contour and each fill can be halved into two chains of them.
-
-        Raises:
-            ValueError: one is a spline, or has several contours or an odd number of cubics.
-        """
-        several = np.bincount(self._scene.contour_shapes(), minlength=self.shape_count) > 1
-        if several.any():
-            raise ValueError(f"shape {int(np.flatnonzero(several)[0])} has several contours, splats have one")
-        splines = self._scene.basis != Basis.CUBIC
-        if splines.any():
-            raise ValueError(f"shape {int(np.flatnonzero(splines)[0])} is a spline, not cubics")
-        odd = (self._scene.kind == Kind.FILL) & (self._scene.point_counts() % 6 != 0)
-        if odd.any():
-            raise ValueError(f"fill {int(np.flatnonzero(odd)[0])} has an odd number of cubics")
 
     def scene(self) -> Scene:
         """Copy the current values to the host."""

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, get_args
 
 from warpsplat.errors import UsageError, printable
+from warpsplat.extensions import renderer_names
 from warpsplat.fit.settings import (
     DEFAULT_QUALITY,
     QUALITIES,
     Painting,
-    Renderer,
     Settings,
     Subject,
     make_settings,
@@ -79,7 +79,7 @@ OPTIONS = (
         str,
         "How the fit sees shapes: as viewers do, as Gaussians much like that, or as the paper's soft ones.",
         _defaults.renderer,
-        choices=get_args(Renderer),
+        choices=renderer_names(),
     ),
     Option(
         "paint",

@@ -5,43 +5,30 @@ from __future__ import annotations
 import io
 import math
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
 from warpsplat.errors import ImageError, UsageError
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.models import EXACT, Model, SplatModel
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
-from warpsplat.scene.chains import as_chains
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 from warpsplat.svg.read import scene_of
 from warpsplat.svg.structure import read_shapes
 from warpsplat.svg.viewer import premultiplied, render_svg
 
-RendererName = Literal["exact", "splat", "gaussian", "viewer"]
-"""The models of coverage, and resvg."""
 
-MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel()}
-
-NO_GAUSSIANS = (
-    "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of each "
-    "Gaussian; vectorize --renderer gaussian reports the figures of its own render"
-)
-
-
-def drawn(text: str, renderer: RendererName, scale: float, backend: Backend) -> FloatArray:
+def drawn(text: str, renderer: str, scale: float, backend: Backend) -> FloatArray:
     """The SVG ``text`` at the size that resvg gives it, as ``Renderer.read_image`` has it.
 
     Raises:
         ImageError: not an SVG, or with something that the model cannot show.
-        UsageError: a scale that leaves no pixel or too many, or Gaussians, which no SVG holds.
+        UsageError: a scale that leaves no pixel or too many, or a renderer that cannot draw files.
     """
-    if renderer == "gaussian":
-        raise UsageError(NO_GAUSSIANS)
+    check_draws_files(renderer)
     size = svg_size(inspect_svg(text).root)
     if size is None:
         raise ImageError("says neither its size nor a viewBox")
@@ -54,16 +41,25 @@ def drawn(text: str, renderer: RendererName, scale: float, backend: Backend) -> 
     scene, has_background = scene_of(read_shapes(text, width, height, scale), width, height)
     if not has_background:
         scene = replace(scene, canvas=replace(scene.canvas, background=None))
-    if renderer == "splat":
-        try:
-            scene = as_chains(scene)
-        except ValueError as error:
-            raise ImageError(f"{error}, not supported by the splat renderer") from None
+    try:
+        scene = (own := renderer_of(renderer)).drawable(scene)
+    except ValueError as error:
+        raise ImageError(f"{error}, not supported by the {renderer} renderer") from None
     if len(scene):
-        return render(scene, model=MODELS[renderer], backend=backend)
+        return render(scene, model=own.default_model, backend=backend)
     background = scene.canvas.background
     image = np.zeros((height, width, 4), np.float32)
     return image if background is None else np.asarray(image[..., :3] + background, np.float32)
+
+
+def check_draws_files(renderer: str) -> None:
+    """Check that a renderer, or the viewer resvg, can draw the scene of a file.
+
+    Raises:
+        UsageError: it cannot, or there is none of that name.
+    """
+    if renderer != "viewer" and (why := renderer_of(renderer).cannot_draw_files):
+        raise UsageError(why)
 
 
 def check_scale(size: tuple[float, float], scale: float) -> None:

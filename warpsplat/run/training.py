@@ -12,6 +12,7 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.work import Meter, Progress, Report
@@ -114,13 +115,13 @@ def _by_trace(run: Training) -> Fit:
 def arranged(made: Fit, run: Training, way: Way) -> Fit:
     """What was made in the order in which the file says it, without what shows nothing."""
     settings = run.settings
-    if way not in {"goal", "trace"} and settings.renderer != "gaussian":
-        # Soft Gaussians reach beyond the outlines that this order goes by.
+    soft = renderer_of(settings.renderer).soft
+    if way not in {"goal", "trace"} and not soft:
         made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     if run.target.shape[2] == 4 and way != "trace" and not made.interrupted:
         clear = clear_empty(made.scene, run.target, settings, run.backend, made.per_pixel)
         made = replace(made, scene=clear)
-    if settings.ids and settings.subject != "line" and settings.renderer != "gaussian":
+    if settings.ids and settings.subject != "line" and not soft:
         made = replace(made, scene=made.scene.take(by_color(made.scene)))
     return made
 

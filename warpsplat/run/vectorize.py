@@ -13,6 +13,7 @@ from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.export import finished
 from warpsplat.fit.place import simple_curves
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import Stages
 from warpsplat.fit.work import Progress
@@ -184,7 +185,8 @@ def vectorize(
     if score:
         score = score.of_file(file)
     render_psnr, render_ssim = made.render_psnr, None
-    if settings.renderer == "gaussian" and not reduction and pixels_of(target) <= settings.fine_pixels:
+    soft = renderer_of(settings.renderer).soft
+    if soft and not reduction and pixels_of(target) <= settings.fine_pixels:
         render_psnr, render_ssim = render_figures(made.scene, target, settings, backend)
     seconds = time.monotonic() - started
     levels = bool(score and settings.levels)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -29,7 +30,7 @@ SEEN = 1e-3
 
 def for_few(settings: Settings) -> Settings:
     """The settings of a run whose file has room for few shapes, ``settings.curves``."""
-    if settings.curves > FEW or settings.renderer != "exact":
+    if settings.curves > FEW or not renderer_of(settings.renderer).exact:
         return settings
     settings = replace(
         settings,

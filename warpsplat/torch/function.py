@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import torch
 from torch.autograd.function import once_differentiable
 
 from warpsplat.errors import UsageError, shown
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Viewport
-from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
+from warpsplat.rendering.models import Model
 from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
@@ -19,7 +20,6 @@ from warpsplat.torch.engine import RenderSpec, check_memory, engine_of
 from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
 
 Tensor = torch.Tensor
-MODELS: dict[str, Model] = {"exact": EXACT, "splat": SplatModel(), "gaussian": GaussianModel()}
 
 
 def render(
@@ -27,7 +27,7 @@ def render(
     width: int | None = None,
     height: int | None = None,
     *,
-    renderer: Literal["exact", "splat", "gaussian"] | Model = "exact",
+    renderer: str | Model = "exact",
     threads: int | None = None,
 ) -> Tensor:
     """Render a scene, or several; gradients flow back to the attributes.
@@ -110,11 +110,7 @@ def model_of(renderer: str | Model) -> Model:
     Raises:
         UsageError: there is no such model.
     """
-    if not isinstance(renderer, str):
-        return renderer
-    if renderer not in MODELS:
-        raise UsageError(f"no renderer {shown(renderer)}; there are {', '.join(MODELS)}")
-    return MODELS[renderer]
+    return renderer_of(renderer).default_model if isinstance(renderer, str) else renderer
 
 
 def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewport:

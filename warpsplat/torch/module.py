@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import torch
 
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.units import Units
 from warpsplat.scene import IndexArray, Scene
 from warpsplat.svg.write import write_svg
-from warpsplat.torch.function import MODELS, model_of, render
+from warpsplat.torch.function import render
 from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of
 
 
@@ -22,7 +23,8 @@ class Module(torch.nn.Module):
         """Copy the attributes of ``scene``; ``renderer``, ``threads``: see ``render``."""
         super().__init__()
         self._layout, self._renderer, self._threads = scene, renderer, threads
-        fixed = WITHOUT_GRADIENT if model_of(renderer) is MODELS["gaussian"] else (*WITHOUT_GRADIENT, "fades")
+        soft = isinstance(renderer, str) and renderer_of(renderer).soft
+        fixed = WITHOUT_GRADIENT if soft else (*WITHOUT_GRADIENT, "fades")
         for name in (attribute.name for attribute in attributes_of(scene)):
             if name not in fixed:
                 self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from tests.files.test_formats import programs  # noqa: F401
 from tests.pages.serve.helpers import Visitor
 from warpsplat.fit.settings import PRESETS
 

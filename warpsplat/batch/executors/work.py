@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from warpsplat.batch.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.errors import WarpsplatError, explain, printable
@@ -14,14 +15,14 @@ from warpsplat.files.inputs import read_input
 from warpsplat.files.output import make_folder
 from warpsplat.fit.work import Progress
 from warpsplat.metrics import score_svg
-from warpsplat.pages.reports.command import vectorize_command
-from warpsplat.pages.reports.single import Facts, report_page
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.turns import turn
+from warpsplat.run.command_line import vectorize_command
 from warpsplat.run.formats import named_bytes
 from warpsplat.run.keys import STOPPED, job_key
 from warpsplat.run.prepare import load_target
+from warpsplat.run.result import Result
 from warpsplat.run.vectorize import vectorize_image
 from warpsplat.svg.inspect import svg_text
 
@@ -89,8 +90,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
         )
         made = Outcome(task.number, "made")
         if task.report and not result.stopped:
-            line = vectorize_command(task.settings, task.name, task.output)
-            made = _reported(task, image, result.svg, Facts.of(result, line), backend, own=True)
+            made = _with_report(task, image, result.svg, result, backend)
     data = named_bytes(output, result.svg, key=STOPPED if result.stopped else key)
     return replace(
         made,
@@ -108,25 +108,33 @@ def _measured(task: Task, key: str, image: bytes) -> Outcome:
     score = score_svg(svg_text(data, task.output), target, eyes=False)
     made = Outcome(task.number, "measured")
     if task.report:
-        line = vectorize_command(task.settings, task.name, task.output)
-        facts = Facts(task.report.figures or score.as_dict(), command=line)
+        figures = task.report.figures or score.as_dict()
         start_warp()
         backend = Backend.on(choose_device(task.device), task.threads)
         with turn(backend.device):
-            made = _reported(task, image, svg_text(data, task.output), facts, backend, own=False)
+            made = _with_report(task, image, svg_text(data, task.output), figures, backend)
     return replace(made, key=key, digest=digest(data), figures=score.as_dict())
 
 
-def _reported(task: Task, image: bytes, svg: str, facts: Facts, backend: Backend, *, own: bool) -> Outcome:
-    """The report of a result that is there: if it cannot be made, that is no reason to lose the result."""
+def _with_report(
+    task: Task, image: bytes, svg: str, done: Result | Mapping[str, Any], backend: Backend
+) -> Outcome:
+    """Return an outcome with the page on an SVG, or with the error that prevented the page.
+
+    ``done``: the result of the run just done, or the figures of an earlier one.
+    """
+    from warpsplat.pages.reports.single import Facts, report_page
+
+    own = isinstance(done, Result)
     outcome = Outcome(task.number, "made" if own else "measured")
     name, svg_name = (os.path.basename(path) for path in (task.name, task.output))
+    line = vectorize_command(task.settings, task.name, task.output)
     try:
         made = report_page(
             svg,
             image,
             backend,
-            facts,
+            Facts.of(done, line) if isinstance(done, Result) else Facts(done, command=line),
             name=name,
             svg_name=f"{svg_name.rpartition('.')[0]}.svg",
             own=own,

@@ -23,7 +23,6 @@ from starlette.routing import Route
 
 from warpsplat.errors import ImageError, UsageError, WarpsplatError, explain
 from warpsplat.native import release_memory
-from warpsplat.pages.reports.command import vectorize_command
 from warpsplat.pages.serve.events import events
 from warpsplat.pages.serve.form import settings_of
 from warpsplat.pages.serve.guard import line
@@ -31,6 +30,7 @@ from warpsplat.pages.serve.limits import Refused
 from warpsplat.pages.serve.pictures import DEFAULT_NAME, Picture, plain_name, read_picture
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine, Worker
+from warpsplat.run.command_line import vectorize_command
 
 MAX_REQUEST = 20_000
 """Of what is no image [bytes]."""

@@ -1,0 +1,99 @@
+"""What the program says: figures on stdout, everything else on stderr, each in whole, printable lines."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+from collections.abc import Iterator
+
+import click
+
+from warpsplat.errors import OutputError, printable
+from warpsplat.native import write_message
+
+
+def open_standard_streams() -> None:
+    """Make sure that 0, 1 and 2 are open: of a closed one, the next file opened would take the number."""
+    for number, name in ((0, "stdin"), (1, "stdout"), (2, "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_RDONLY if number == 0 else os.O_WRONLY)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+        if getattr(sys, name) is None:
+            setattr(
+                sys, name, os.fdopen(number, "r" if number == 0 else "w", encoding="utf-8", closefd=False)
+            )
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure:  # names that the terminal's encoding lacks are shown escaped
+            reconfigure(errors="backslashreplace")
+
+
+def echo(text: str, *, err: bool = False) -> None:
+    """Print lines, control characters escaped. A stderr that takes no more is no reason to fail.
+
+    Raises:
+        OutputError: stdout cannot be written.
+        BrokenPipeError: nobody reads it any more.
+    """
+    text = "\n".join(printable(line) for line in text.split("\n"))
+    try:
+        click.echo(text, err=err)
+    except OSError as error:
+        silence(sys.stderr if err else sys.stdout)  # what is left in its buffer cannot be written either
+        if err:
+            return
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise OutputError(f"standard output: could not be written: {error.strerror or error}") from error
+
+
+def silence(stream: object) -> None:
+    """Send what is left in a stream's buffer, and all to come, to nowhere."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())  # type: ignore[attr-defined]
+        os.close(nowhere)
+
+
+class _Notices(logging.Handler):
+    """Shows the library's notices on stderr; on a terminal those that pass as well, in one line."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__()
+        self._start = "\r\x1b[2K" if terminal else ""  # a progress bar may stand in the line
+        self._terminal = terminal
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = printable(record.getMessage())
+        with contextlib.suppress(OSError):
+            if not getattr(record, "passing", False):
+                click.echo(f"{self._start}warpsplat: {text}", err=True)
+            elif self._terminal:
+                write_message(self._start + (f"warpsplat: {text}" if text else ""))
+
+
+@contextlib.contextmanager
+def notices() -> Iterator[None]:
+    """Show the library's warnings, and on a terminal what it is busy with; ``set_verbosity`` changes that."""
+    log = logging.getLogger("warpsplat")
+    before, handler = (log.propagate, log.level), _Notices(terminal=sys.stderr.isatty())
+    log.addHandler(handler)
+    log.propagate = False
+    log.setLevel(logging.INFO if sys.stderr.isatty() else logging.WARNING)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.propagate = before[0]
+        log.setLevel(before[1])
+
+
+def set_verbosity(*, quiet: bool) -> None:
+    """Show errors only, or everything."""
+    logging.getLogger("warpsplat").setLevel(logging.ERROR if quiet else logging.INFO)

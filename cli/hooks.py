@@ -1,0 +1,179 @@
+"""Hooks by which extensions add options to ``vectorize``, ``refine`` and ``eval``, check them before the run,
+watch the run, and show or write more than the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+
+import click
+
+from warpsplat.errors import UsageError
+from warpsplat.extensions import extensions, load
+
+if TYPE_CHECKING:
+    from warpsplat.fit.work import Progress
+    from warpsplat.run.result import Result
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+Mode = Literal["one file", "several images", "several numbers", "suggestion"]
+"""What a command line makes."""
+
+TAKES: dict[Mode, str] = {
+    "several images": "one image",
+    "several numbers": "one number of shapes",
+    "suggestion": "a run that makes a file",
+}
+"""For messages: what an option takes that cannot be given in a mode."""
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command did."""
+
+    image: Path
+    """As it was given."""
+    data: bytes | Path
+    """The image itself."""
+    made: Sequence[tuple[Path, Result | bytes | Path]]
+    """Files with their results; of ``eval``, the SVG that was measured."""
+    command: str = ""
+    """A command line that does the same again."""
+    several: bool = False
+    """Whether several numbers of shapes were asked for."""
+    device: str = "auto"
+    threads: int | None = None
+    quiet: bool = False
+
+
+class RunHook:
+    """Base class of hooks; it does nothing. One is made for each command line, with its options' values."""
+
+    commands: ClassVar[tuple[str, ...]] = ("vectorize", "refine")
+    modes: ClassVar[tuple[Mode, ...]] = ("one file",)
+    """Where its options can be given."""
+    options: ClassVar[dict[str, Callable[[Any], Any]]] = {}
+    """Parameter -> click decorator."""
+
+    def __init__(self, **values: Any) -> None:
+        """``values``: of ``options``."""
+
+    @staticmethod
+    def rewrite(arguments: list[str]) -> list[str]:
+        """Return the words of the command line as click is to parse them."""
+        return arguments
+
+    def flag(self) -> str | None:
+        """Return the first flag that was given, for messages; None if there is none."""
+        return None
+
+    def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
+        """Check before the run that what is asked for can be done.
+
+        Raises:
+            UsageError: it cannot.
+        """
+
+    def needs_image(self) -> bool:
+        """Return whether ``Done.data`` has to be the image's bytes."""
+        return False
+
+    def watch(self, on_progress: Callable[[Progress], None]) -> Callable[[Progress], None]:
+        """Return what the run calls in place of ``on_progress``, which shows the progress bar."""
+        return on_progress
+
+    def show(self, result: Result, image: bytes | Path | None) -> None:
+        """Show a result as soon as it is there; ``image`` is None if it cannot be read once more."""
+
+    def finish(self, done: Done) -> None:
+        """Write what was asked for, once the file is there and its figures are printed."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what is added to the object of ``--json``."""
+        return {}
+
+
+def hooks_of(command: str) -> Iterable[type[RunHook]]:
+    """Yield the hooks of a command."""
+    for extension in extensions().values():
+        for target in extension.run_hooks:
+            if command in (hook := load(target)).commands:
+                yield hook
+
+
+def hook_options(command: str) -> Callable[[Function], Function]:
+    """Return a decorator that adds the options of all hooks of a command."""
+
+    def decorate(function: Function) -> Function:
+        options = [option for hook in hooks_of(command) for option in hook.options.values()]
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+class HookedCommand(click.Command):
+    """A command whose hooks may rewrite the words before they are parsed."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse what the hooks make of ``args``."""
+        for hook in hooks_of(self.name or ""):
+            args = hook.rewrite(args)
+        return super().parse_args(ctx, args)
+
+
+class Hooks:
+    """All hooks of one command line."""
+
+    def __init__(self, command: str, given: dict[str, Any]) -> None:
+        """Take the values of the hooks' options out of ``given``."""
+        self.values: dict[str, Any] = {}
+        self._hooks = []
+        for hook in hooks_of(command):
+            values = {name: given.pop(name) for name in hook.options}
+            self.values |= values
+            self._hooks.append(hook(**values))
+
+    def check_mode(self, mode: Mode) -> None:
+        """Check that the options that were given are possible in a mode.
+
+        Raises:
+            UsageError: one is not.
+        """
+        for hook in self._hooks:
+            if mode not in hook.modes and (flag := hook.flag()):
+                raise UsageError(f"{flag} takes {TAKES[mode]}")
+
+    def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
+        """See ``RunHook``."""
+        for hook in self._hooks:
+            hook.check(inputs, outputs, overwrite=overwrite)
+
+    def need_image(self) -> bool:
+        """Return whether a hook needs the image's bytes."""
+        return any(hook.needs_image() for hook in self._hooks)
+
+    def watch(self, on_progress: Callable[[Progress], None]) -> Callable[[Progress], None]:
+        """See ``RunHook``."""
+        for hook in self._hooks:
+            on_progress = hook.watch(on_progress)
+        return on_progress
+
+    def show(self, result: Result, image: bytes | Path | None) -> None:
+        """See ``RunHook``."""
+        for hook in self._hooks:
+            hook.show(result, image)
+
+    def finish(self, done: Done) -> None:
+        """See ``RunHook``."""
+        for hook in self._hooks:
+            hook.finish(done)
+
+    def as_dict(self) -> dict[str, Any]:
+        """See ``RunHook``."""
+        return {name: value for hook in self._hooks for name, value in hook.as_dict().items()}

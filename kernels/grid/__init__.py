@@ -1,1 +1,0 @@
-"""Shapes -> grids of Gaussians (the paper's model)."""

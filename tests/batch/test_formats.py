@@ -1,0 +1,13 @@
+"""Which files of a folder are taken for images."""
+
+from __future__ import annotations
+
+from PIL import Image
+
+from tests.files.test_formats import PIXELS
+from warpsplat.batch.images import ENDINGS
+
+
+def test_the_formats_of_folders_are_read() -> None:
+    Image.init()
+    assert {Image.registered_extensions()[ending] for ending in ENDINGS if ending != ".jfif"} <= PIXELS

@@ -1,0 +1,3 @@
+from __future__ import annotations
+
+from tests.files.memory_store import store  # noqa: F401

@@ -1,0 +1,151 @@
+"""``--animate`` and ``--preview``: what the command line does with them."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import QUICK, one_line, run
+from warpsplat.cli import signals
+from warpsplat.motion.terminal import detect, start
+from warpsplat.svg.viewer import render_own
+
+SHORT = [*QUICK[:2], "--iterations", "40", *QUICK[4:]]
+
+
+def test_an_animation_besides_the_file(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file is the same, and so is what is said of it; with a preview as well."""
+    plain, shown, film = tmp_path / "a.svg", tmp_path / "b.svg", tmp_path / "b.gif"
+    assert run("vectorize", image, "-o", plain, *SHORT) == 0
+    figures = capsys.readouterr().out
+    more = ["--animate", film, "--animate-width", "40", "--preview=blocks"]
+    assert run("vectorize", image, "-o", shown, *SHORT, *more) == 0
+    captured = capsys.readouterr()
+    assert shown.read_bytes() == plain.read_bytes()
+    seconds = re.compile(r", [\d.]+ s$")
+    assert seconds.sub("", captured.out.strip()) == seconds.sub("", figures.strip().replace("a.svg", "b.svg"))
+    said = [line for line in captured.err.splitlines() if "▀" not in line]
+    assert said == [f"warpsplat: {film}: animation of the training, {film.stat().st_size:,} bytes"]
+    with Image.open(film) as opened:
+        assert opened.width == 40 and getattr(opened, "n_frames", 1) > 3
+
+
+def test_traced_drawings_are_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also where the training is asked for that there is none of."""
+    image, film = tmp_path / "cells.png", tmp_path / "a.svg"
+    cells = Image.effect_noise((6, 5), 90).point(lambda level: 255 * (level > 128))
+    cells.resize((48, 40), Image.Resampling.NEAREST).save(image)
+    for more in ([], ["--animate-what", "training"]):
+        output = tmp_path / "b.svg"
+        options = ["--subject", "pixel", "--device", "cpu", "--animate", film, *more]
+        assert run("vectorize", image, "-o", output, *options) == 0
+        captured = capsys.readouterr()
+        lines = captured.err.strip().splitlines()
+        assert re.search(r"a\.svg: animation of the drawing, [\d,]+ bytes$", lines[-1])
+        assert len(lines) == 1 + bool(more)
+        assert 'class="wf"' in film.read_text()
+        assert render_own(film.read_text()).tobytes() == render_own(output.read_text()).tobytes()
+
+
+def test_refine_as_well(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    svg, film = tmp_path / "a.svg", tmp_path / "b.webp"
+    assert run("vectorize", image, "-o", svg, *QUICK) == 0
+    options = ["--iterations", "40", "--device", "cpu", "--animate", film, "--preview=kitty"]
+    assert run("refine", svg, image, "-o", tmp_path / "b.svg", *options) == 0
+    captured = capsys.readouterr()
+    assert "animation of the training" in captured.err and "\x1b_Ga=T" in captured.err
+    with Image.open(film) as opened:
+        assert opened.format == "WEBP" and getattr(opened, "n_frames", 1) > 2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ["--animate", "a.avi"],
+            "a.avi: is no kind of animation; its name ends with .svg, .gif, .webp or .mp4",
+        ),
+        (["--animate", "-"], "an animation does not go to the standard output: give --animate FILE"),
+        (["--animate", "a.svg"], "a.svg: is another file of this run; give another name"),
+        (["--animate", "there.gif/a.gif"], "there.gif/a.gif: {here}/there.gif is not a folder"),
+        (["--animate", "a.gif", "--animate-width", "9"], "an animation is 16 to 2048 px wide, not 9"),
+        (["--animate-what", "drawing"], "--animate-what and --animate-width say how --animate FILE is made"),
+        (
+            ["--animate", "there.gif"],
+            "there.gif: exists and was not written by warpsplat; --overwrite replaces it",
+        ),
+        (["photo.png", "--animate", "a.gif"], "--animate takes one image"),
+        (["photo.png", "--preview"], "--preview takes one image"),
+    ],
+)
+def test_what_cannot_be_is_said_before_the_run(
+    options: list[str],
+    message: str,
+    image: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(image.parent)
+    Path("there.gif").write_bytes(b"GIF89a of somebody else")
+    before = sorted(image.parent.iterdir())
+    assert run("vectorize", image.name, "-o", "a.svg", *options) == 2
+    assert one_line(capsys.readouterr().err) == "warpsplat: " + message.replace("{here}", str(image.parent))
+    assert sorted(image.parent.iterdir()) == before
+
+
+def test_without_a_terminal_a_line_says_so(
+    image: Path, tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    """An image may follow the flag; the SVG on stdout stays what it is."""
+    assert run("vectorize", "--preview", image, "-o", "-", *QUICK) == 0
+    captured = capfdbinary.readouterr()
+    lines = captured.err.decode().splitlines()
+    assert lines[0] == (
+        "warpsplat: --preview: stderr is no terminal that shows pictures; --preview=blocks prints them"
+    )
+    assert captured.out.startswith(b"<svg") and len(lines) == 2
+
+
+def test_an_encoding_without_half_blocks(
+    image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(start, "HALF", "\udc80")
+    assert run("vectorize", image, "-o", tmp_path / "a.svg", *QUICK, "--preview=blocks") == 0
+    assert "has no half blocks" in one_line(capsys.readouterr().err)
+
+
+def test_the_preview_knows_of_notices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which go below it; those that pass leave no line."""
+    import sys
+
+    monkeypatch.setattr(detect, "_size", lambda stream, environ: (80, 24, 0, 0))
+    made = start.start_preview(sys.stderr, "blocks")
+    assert made
+    moved = []
+    monkeypatch.setattr(made, "move_on", lambda: moved.append(1))
+    log = logging.getLogger("warpsplat")
+    log.warning("a notice")
+    log.warning("compiling", extra={"passing": True})
+    assert len(moved) == 1
+    again = start.start_preview(sys.stderr, "blocks")
+    assert again and sum(type(handler).__name__ == "_NoticeHandler" for handler in log.handlers) == 1
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_second_signal_leaves_the_cursor_to_be_seen(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A progress bar hides it, and nobody cleans up after a program that ends at once."""
+    written: list[tuple[int, bytes]] = []
+    monkeypatch.setattr(os, "isatty", lambda handle: terminal)
+    monkeypatch.setattr(os, "write", lambda handle, text: written.append((handle, text)))
+    monkeypatch.setattr(signals, "_exit", lambda code: None)
+    signals._end(2)
+    assert written == [(2, b"\x1b[?25h" * terminal + b"\nwarpsplat: interrupted\n")]

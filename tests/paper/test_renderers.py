@@ -1,0 +1,113 @@
+"""What a fit asks of the two renderers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.cli.helpers import one_line, run
+from tests.fit.pictures import picture
+from tests.scenes import random_scene
+from warpsplat.cli.summary import summary
+from warpsplat.errors import UsageError
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.metrics import score_svg
+from warpsplat.paper.renderers import fold_weight
+from warpsplat.rendering.backend import Backend
+from warpsplat.run.figures import render_figures
+from warpsplat.run.vectorize import vectorize
+from warpsplat.scene import Basis, Kind
+from warpsplat.svg.write import write_svg
+
+
+def test_the_fold_weight_grows_geometrically() -> None:
+    settings = make_settings(iterations=100, fold_start=0.1, fold_end=10.0)
+    assert [fold_weight(settings, n) for n in (0, 50, 100)] == pytest.approx([0.1, 1.0, 10.0])
+
+
+def test_splats_get_fewer_iterations_unless_told() -> None:
+    assert make_settings(renderer="splat").iterations < make_settings().iterations
+    assert make_settings(renderer="splat", iterations=77).iterations == 77
+
+
+def test_soft_gaussians_are_trained_on_their_own_render() -> None:
+    settings = make_settings(renderer="gaussian")
+    assert (settings.basis, settings.order, settings.viewer) == (Basis.CUBIC, "area", False)
+    assert make_settings(renderer="gaussian", order="age").order == "age"
+
+
+def test_splats_and_splines_do_not_go_together() -> None:
+    with pytest.raises(UsageError, match="splat needs the basis cubic"):
+        make_settings(renderer="splat", basis="spline")
+
+
+def test_soft_gaussians_have_no_gradients() -> None:
+    with pytest.raises(UsageError, match="gaussian needs the paint flat"):
+        make_settings(renderer="gaussian", paint="auto")
+
+
+def test_paper_options_run(device: str) -> None:
+    settings = make_settings(
+        kind=Kind.STROKE,
+        renderer="splat",
+        curves=8,
+        iterations=30,
+        order="area",
+        through_scales=False,
+    )
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert len(result.scene) == 8
+    assert result.score.paths == 8
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_soft_gaussians_have_two_figures(device: str, kind: Kind) -> None:
+    """That of their own render, which the scene gives again, and that of the file."""
+    settings = make_settings(curves=60, iterations=60, renderer="gaussian", kind=kind)
+    result = vectorize(picture(), settings, Backend.on(device))
+    assert result.score
+    assert result.score.paths == 60
+    values = result.as_dict()
+    assert (values["renderer"], values["psnr"]) == ("gaussian", round(result.score.psnr, 3))
+    again = render_figures(result.scene, picture(), settings, Backend.on(device))
+    assert (result.render_psnr, result.render_ssim) == again
+    assert result.render_psnr > 24
+    assert result.render_psnr > result.score.psnr > 14
+    reduced = vectorize(picture(), replace(settings, fine_pixels=500, iterations=3), Backend.on(device))
+    assert reduced.render_ssim is None, "an image that is larger than what was trained on"
+    larger, _ = render_figures(result.scene, picture(), settings, Backend.on(device), scale=2)
+    assert larger == pytest.approx(result.render_psnr, abs=1)
+    said = summary(Path("a.svg"), values)
+    assert f"the soft render {values['render_psnr']:.2f} dB, the file {values['psnr']:.2f} dB" in said
+
+
+def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str) -> None:
+    """The render is of splats; the file has paths, as every viewer shows them."""
+    settings = make_settings(curves=30, iterations=40, renderer="splat")
+    result = vectorize(picture(), settings, Backend.on(device))
+    values = result.as_dict()
+    assert values["psnr"] == round(score_svg(result.svg, picture(), eyes=False).psnr, 3)
+    # After its last step the numbers are rounded for the file: 0.01 to 0.04 dB over five seeds.
+    splats, _ = render_figures(result.scene, picture(), settings, Backend.on(device))
+    assert values["render_psnr"] == pytest.approx(splats, abs=0.2)
+    assert values["estimated_psnr"] == round(result.estimated_psnr, 3)
+
+
+def test_soft_gaussians_are_in_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
+    svg.write_text(write_svg(random_scene(Kind.FILL)))
+    assert run("render", svg, "-o", png, "--renderer", "gaussian") == 2
+    assert "vectorize --renderer gaussian" in one_line(capsys.readouterr().err)
+    assert not png.exists()
+
+
+def test_splined_steps_are_not_theirs() -> None:
+    assert make_settings(renderer="splat").rates == Settings().rates
+
+
+def test_mixed_shapes_are_refused() -> None:
+    with pytest.raises(UsageError, match="mixed and"):
+        make_settings(mixed=True, renderer="splat")

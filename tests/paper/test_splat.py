@@ -1,0 +1,284 @@
+"""Splats: image and adjoint against float64, coverage, tile lists against brute force; properties."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from tests.helpers import (
+    SPLAT,
+    compare,
+    coverage_images,
+    relative_error,
+    renderer_for,
+    run,
+)
+from tests.paper.helpers import grid_of, plans_of
+from tests.paper.reference import splat as reference
+from tests.paper.reference.grid import grids, runs_of
+from tests.reference.curves import tensors
+from tests.scenes import canvas, disc, mixed_scene, random_scene
+from warpsplat.errors import CapacityError
+from warpsplat.kernels.constants import PLATEAU, TILE, TILE_PIXELS
+from warpsplat.metrics import psnr
+from warpsplat.paper.kernels import splat_coverage
+from warpsplat.paper.models import SplatModel
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Capacity, Renderer, render
+from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
+
+FILL, STROKE = Kind.FILL, Kind.STROKE
+CASES = [(FILL, n, 1.0) for n in (2, 4, 6)] + [(STROKE, n, 1.0) for n in (1, 2, 3, 4, 5)]
+CASES += [(FILL, 4, 0.6), (STROKE, 3, 1.7)]
+
+
+def splatted(scene: Scene, device: str) -> FloatArray:
+    return render(scene, model=SPLAT, backend=Backend.on(device))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "cubics", "scale"), CASES)
+@pytest.mark.parametrize("through_scales", [True, False])
+def test_image_and_gradients(
+    device: str, kind: Kind, cubics: int, scale: float, through_scales: bool
+) -> None:
+    compare(random_scene(kind, beziers=cubics, seed=3), device, scale, model=SplatModel(through_scales))
+
+
+def test_a_fill_without_two_chains_is_refused(device: str) -> None:
+    with pytest.raises(ValueError, match="odd number of cubics"):
+        renderer_for(random_scene(FILL, beziers=3), device, model=SPLAT)
+
+
+def test_a_fill_of_several_contours_is_refused(device: str) -> None:
+    """Though all of its points would make two chains."""
+    scene = random_scene(Kind.FILL, 1, beziers=4)
+    scene = replace(scene, starts=np.array([0, 6, 12], np.int32), closed=np.ones(2, np.int32))
+    with pytest.raises(ValueError, match="shape 0 has several contours"):
+        renderer_for(scene, device, model=SPLAT)
+
+
+def test_splines_are_refused(device: str) -> None:
+    cubics, spline = random_scene(FILL), random_scene(STROKE, count=1, basis=Basis.SPLINE)
+    with pytest.raises(ValueError, match="shape 4 is a spline, not cubics"):
+        renderer_for(cubics.append(spline), device, model=SPLAT)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, seed=21)
+    renderer = renderer_for(scene, device, model=SPLAT)
+    grid, bins = grid_of(renderer), renderer.bins.buffers
+    coverage = renderer.coverage.buffers
+    height, width = renderer.viewport.height, renderer.viewport.width
+    positions = grids(scene, tensors(scene), plans_of(renderer), 1.0)
+    got = coverage_images(renderer)[:, :height, :width]
+    rng = np.random.default_rng(0)
+    coverage_grad = rng.normal(size=coverage.coverage_pixels.shape).astype(np.float32)
+    # Compositing leaves no gradient in the padding of the tiles.
+    inside = renderer.film.buffers.inside.numpy().reshape(-1, TILE_PIXELS)
+    coverage_grad *= inside[np.minimum(bins.slot_tile.numpy(), len(inside) - 1)]
+    coverage.coverage_pixels.assign(coverage_grad * (1 - coverage.coverage_pixels.numpy()))
+    run(
+        splat_coverage.splat_backward,
+        renderer.capacity.samples,
+        device,
+        bins,
+        grid,
+        sum_grad=coverage.coverage,
+    )
+    tiles = bins.slot_tile.numpy()
+    for shape, places in enumerate(positions):
+        runs = runs_of(scene, shape)
+        mean, scale, angle = (x.detach().requires_grad_() for x in reference.gaussians(places, runs=runs))
+        g = reference.gaussian_values(mean, scale, angle, reference.cuts(places), width, height)
+        cover = 1 - torch.prod(1 - g, 0)
+        np.testing.assert_allclose(got[shape], cover.detach().numpy(), atol=2e-3)
+        assert np.abs(got[shape] - cover.detach().numpy()).mean() < 1e-5
+        total = torch.zeros(())
+        for slot in range(bins.slot_first.numpy()[shape], bins.slot_last.numpy()[shape]):
+            y, x = divmod(int(tiles[slot]), renderer.viewport.tiles_x)
+            block = cover[TILE * y : TILE * (y + 1), TILE * x : TILE * (x + 1)]
+            weights = torch.tensor(coverage_grad[slot].reshape(TILE, TILE).T)[
+                : block.shape[0], : block.shape[1]
+            ]
+            total = total + (block * weights).sum()
+        total.backward()
+        rows = slice(grid.gaussian_first.numpy()[shape], grid.gaussian_last.numpy()[shape])
+        assert mean.grad is not None
+        assert relative_error(grid.mean_grad.numpy()[rows], mean.grad.numpy()) < 2e-3
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_tile_lists_match_brute_force(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, count=12, width=75, height=50, seed=4)
+    renderer = renderer_for(scene, device, model=SPLAT)
+    bins, grid = renderer.bins.buffers, grid_of(renderer)
+    first, last = bins.tile_first.numpy(), bins.tile_last.numpy()
+    slots, shapes = bins.sort_slots.numpy(), bins.slot_shape.numpy()
+    mean, extent = grid.mean.numpy(), grid.extent.numpy()
+    g_first, g_last = grid.gaussian_first.numpy(), grid.gaussian_last.numpy()
+    for tile in range(renderer.viewport.tile_count):
+        listed = [int(shapes[s]) for s in slots[first[tile] : last[tile]]]
+        assert listed == sorted(listed, reverse=True), "front (the last row) first, each shape once"
+        ty, tx = divmod(tile, renderer.viewport.tiles_x)
+        wanted = []
+        for shape in range(len(scene)):
+            low = (mean - extent)[g_first[shape] : g_last[shape]].min(axis=0)
+            high = (mean + extent)[g_first[shape] : g_last[shape]].max(axis=0)
+            if (high >= [TILE * tx, TILE * ty]).all() and (low < [TILE * (tx + 1), TILE * (ty + 1)]).all():
+                wanted.append(shape)
+        assert listed == wanted[::-1]
+
+
+def test_slot_ranges_cover_each_pixel_once(device: str) -> None:
+    renderer = renderer_for(random_scene(FILL, count=9, seed=8), device, model=SPLAT)
+    bins = renderer.bins.buffers
+    used = bins.slot_shape.numpy() >= 0
+    assert used.sum() == renderer.needed_slots.numpy()[0]
+    pairs = set(zip(bins.slot_shape.numpy()[used], bins.slot_tile.numpy()[used], strict=True))
+    assert len(pairs) == used.sum()
+    assert renderer.coverage.buffers.coverage_pixels.shape == (renderer.capacity.slots, TILE_PIXELS)
+
+
+def test_overflow_is_counted_and_mended(device: str) -> None:
+    scene = random_scene(FILL, count=10)
+    whole = splatted(scene, device)
+    parameters = Parameters(scene, Backend.on(device))
+    viewport = Viewport(scene.canvas.width, scene.canvas.height)
+    small = Renderer(parameters, viewport, model=SPLAT, capacity=Capacity(700, 9))
+    small.forward()
+    assert np.isfinite(small.read_image()).all()
+    assert small.needed_samples.numpy()[0] > 700
+    assert small.make_room()
+    small.forward()
+    assert small.make_room() or small.capacity.slots >= small.needed_slots.numpy()[0]
+    small.forward_complete()
+    assert not small.make_room()
+    np.testing.assert_array_equal(small.read_image(), whole)
+
+
+def test_a_scene_past_the_limits_is_refused(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpsplat.rendering.renderer.SLOT_LIMIT", 3)
+    with pytest.raises(CapacityError, match="fewer shapes or a smaller image"):
+        renderer_for(random_scene(FILL), device, model=SPLAT)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_same_bits_for_any_number_of_threads(device: str, kind: Kind) -> None:
+    scene = random_scene(kind, count=20, width=90, height=70, seed=2)
+    outcomes = []
+    for threads in (1, 2, 3, 1):
+        renderer = renderer_for(scene, device, model=SplatModel(fold=0.5), threads=threads)
+        renderer.film.buffers.image_grad.assign(renderer.film.buffers.image)
+        renderer.backward()
+        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
+    for other in outcomes[1:]:
+        for a, b in zip(outcomes[0], other, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("radius", [4.0, 10.0, 25.0])
+def test_a_splatted_disc_covers_what_the_path_covers(device: str, radius: float) -> None:
+    size = int(2 * radius + 12)
+    image = splatted(disc(radius, size, size / 2 + 0.3), device)[..., 0]
+    centres = np.arange(size) + 0.5 - (size / 2 + 0.3)
+    distance = np.hypot(*np.meshgrid(centres, centres)) - radius
+    assert image.sum() == pytest.approx(np.pi * radius**2, rel=0.06)
+    assert image[distance < -1.5].min() > 0.95
+    assert image[distance > 1.5].max() < 0.1
+    assert image[np.abs(distance) < 0.2].mean() == pytest.approx(0.5, abs=0.12)
+
+
+def test_stroke_covers_caps_and_joins(device: str) -> None:
+    """A stroke that turns back at its joint: the round join is a half disc beyond the turning point."""
+    scene = random_scene(STROKE, count=1, width=60, height=40)
+    x = np.array([15, 22, 30, 40, 33, 26, 20, 22, 24, 26], np.float32)
+    points = np.stack([x, np.full(10, 20.0, np.float32)], axis=1)
+    one = replace(
+        scene,
+        points=points,
+        widths=np.array([12.0], np.float32),
+        colors=np.ones((1, 3), np.float32),
+        opacities=np.ones(1, np.float32),
+        canvas=replace(scene.canvas, background=np.zeros(3, np.float32)),
+    )
+    image = splatted(one, device)[..., 0]
+    assert image[20, 44] > 0.9, "join: 4 px beyond the joint at x = 40, inside the radius of 6"
+    assert image[20, 48] < 0.05
+    assert image[20, 11] > 0.9, "cap: 4 px beyond the start at x = 15"
+    assert image[20, 7] < 0.05
+
+
+def test_invisible_and_outside_shapes_change_nothing(device: str) -> None:
+    scene = random_scene(FILL, count=3)
+    clear = replace(scene, opacities=np.zeros_like(scene.opacities))
+    np.testing.assert_array_equal(
+        splatted(clear, device), np.broadcast_to(scene.canvas.background, (36, 40, 3))
+    )
+    away = replace(scene, points=scene.points + np.float32(500))
+    renderer = renderer_for(away, device, model=SPLAT)
+    assert renderer.needed_slots.numpy()[0] == 0
+    renderer.write_image_grad(np.ones((renderer.viewport.height, renderer.viewport.width, 3), np.float32))
+    renderer.backward()
+    assert not any(g.any() for g in renderer.parameters.gradients().values())
+
+
+def test_translation_moves_the_image(device: str) -> None:
+    scene = random_scene(FILL, count=3, width=64, height=64, seed=9)
+    inner = replace(scene, points=(0.4 * scene.points + 12).astype(np.float32))
+    moved = replace(inner, points=inner.points + np.float32(16))
+    a, b = splatted(inner, device), splatted(moved, device)
+    np.testing.assert_allclose(b[16:, 16:], a[:-16, :-16], atol=3e-3)
+
+
+@pytest.mark.parametrize("cuts", [(0.5,), (0.1, 0.15, 0.9), (0.01, 0.02, 0.03, 0.04), (0.2, 0.4, 0.6, 0.8)])
+def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tuple[float, ...]) -> None:
+    """One cubic cut into several, of equal and of unequal lengths."""
+    whole = np.array([[8, 50], [20, -10], [44, 80], [56, 10]], np.float64)
+
+    def piece(a: float, b: float) -> np.ndarray:
+        return np.array([blossom(*at) for at in ((a, a, a), (a, a, b), (a, b, b), (b, b, b))])
+
+    def blossom(*at: float) -> np.ndarray:
+        p = whole
+        for t in at:
+            p = (1 - t) * p[:-1] + t * p[1:]
+        return p[0]
+
+    pieces = [piece(a, b) for a, b in itertools.pairwise((0.0, *cuts, 1.0))]
+    chain = np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
+    pictures = []
+    for points in (whole, chain):
+        scene = Scene.uniform(
+            STROKE,
+            canvas(64, 64),
+            points[None].astype(np.float32),
+            colors=np.ones((1, 3), np.float32),
+            opacities=np.full(1, 0.9, np.float32),
+            widths=np.full(1, 6, np.float32),
+        )
+        pictures.append(splatted(scene, device))
+    assert np.abs(pictures[0] - pictures[1]).mean() < 3e-3
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("through_scales", [True, False])
+def test_mixed_scenes(device: str, seed: int, through_scales: bool) -> None:
+    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales))
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
+    """Of strong contrast: a splat's plateau is a little below its opacity."""
+    scene = random_scene(kind, count=10, width=96, height=80, seed=3)
+    shown = on_white(render_svg(write_svg(scene, opacity_scale=PLATEAU)))
+    mine = render(scene, model=SPLAT, backend=Backend.on(device)).astype(np.float64) * 255
+    assert psnr(mine, shown) > 30

@@ -1,0 +1,87 @@
+"""The command that makes a result again says all that its settings say."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any
+
+import pytest
+
+from warpsplat.cli.main import cli
+from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.run.command_line import refine_command, several_command, vectorize_command
+from warpsplat.run.options import settings_from
+from warpsplat.scene import Kind
+
+CASES: list[dict[str, Any]] = [
+    {},
+    {"curves": 512},
+    {"quality": "draft", "kind": Kind.STROKE, "curves": 9, "seed": 4},
+    {"quality": "high", "iterations": 70, "renderer": "splat"},
+    {"renderer": "gaussian", "curves": 40},
+    {"layered": True, "curves": 512},
+    {"levels": "8,32", "title": "it's <b>; rm -rf /", "background": "#aabbcc"},
+    {"palette": "#ff0000,#00ff00", "mixed": True},
+    {"colors": 4, "subject": "drawing", "minify": True, "ids": True},
+    {"time_budget": "90s", "max_bytes": "20KB", "paint": "auto", "precision": 1, "opaque": True},
+    {"subject": "line", "page": "a4", "units": "cm", "title": "-dash"},
+]
+
+
+def settings_of(line: str) -> Settings:
+    """What the program would run with."""
+    words = shlex.split(line, comments=True)
+    assert words[:2] == ["warpsplat", "vectorize"]
+    import click
+
+    command = cli.get_command(click.Context(cli), "vectorize")
+    assert command
+    given = command.make_context("vectorize", words[2:]).params
+    others = {
+        "images",
+        "output",
+        "overwrite",
+        "importance",
+        "device",
+        "threads",
+        "verbose",
+        "quiet",
+        "as_json",
+        "suggest",
+    }
+    others |= {"as_uri", "checkpoint", "resume", "checkpoint_every", "report"}
+    return settings_from({key: value for key, value in given.items() if key not in others})
+
+
+@pytest.mark.parametrize("given", CASES, ids=lambda given: "-".join(given) or "nothing")
+def test_the_line_gives_the_settings(given: dict[str, Any]) -> None:
+    settings = make_settings(**given)
+    line = vectorize_command(settings, "-odd; name.png", "out.svg")
+    assert "#" not in shlex.split(line)
+    assert settings_of(line.replace("'-odd; name.png'", "x.png")) == settings
+
+
+def test_it_says_no_more_than_is_needed() -> None:
+    assert vectorize_command(make_settings(), "a.png", "a.svg") == "warpsplat vectorize a.png -o a.svg"
+    line = vectorize_command(make_settings("draft", curves=9), "a b.png", "a.svg")
+    assert line == "warpsplat vectorize 'a b.png' --quality draft --curves 9 -o a.svg"
+
+
+def test_what_no_flag_says_is_told() -> None:
+    assert vectorize_command(make_settings(bending=0.1), "a.png", "a.svg").endswith(
+        "# and settings that no flag says"
+    )
+
+
+def test_refine() -> None:
+    settings = make_settings(iterations=30, title="x y")
+    line = refine_command(settings, "a.svg", "a.png", "b.svg", "--keep")
+    assert line == "warpsplat refine a.svg a.png --iterations 30 --title 'x y' --keep -o b.svg"
+
+
+def test_names_that_begin_as_flags_do_are_paths() -> None:
+    settings = make_settings()
+    assert " ./-a.png " in vectorize_command(settings, "-a.png", "a.svg")
+    assert " ./-a.png " in several_command(settings, (8, 16), "-a.png", None) + " "
+    assert " ./-a.svg ./-a.png " in refine_command(settings, "-a.svg", "-a.png", "b.svg")
+    assert " - " in vectorize_command(settings, "-", "a.svg")

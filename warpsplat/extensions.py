@@ -1,0 +1,90 @@
+"""Find the extensions: folders of this package that have an ``extension.py``, which declares what they add.
+
+The core imports no extension. What a declaration names ("module:attribute") is imported when it is used.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from warpsplat.errors import UsageError, shown
+
+
+class Command(NamedTuple):
+    """A command of the command line."""
+
+    help: str
+    """One line."""
+    target: str
+    """The click command, as "module:attribute"."""
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What a folder adds to the core, all by name."""
+
+    commands: Mapping[str, Command] = field(default_factory=dict)
+    renderers: Mapping[str, str] = field(default_factory=dict)
+    """Instances of ``fit.renderers.FitRenderer``, by the name that ``--renderer`` has for them."""
+    run_hooks: tuple[str, ...] = ()
+    """Classes of ``cli.hooks.RunHook``, which add options to ``vectorize``, ``refine`` and ``eval``."""
+    provides: Mapping[str, str] = field(default_factory=dict)
+    """Functions that the core asks for by name."""
+    api: Mapping[str, str] = field(default_factory=dict)
+    """Names that ``warpsplat`` offers -> the modules they are in."""
+    requires: tuple[str, ...] = ()
+    """Extensions without which this one is left out."""
+    uses: tuple[str, ...] = ()
+    """Extensions that this one imports where it can do without them."""
+
+
+@functools.cache
+def extensions() -> dict[str, Extension]:
+    """Return the extensions that are there, by the names of their folders, in alphabetical order."""
+    found: dict[str, Extension] = {}
+    for path in sorted(Path(__file__).parent.glob("*/extension.py")):
+        # By its path, because the package around it may need what is not installed.
+        spec = importlib.util.spec_from_file_location(f"warpsplat.{path.parent.name}.extension", path)
+        assert spec
+        assert spec.loader
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        found[path.parent.name] = module.EXTENSION
+    while incomplete := [name for name, one in found.items() if not found.keys() >= set(one.requires)]:
+        for name in incomplete:
+            del found[name]
+    return found
+
+
+def declared(kind: str) -> Iterator[tuple[str, Any]]:
+    """Yield all (name, value) of a mapping of ``Extension``, such as "commands"."""
+    for extension in extensions().values():
+        yield from getattr(extension, kind).items()
+
+
+def load(target: str) -> Any:
+    """Import "module:attribute"."""
+    module, _, name = target.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
+def renderer_names() -> tuple[str, ...]:
+    """Return the names of all renderers, the core's first."""
+    return ("exact", *(name for name, _ in declared("renderers")))
+
+
+def load_renderer(name: str) -> Any:
+    """Return the ``fit.renderers.FitRenderer`` of a name.
+
+    Raises:
+        UsageError: there is none of that name.
+    """
+    if name not in renderer_names():
+        raise UsageError(f"renderer must be one of {', '.join(renderer_names())}, not {shown(name)}")
+    return load({"exact": "warpsplat.fit.renderers:EXACT", **dict(declared("renderers"))}[name])

@@ -1,0 +1,74 @@
+"""What a fit asks of its renderer; the exact one, and those that extensions register."""
+
+from __future__ import annotations
+
+from warpsplat.errors import UsageError
+from warpsplat.extensions import load_renderer
+from warpsplat.fit.settings import Settings
+from warpsplat.rendering.models import EXACT as EXACT_MODEL
+from warpsplat.rendering.models import ExactModel, Model
+from warpsplat.scene import IndexArray, Scene
+
+
+class FitRenderer:
+    """The exact renderer. Others override what differs."""
+
+    exact: bool = True
+    """Whether it shows a scene as a viewer shows the scene's file."""
+    soft: bool = False
+    """Whether shapes reach beyond their outlines: a file only approximates such a render, whose figures are
+    therefore given as well, and shapes cannot be sorted by where their outlines overlap."""
+    opacity_scale: float = 1.0
+    """Opacity of a path in the file over that of its shape."""
+    step_cost: tuple[float, float, float, float] | None = None
+    """Arguments of ``fit.costs.Law``; None: those of the exact renderer."""
+    default_model: Model = EXACT_MODEL
+    """The model for rendering only."""
+    cannot_draw_files: str = ""
+    """Why it cannot draw the scene of a file; empty if it can."""
+
+    def preset(self, preset: Settings) -> Settings:
+        """Return a preset with what changes in it for this renderer."""
+        return preset
+
+    def check(self, settings: Settings) -> None:
+        """Check that settings go together with this renderer.
+
+        Raises:
+            UsageError: they do not.
+        """
+
+    def model(self, settings: Settings, step: int, slack: float) -> Model:
+        """Return the model of coverage after ``step`` steps; ``slack``: see ``ExactModel``."""
+        return ExactModel(slack=slack)
+
+    def to_paths(self, scene: Scene, settings: Settings) -> Scene:
+        """Return the scene that the file holds, ``opacity_scale`` aside."""
+        return scene
+
+    def drawable(self, scene: Scene) -> Scene:
+        """Return any scene in a form that this renderer can draw.
+
+        Raises:
+            ValueError: there is none; the message says what it has.
+        """
+        return scene
+
+    def split(self, scene: Scene, keep: IndexArray, most: int) -> tuple[IndexArray, Scene]:
+        """Replace up to ``most`` of the shapes ``keep`` by two each; return those left, and the new ones."""
+        return keep, scene.take(keep[:0])
+
+
+EXACT = FitRenderer()
+
+
+def renderer_of(name: str) -> FitRenderer:
+    """Return a renderer by its name.
+
+    Raises:
+        UsageError: there is none of that name.
+    """
+    found = load_renderer(name)
+    if not isinstance(found, FitRenderer):
+        raise UsageError(f"renderer {name} is no FitRenderer")
+    return found

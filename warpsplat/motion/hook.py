@@ -1,0 +1,146 @@
+"""``--animate`` and ``--preview``: how the shapes came to be, as a file and in the terminal."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, RunHook
+from warpsplat.cli.options import FILE
+from warpsplat.errors import UsageError
+
+if TYPE_CHECKING:
+    from warpsplat.fit.work import Progress
+    from warpsplat.motion.recorder import Recorder
+    from warpsplat.motion.terminal.preview import Preview
+    from warpsplat.run.result import Result
+
+PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
+
+OPTIONS = {
+    "animate": click.option(
+        "--animate",
+        type=FILE,
+        metavar="FILE",
+        help="Write an animation as well: .svg, .gif, .webp or .mp4.",
+    ),
+    "animate_what": click.option(
+        "--animate-what",
+        type=click.Choice(["training", "drawing"]),
+        help="How the shapes came to be, or how they are drawn one after the other.  [default: training,"
+        " and drawing of what is traced]",
+    ),
+    "animate_width": click.option(
+        "--animate-width",
+        type=int,
+        metavar="PX",
+        help="Width of a .gif, .webp or .mp4.  [default: the image's; at most 800, of a GIF 480]",
+    ),
+    "preview": click.option(
+        "--preview",
+        type=click.Choice(PROTOCOLS),
+        help="Show the picture in the terminal (stderr), live during the run, as well as the terminal can;"
+        " or --preview=blocks ...",
+    ),
+}
+
+
+class MotionHook(RunHook):
+    """Records a run for an animation, and draws it in the terminal."""
+
+    options = OPTIONS
+
+    def __init__(
+        self, animate: Path | None, animate_what: Any, animate_width: int | None, preview: str | None
+    ) -> None:
+        """Take the values of the options."""
+        self._file, self._what, self._width, self._protocol = animate, animate_what, animate_width, preview
+        self._recorder: Recorder | None = None
+        self._preview: Preview | None = None
+
+    @staticmethod
+    def rewrite(arguments: list[str]) -> list[str]:
+        """Give ``--preview`` the value auto: the next word may be an image, other values follow a "="."""
+        end = arguments.index("--") if "--" in arguments else len(arguments)
+        words = ["--preview=auto" if word == "--preview" else word for word in arguments[:end]]
+        return words + arguments[end:]
+
+    def flag(self) -> str | None:
+        """See ``RunHook``."""
+        return "--animate" if self._file else "--preview" if self._protocol else None
+
+    def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
+        """Check that the animation can be made and is none of the run's files, and open the preview."""
+        if self._file is None:
+            if self._what or self._width is not None:
+                raise UsageError("--animate-what and --animate-width say how --animate FILE is made")
+        else:
+            self._check_animation(self._file, [*inputs, *outputs], overwrite=overwrite)
+        if self._protocol:
+            from warpsplat.motion.terminal.start import start_preview
+
+            self._preview = start_preview(sys.stderr, None if self._protocol == "auto" else self._protocol)
+
+    def _check_animation(self, path: Path, files: Sequence[Path], *, overwrite: bool) -> None:
+        from warpsplat.files.inputs import STANDARD
+        from warpsplat.files.output import check_output
+        from warpsplat.motion.films import check_format
+        from warpsplat.motion.recorder import Recorder, check_width
+
+        if path == STANDARD:
+            raise UsageError("an animation does not go to the standard output: give --animate FILE")
+        check_format(path)
+        check_width(self._width)
+        check_output(path, *files, overwrite=overwrite)
+        if path.absolute() in {file.absolute() for file in files if file != STANDARD}:
+            raise UsageError(f"{path}: is another file of this run; give another name")
+        self._recorder = Recorder()
+
+    def watch(self, on_progress: Callable[[Progress], None]) -> Callable[[Progress], None]:
+        """Draw the picture first, so that the progress bar comes below it."""
+        preview, recorder = self._preview, self._recorder
+
+        def watched(progress: Progress) -> None:
+            if preview:
+                preview.report(progress)
+            on_progress(progress)
+            if recorder:
+                recorder(progress)
+
+        return watched if preview or recorder else on_progress
+
+    def show(self, result: Result, image: bytes | Path | None) -> None:
+        """Show the finished picture, beside the image if there is one."""
+        if self._preview:
+            from warpsplat.motion.terminal.start import show_finished
+
+            show_finished(self._preview, result, image)
+
+    def finish(self, done: Done) -> None:
+        """Write the animation, drawn on the device of the run."""
+        if self._file is None or self._recorder is None:
+            return
+        from warpsplat.run.result import Result
+
+        ((_, result),) = done.made
+        assert isinstance(result, Result)
+        what = self._what or self._recorder.shows(result)
+        if what == "training" and not self._recorder.has_training:
+            echo(f"warpsplat: {self._file}: no training to show, so it shows the drawing", err=True)
+            what = "drawing"
+        log = logging.getLogger("warpsplat")
+        log.info(f"{self._file}: pictures of the {what} ...", extra={"passing": True})
+        try:
+            size = self._recorder.save(
+                self._file, result, what=what, width=self._width, device=done.device, threads=done.threads
+            )
+        finally:
+            log.info("", extra={"passing": True})
+        if not done.quiet:
+            echo(f"warpsplat: {self._file}: animation of the {what}, {size:,} bytes", err=True)

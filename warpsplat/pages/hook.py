@@ -1,0 +1,97 @@
+"""``--report``: a page on what ``vectorize``, ``refine`` or ``eval`` made or measured."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from warpsplat.cli.hooks import Done, RunHook
+from warpsplat.cli.options import FILE
+from warpsplat.errors import UsageError
+from warpsplat.files.inputs import STANDARD
+from warpsplat.files.output import check_output
+
+ENDINGS = (".html", ".htm")
+"""File name endings of pages."""
+
+
+class ReportHook(RunHook):
+    """Writes a page on one result, or one that compares several numbers of shapes."""
+
+    commands = ("vectorize", "refine", "eval")
+    modes = ("one file", "several images", "several numbers")
+    options = {  # noqa: RUF012 - declared in the base class
+        "report": click.option(
+            "--report",
+            type=FILE,
+            metavar="FILE.html",
+            help="Page on the result, to look at: image and SVG under a slider, errors, shapes, figures.",
+        )
+    }
+
+    def __init__(self, report: Path | None) -> None:
+        """``report``: the page; None: none is made."""
+        self._page = report
+
+    def flag(self) -> str | None:
+        """See ``RunHook``."""
+        return "--report" if self._page else None
+
+    def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
+        """Check that the page can be written, and is none of the run's other files."""
+        if self._page is None:
+            return
+        if self._page == STANDARD:
+            raise UsageError("a report is a file, not the standard output")
+        taken = {os.path.realpath(path) for path in outputs if path != STANDARD}
+        if os.path.realpath(self._page) in taken:
+            raise UsageError(f"{self._page}: is the result; give the report another name")
+        check_output(self._page, *inputs, endings=ENDINGS, overwrite=overwrite)
+
+    def needs_image(self) -> bool:
+        """See ``RunHook``."""
+        return self._page is not None
+
+    def finish(self, done: Done) -> None:
+        """Write the page."""
+        if self._page is None or not done.made:
+            return
+        name = "image" if done.image == STANDARD else done.image.name
+        if done.several:
+            _write_comparison(self._page, done, name)
+            return
+        from warpsplat.pages.report import report
+
+        ((output, result),) = done.made
+        stem = Path(name if output == STANDARD else output.name).stem
+        report(
+            result,
+            done.data,
+            self._page,
+            command=done.command,
+            name=name,
+            svg_name=f"{stem}.svg",
+            device=done.device,
+            threads=done.threads,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """See ``RunHook``."""
+        return {"report": str(self._page)} if self._page else {}
+
+
+def _write_comparison(page: Path, done: Done, name: str) -> None:
+    """Write the page that compares several results of one image."""
+    from warpsplat.files.output import write_result
+    from warpsplat.pages.reports.several import Version, several_page
+    from warpsplat.run.result import Result
+
+    versions = [  # the output itself may be a picture
+        Version(result, f"{path.stem}.svg") for path, result in done.made if isinstance(result, Result)
+    ]
+    versions.sort(key=lambda version: version.shapes)
+    write_result(page, several_page(versions, done.data, name=name, command=done.command).encode())

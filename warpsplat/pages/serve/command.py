@@ -1,0 +1,98 @@
+"""``warpsplat serve``."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import webbrowser
+
+import click
+
+from warpsplat.cli.echo import echo, set_verbosity
+from warpsplat.cli.options import threads_option
+from warpsplat.cli.signals import Interrupt
+from warpsplat.errors import UsageError
+from warpsplat.pages.serve.limits import Limits
+
+HOST, PORT = "127.0.0.1", 8765
+
+
+@click.command("serve", context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=PORT,
+    show_default=True,
+    metavar="N",
+    help="Where it listens; 0: any port that is free.",
+)
+@click.option(
+    "--host",
+    default=HOST,
+    show_default=True,
+    metavar="ADDRESS",
+    help="Address of this machine; other machines can reach any but 127.0.0.1 and ::1.",
+)
+@click.option("--open", "opens", is_flag=True, help="Open the page in a browser.")
+@click.option(
+    "--max-upload",
+    default=f"{Limits.upload // 10**6}MB",
+    show_default=True,
+    metavar="SIZE",
+    help="Largest file that is taken.",
+)
+@click.option(
+    "--max-memory",
+    metavar="SIZE",
+    help="Memory for a run to stay below, as 4GB: a larger image is worked on at a smaller size.",
+)
+@click.option(
+    "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
+)
+@threads_option
+def command(
+    port: int,
+    host: str,
+    opens: bool,
+    max_upload: str,
+    max_memory: str | None,
+    device: str,
+    threads: int | None,
+) -> None:
+    """Serve a page to vectorize images in a browser, until Ctrl-C.
+
+    Drop an image on it, choose, see the shapes grow, stop when it pleases,
+    compare results side by side and save them. Nothing leaves this machine,
+    and nothing is kept: images and results are in memory only.
+    """
+    interrupt = Interrupt()
+    from warpsplat.fit.texts import parse_bytes
+    from warpsplat.rendering.device import choose_device, start_warp
+
+    try:
+        from warpsplat.pages.serve.server import WarpsplatServer, is_loopback
+    except ModuleNotFoundError as error:
+        raise UsageError(f'serve: {error}; pip install "warpsplat[serve]" installs it') from error
+    from warpsplat.pages.serve.worker import Machine
+    from warpsplat.run.options import settings_from
+
+    limits = Limits(upload=parse_bytes(max_upload))
+    settings_from({"max_memory": max_memory})  # what cannot be used is said now
+    start_warp()
+    choose_device(device)
+    server = WarpsplatServer(
+        host, port, machine=Machine(device, threads), limits=limits, max_memory=max_memory
+    )
+    if not is_loopback(host):
+        risk = "others can reach it, and who has the address can use it; it is not encrypted"
+        echo(f"warpsplat: --host {host}: {risk}", err=True)
+    set_verbosity(quiet=False)  # that kernels are being compiled is for the page as well
+
+    def ready() -> None:
+        echo(f"warpsplat: {server.address()} (Ctrl-C ends it)")
+        if opens:
+            # Some browsers are programs of the terminal, which return when they are closed.
+            threading.Thread(target=webbrowser.open, args=[server.ticket()], daemon=True).start()
+
+    with contextlib.closing(server), interrupt.watching():
+        server.run(interrupt, ready)

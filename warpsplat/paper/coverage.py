@@ -1,0 +1,61 @@
+"""The coverage stage: Gaussians -> how much of each pixel a shape covers, and the adjoint."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.paper.grid import Grid
+from warpsplat.paper.kernels import gaussian_coverage, splat_coverage
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.coverage import CoverageBuffers
+from warpsplat.rendering.program import Program
+
+
+class SplatCoverage:
+    """The paper's Gaussians: 1 - product of 1 - g."""
+
+    law = constants.PRODUCT
+    kernels: ClassVar[tuple[wp.Kernel, wp.Kernel]] = (
+        splat_coverage.splat_forward,
+        splat_coverage.splat_backward,
+    )
+    """Gaussians -> coverages, and its adjoint."""
+
+    def __init__(self, backend: Backend, grid: Grid, bins: Bins, slots: int) -> None:
+        self._backend, self._grid, self._slots = backend, grid, slots
+        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
+        self._sources = (self.buffers, bins.buffers, grid.buffers)
+
+    def states(self, program: Program) -> None:
+        """See ``Coverage``."""
+        program.launch(
+            self.kernels[0],
+            (self._slots, self._backend.lanes),
+            *self._sources,
+            lanes=self._backend.lanes,
+            split=True,
+        )
+
+    def values(self, program: Program) -> None:
+        """See ``Coverage``: all are there."""
+
+    def backward(self, program: Program) -> None:
+        """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
+        program.launch(
+            self.kernels[1],
+            self._grid.buffers.mean.shape[0],
+            *self._sources,
+            sum_grad=self.buffers.coverage,
+            split=True,
+        )
+        self._grid.backward(program)
+
+
+class GaussianCoverage(SplatCoverage):
+    """1 - product of 1 - o g."""
+
+    kernels = (gaussian_coverage.gaussian_forward, gaussian_coverage.gaussian_backward)

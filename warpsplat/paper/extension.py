@@ -1,0 +1,10 @@
+"""What the paper's renderers add to the core."""
+
+from warpsplat.extensions import Extension
+
+EXTENSION = Extension(
+    renderers={
+        "splat": "warpsplat.paper.renderers:SPLAT",
+        "gaussian": "warpsplat.paper.renderers:GAUSSIAN",
+    }
+)

@@ -1,0 +1,201 @@
+"""Fills -> grid positions, and the adjoint.
+
+A closed outline is a strip between its two chains: row ``r`` lies at the fraction ``u_r`` of the way from
+chain 0 to chain 1 (paper eq. 4). Both chains have as many cubics.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.bezier import cross, cubic_weights, local_weight, ring_index, segment_at
+from warpsplat.kernels.ranges import bounded_product, find_range
+from warpsplat.paper.kernels.strips import row_plan, row_position, station_plan
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+
+@wp.func
+def chain_cubics(point_first: wp.array[wp.int32], shape: wp.int32) -> wp.int32:
+    """Cubics in each of the two chains of a closed outline."""
+    return (point_first[shape + 1] - point_first[shape]) / 6
+
+
+@wp.func
+def chain_point(
+    points: wp.array[wp.vec2], start: wp.int32, chain: wp.int32, t: wp.float32, cubics: wp.int32
+) -> wp.vec2:
+    """Point at ``t`` in [0, cubics] of a chain of the outline from ``start``, canvas units (paper eq. 1)."""
+    segment = segment_at(t, cubics)
+    weights = cubic_weights(t - float(segment))
+    position = wp.vec2(0.0, 0.0)
+    for j in range(4):
+        position += weights[j] * points[start + ring_index(chain, 3 * segment + j, 6 * cubics)]
+    return position
+
+
+@wp.kernel
+def plan_fill(
+    # In:
+    offset: wp.int32,
+    points: wp.array[wp.vec2],  # [point_count] canvas units
+    kind: wp.array[wp.int32],  # [shape_count]
+    point_first: wp.array[wp.int32],  # [shape_count + 1]
+    scale: wp.float32,  # render pixels per canvas unit
+    # Out:
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_runs: wp.array[wp.int32],  # [shape_count] 1: all stations are neighbours
+    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_reach: wp.array[wp.float32],  # [shape_count]
+    gaussian_count: wp.array[wp.int32],  # [shape_count] stations x rows
+    shape_sign: wp.array[wp.float32],  # [shape_count] 1 or -1, the orientation of the outline
+):
+    """Grid size from the longer chain and the mean width of the strip. One thread a shape."""
+    shape = offset + wp.tid()
+    if kind[shape] != constants.FILL:
+        return
+    start = point_first[shape]
+    cubics = chain_cubics(point_first, shape)
+    count = constants.PLAN_SAMPLES * cubics
+    a0 = scale * points[start]
+    b0 = a0
+    length_a = float(0.0)
+    length_b = float(0.0)
+    width = float(0.0)
+    doubled_area = float(0.0)
+    for i in range(1, count + 1):
+        t = float(i) / float(constants.PLAN_SAMPLES)
+        a1 = scale * chain_point(points, start, 0, t, cubics)
+        b1 = scale * chain_point(points, start, 1, t, cubics)
+        length_a += wp.length(a1 - a0)
+        length_b += wp.length(b1 - b0)
+        width += wp.length(a1 - b1)
+        doubled_area += cross(a0, a1) - cross(b0, b1)
+        a0 = a1
+        b0 = b1
+    rows = row_plan(width / float(count))
+    stations = station_plan(wp.max(length_a, length_b))
+    shape_stations[shape] = stations
+    shape_runs[shape] = 1
+    shape_rows[shape] = int(rows[0])
+    shape_reach[shape] = rows[1]
+    gaussian_count[shape] = bounded_product(stations, int(rows[0]))
+    shape_sign[shape] = wp.sign(doubled_area)
+
+
+@wp.kernel
+def fill_grid_forward(
+    # In:
+    offset: wp.int32,
+    points: wp.array[wp.vec2],  # [point_count] canvas units
+    kind: wp.array[wp.int32],  # [shape_count]
+    point_first: wp.array[wp.int32],  # [shape_count + 1]
+    scale: wp.float32,
+    gaussian_ends: wp.array[wp.int32],  # [shape_count]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_reach: wp.array[wp.float32],  # [shape_count]
+    # Out:
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
+    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity] u of the row
+    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+):
+    """X(r, k) = (1 - u_r) B0(t_k) + u_r B1(t_k) (paper eq. 4 and 5), t_k at the middle of its cell."""
+    i = offset + wp.tid()
+    shape = find_range(gaussian_ends, gaussian_ends.shape[0], i)
+    if shape >= gaussian_ends.shape[0]:
+        gaussian_shape[i] = -1
+        return
+    if kind[shape] != constants.FILL:
+        return
+    gaussian_shape[i] = -1
+    if i >= gaussian_last[shape]:
+        return
+    stations = shape_stations[shape]
+    row = (i - gaussian_first[shape]) / stations
+    station = (i - gaussian_first[shape]) % stations
+    start = point_first[shape]
+    cubics = chain_cubics(point_first, shape)
+    t = (float(station) + 0.5) * float(cubics) / float(stations)
+    u = row_position(row, shape_rows[shape], shape_reach[shape])
+    a = chain_point(points, start, 0, t, cubics)
+    b = chain_point(points, start, 1, t, cubics)
+    gaussian_shape[i] = shape
+    gaussian_across[i] = u
+    mean[i] = scale * ((1.0 - u) * a + u * b)
+
+
+@wp.kernel
+def fill_stations_backward(
+    # In:
+    offset: wp.int32,
+    kind: wp.array[wp.int32],  # [shape_count]
+    scale: wp.float32,
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
+    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_rows: wp.array[wp.int32],  # [shape_count]
+    position_grad: wp.array[wp.vec2],  # [gaussian_capacity] of the grid positions
+    # Out:
+    station_grad: wp.array[wp.vec2],  # [gaussian_capacity] rows 0 and 1 of a shape: of the chains' points
+):
+    """Sum over a station's rows: dL/dB0(t_k) into row 0, dL/dB1(t_k) into row 1 (there are two at least)."""
+    i = offset + wp.tid()
+    shape = gaussian_shape[i]
+    if shape < 0:
+        return
+    if kind[shape] != constants.FILL:
+        return
+    stations = shape_stations[shape]
+    if i - gaussian_first[shape] >= stations:
+        return
+    a_grad = wp.vec2(0.0, 0.0)
+    b_grad = wp.vec2(0.0, 0.0)
+    for row in range(shape_rows[shape]):
+        j = i + row * stations
+        u = gaussian_across[j]
+        a_grad += (1.0 - u) * position_grad[j]
+        b_grad += u * position_grad[j]
+    station_grad[i] = scale * a_grad
+    station_grad[i + stations] = scale * b_grad
+
+
+@wp.kernel
+def fill_points_backward(
+    # In:
+    offset: wp.int32,
+    kind: wp.array[wp.int32],  # [shape_count]
+    point_first: wp.array[wp.int32],  # [shape_count + 1]
+    point_shape: wp.array[wp.int32],  # [point_count]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    station_grad: wp.array[wp.vec2],  # [gaussian_capacity]
+    # Out:
+    points_grad: wp.array[wp.vec2],  # [point_count] written
+):
+    """A gather, one thread a control point: the sum over stations of Bernstein weight x station gradient."""
+    i = offset + wp.tid()
+    shape = point_shape[i]
+    if kind[shape] != constants.FILL:
+        return
+    cubics = chain_cubics(point_first, shape)
+    point_count = 6 * cubics
+    point = i - point_first[shape]
+    total = wp.vec2(0.0, 0.0)
+    if gaussian_last[shape] > gaussian_first[shape]:
+        stations = shape_stations[shape]
+        for chain in range(2):
+            index = point
+            if chain == 1:
+                index = (point_count - point) % point_count
+            if index <= 3 * cubics:
+                for station in range(stations):
+                    t = (float(station) + 0.5) * float(cubics) / float(stations)
+                    segment = segment_at(t, cubics)
+                    if index >= 3 * segment and index <= 3 * segment + 3:
+                        weight = local_weight(cubic_weights(t - float(segment)), segment, index)
+                        total += weight * station_grad[gaussian_first[shape] + chain * stations + station]
+    points_grad[i] = total

@@ -1,0 +1,351 @@
+"""Shapes -> soft Gaussians (the paper's own model), and the adjoint.
+
+Fills are the strips of ``grid.fill``. A stroke is one row of Gaussians along its course, whose scale across
+is learnt: the stroke's width. With Dx and Dr the differences along and across rows, as in ``grid.gaussians``:
+
+    scale_x^2 = (SPREAD straightness |Dx|)^2 + softness^2 + PIXEL_VARIANCE
+    scale_y^2 = (SPREAD cross(Dx, Dr) / |Dx|)^2 + (WIDTH_SIGMA width)^2 + softness^2 + PIXEL_VARIANCE
+
+Dr is 0 for strokes, width is 0 for fills. Grids are planned and the softness is counted in canvas units: at
+any scale it is the same picture, seen through the area of a pixel.
+
+What each Gaussian lets through is its own: its **strength** is the opacity of its shape, or of its third of a
+stroke, inside the product over the shape's Gaussians (paper eq. 8 and 9: a shape's Gaussians share one depth,
+and so lie side by side in the order of blending).
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.bezier import cross, cubic_weights
+from warpsplat.kernels.ranges import bounded_product, find_range
+from warpsplat.paper.kernels.fill import chain_cubics, chain_point
+from warpsplat.paper.kernels.gaussians import difference, straightness
+from warpsplat.paper.kernels.strips import row_plan, station_plan
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+FILL = wp.constant(constants.FILL)
+STROKE = wp.constant(constants.STROKE)
+PLAN_SAMPLES = wp.constant(constants.PLAN_SAMPLES)
+SPREAD = wp.constant(constants.SPREAD)
+EPSILON = wp.constant(constants.EPSILON)
+Q_SOFT = wp.constant(constants.Q_SOFT)
+GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
+WIDTH_SIGMA = wp.constant(constants.WIDTH_SIGMA)
+PIXEL_VARIANCE = wp.constant(constants.PIXEL_VARIANCE)
+
+
+@wp.func
+def soft_stations(length: wp.float32, density: wp.float32) -> wp.int32:
+    """Stations along a curve ``length`` [canvas units] long."""
+    return wp.max(3, int(wp.ceil(density * float(station_plan(length)))))
+
+
+@wp.kernel
+def plan_soft(
+    # In:
+    offset: wp.int32,
+    points: wp.array[wp.vec2],  # [point_count] canvas units
+    kind: wp.array[wp.int32],  # [shape_count]
+    point_first: wp.array[wp.int32],  # [shape_count + 1]
+    density: wp.float32,  # Gaussians along and across over their usual number
+    # Out:
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_runs: wp.array[wp.int32],  # [shape_count] 1: all stations are neighbours
+    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_reach: wp.array[wp.float32],  # [shape_count]
+    gaussian_count: wp.array[wp.int32],  # [shape_count] stations x rows
+    shape_sign: wp.array[wp.float32],  # [shape_count] orientation of a fill's outline, 0 for strokes
+):
+    """Grid size of a fill from its longer chain and mean width, of a stroke from its longest cubic: each of
+    its cubics has as many stations. One thread a shape.
+    """
+    shape = offset + wp.tid()
+    start = point_first[shape]
+    shape_runs[shape] = 1
+    if kind[shape] == STROKE:
+        segments = (point_first[shape + 1] - start) / 3
+        longest = float(0.0)
+        for segment in range(segments):
+            before = points[start + 3 * segment]
+            length = float(0.0)
+            for i in range(1, PLAN_SAMPLES + 1):
+                weights = cubic_weights(float(i) / float(PLAN_SAMPLES))
+                here = wp.vec2(0.0, 0.0)
+                for j in range(4):
+                    here += weights[j] * points[start + 3 * segment + j]
+                length += wp.length(here - before)
+                before = here
+            longest = wp.max(longest, length)
+        shape_stations[shape] = bounded_product(segments, soft_stations(longest, density))
+        shape_rows[shape] = 1
+        shape_reach[shape] = 0.0
+        shape_sign[shape] = 0.0
+    else:
+        cubics = chain_cubics(point_first, shape)
+        count = PLAN_SAMPLES * cubics
+        a0 = points[start]
+        b0 = a0
+        length_a = float(0.0)
+        length_b = float(0.0)
+        width = float(0.0)
+        doubled_area = float(0.0)
+        for i in range(1, count + 1):
+            t = float(i) / float(PLAN_SAMPLES)
+            a1 = chain_point(points, start, 0, t, cubics)
+            b1 = chain_point(points, start, 1, t, cubics)
+            length_a += wp.length(a1 - a0)
+            length_b += wp.length(b1 - b0)
+            width += wp.length(a1 - b1)
+            doubled_area += cross(a0, a1) - cross(b0, b1)
+            a0 = a1
+            b0 = b1
+        rows = row_plan(width / float(count))
+        shape_stations[shape] = soft_stations(wp.max(length_a, length_b), density)
+        shape_rows[shape] = wp.max(2, int(wp.ceil(density * rows[0])))
+        shape_reach[shape] = rows[1]
+        shape_sign[shape] = wp.sign(doubled_area)
+    gaussian_count[shape] = bounded_product(shape_stations[shape], shape_rows[shape])
+
+
+@wp.kernel
+def soft_stroke_forward(
+    # In:
+    offset: wp.int32,
+    points: wp.array[wp.vec2],  # [point_count] canvas units
+    kind: wp.array[wp.int32],  # [shape_count]
+    point_first: wp.array[wp.int32],  # [shape_count + 1]
+    scale: wp.float32,
+    gaussian_ends: wp.array[wp.int32],  # [shape_count]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    # Out:
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
+    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+):
+    """X(k) = B(t_k) (paper eq. 3), t_k at the middle of its cell."""
+    i = offset + wp.tid()
+    shape = find_range(gaussian_ends, gaussian_ends.shape[0], i)
+    if shape >= gaussian_ends.shape[0]:
+        gaussian_shape[i] = -1
+        return
+    if kind[shape] != STROKE:
+        return
+    gaussian_shape[i] = -1
+    if i >= gaussian_last[shape]:
+        return
+    start = point_first[shape]
+    each = shape_stations[shape] / ((point_first[shape + 1] - start) / 3)
+    station = i - gaussian_first[shape]
+    weights = cubic_weights((float(station % each) + 0.5) / float(each))
+    position = wp.vec2(0.0, 0.0)
+    for j in range(4):
+        position += weights[j] * points[start + 3 * (station / each) + j]
+    gaussian_shape[i] = shape
+    mean[i] = scale * position
+
+
+@wp.func
+def third(station: wp.int32, stations: wp.int32) -> wp.int32:
+    """The third of a stroke that a station lies in; of three cubics, the cubic."""
+    return 3 * station / stations
+
+
+@wp.kernel
+def soft_gaussians_forward(
+    # In:
+    offset: wp.int32,
+    widths: wp.array[wp.float32],  # [shape_count] canvas units, 0 for fills
+    opacities: wp.array[wp.float32],  # [shape_count]
+    fades: wp.array[wp.vec3],  # [shape_count] what is added to a stroke's opacity by thirds
+    scale: wp.float32,
+    softness: wp.float32,  # canvas units
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_rows: wp.array[wp.int32],  # [shape_count]
+    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+    # Out:
+    conic: wp.array[wp.vec3],  # [gaussian_capacity] (a, b, c) of q = a dx^2 + 2 b dx dy + c dy^2, px^-2
+    extent: wp.array[wp.vec2],  # [gaussian_capacity] px, half size of the box where q <= cut
+    cut: wp.array[wp.float32],  # [gaussian_capacity] the q beyond which a Gaussian is 0
+    strength: wp.array[wp.float32],  # [gaussian_capacity] peak, in [0, GAUSSIAN_MAX]
+):
+    """See the module. One thread a Gaussian."""
+    i = offset + wp.tid()
+    shape = gaussian_shape[i]
+    if shape < 0:
+        return
+    stations = shape_stations[shape]
+    index = i - gaussian_first[shape]
+    station = index % stations
+    dx = difference(mean, i, 1, station, stations)
+    dr = difference(mean, i, stations, index / stations, shape_rows[shape])
+    length = wp.length(dx)
+    reach = SPREAD * straightness(mean, i, 1, station, stations) * length
+    e = wp.vec2(1.0, 0.0)
+    if length >= EPSILON:
+        e = dx / length
+    across = SPREAD * cross(e, dr)
+    half = WIDTH_SIGMA * scale * widths[shape]
+    least = scale * scale * softness * softness + PIXEL_VARIANCE
+    variance_x = reach * reach + least
+    variance_y = across * across + half * half + least
+    ix = 1.0 / variance_x
+    iy = 1.0 / variance_y
+    cc = e[0] * e[0]
+    ss = e[1] * e[1]
+    cs = e[0] * e[1]
+    conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
+    cut[i] = Q_SOFT
+    extent[i] = wp.vec2(
+        wp.sqrt(Q_SOFT * (cc * variance_x + ss * variance_y)),
+        wp.sqrt(Q_SOFT * (ss * variance_x + cc * variance_y)),
+    )
+    opacity = opacities[shape] + fades[shape][third(station, stations)]
+    strength[i] = GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)
+
+
+@wp.kernel
+def soft_differences_backward(
+    # In:
+    offset: wp.int32,
+    widths: wp.array[wp.float32],  # [shape_count] canvas units
+    scale: wp.float32,
+    softness: wp.float32,
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_rows: wp.array[wp.int32],  # [shape_count]
+    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+    conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] (of a, b, c)
+    through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
+    shape_sign: wp.array[wp.float32],  # [shape_count] orientation of the outline; 0: may fold
+    fold_factor: wp.float32,  # weight of the folded area [per px squared]
+    # Out:
+    along_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dx
+    across_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dr
+    gaussian_width_grad: wp.array[wp.float32],  # [gaussian_capacity] each Gaussian's share in the width's
+):
+    """As ``gaussians.differences_backward``, which derives it, with the width's part of scale_y:
+    d width = -2 iy^2 d iy WIDTH_SIGMA^2 scale^2 width. The width's gradient flows always.
+    """
+    i = offset + wp.tid()
+    shape = gaussian_shape[i]
+    if shape < 0:
+        return
+    stations = shape_stations[shape]
+    index = i - gaussian_first[shape]
+    station = index % stations
+    dx = difference(mean, i, 1, station, stations)
+    dr = difference(mean, i, stations, index / stations, shape_rows[shape])
+    length = wp.length(dx)
+    e = wp.vec2(1.0, 0.0)
+    if length >= EPSILON:
+        e = dx / length
+    n = wp.vec2(-e[1], e[0])
+    h = wp.dot(n, dr)
+    straight = straightness(mean, i, 1, station, stations)
+    reach = SPREAD * straight * length
+    half = WIDTH_SIGMA * scale * widths[shape]
+    least = scale * scale * softness * softness + PIXEL_VARIANCE
+    ix = 1.0 / (reach * reach + least)
+    iy = 1.0 / (SPREAD * SPREAD * h * h + half * half + least)
+    g = conic_grad[i]
+    cc = e[0] * e[0]
+    ss = e[1] * e[1]
+    cs = e[0] * e[1]
+    variance_grad = -iy * iy * (ss * g[0] - cs * g[1] + cc * g[2])
+    gaussian_width_grad[i] = 2.0 * WIDTH_SIGMA * scale * half * variance_grad
+    along = wp.vec2(0.0, 0.0)
+    across = wp.vec2(0.0, 0.0)
+    if length >= EPSILON:
+        g = through_scales * g
+        variance_grad = through_scales * variance_grad
+        ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
+        length_grad = -2.0 * SPREAD * straight * reach * ix * ix * ix_grad
+        h_grad = 2.0 * SPREAD * SPREAD * h * variance_grad
+        angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2])
+        angle_grad -= h_grad * wp.dot(e, dr)
+        along = length_grad * e + (angle_grad / length) * n
+        across = h_grad * n
+        sign = shape_sign[shape]
+        if sign * h < 0.0:
+            along -= fold_factor * sign * wp.vec2(dr[1], -dr[0])
+            across -= fold_factor * sign * wp.vec2(-dx[1], dx[0])
+    along_grad[i] = along
+    across_grad[i] = across
+
+
+@wp.kernel
+def soft_stroke_backward(
+    # In:
+    offset: wp.int32,
+    kind: wp.array[wp.int32],  # [shape_count]
+    point_first: wp.array[wp.int32],  # [shape_count + 1]
+    point_shape: wp.array[wp.int32],  # [point_count]
+    scale: wp.float32,
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    position_grad: wp.array[wp.vec2],  # [gaussian_capacity]
+    # Out:
+    points_grad: wp.array[wp.vec2],  # [point_count] written
+):
+    """A gather, one thread a control point: the sum over stations of Bernstein weight x gradient."""
+    i = offset + wp.tid()
+    shape = point_shape[i]
+    if kind[shape] != STROKE:
+        return
+    start = gaussian_first[shape]
+    point = i - point_first[shape]
+    segments = (point_first[shape + 1] - point_first[shape]) / 3
+    total = wp.vec2(0.0, 0.0)
+    if gaussian_last[shape] > start:
+        each = shape_stations[shape] / segments
+        for station in range(shape_stations[shape]):
+            j = point - 3 * (station / each)
+            if j >= 0 and j <= 3:
+                weights = cubic_weights((float(station % each) + 0.5) / float(each))
+                total += weights[j] * position_grad[start + station]
+    points_grad[i] = scale * total
+
+
+@wp.kernel
+def soft_shapes_backward(
+    # In:
+    offset: wp.int32,
+    opacities: wp.array[wp.float32],  # [shape_count]
+    fades: wp.array[wp.vec3],  # [shape_count]
+    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    shape_stations: wp.array[wp.int32],  # [shape_count]
+    strength_grad: wp.array[wp.float32],  # [gaussian_capacity]
+    gaussian_width_grad: wp.array[wp.float32],  # [gaussian_capacity]
+    # Out:
+    opacities_grad: wp.array[wp.float32],  # [shape_count] written, over what compositing left
+    fades_grad: wp.array[wp.vec3],  # [shape_count] written
+    widths_grad: wp.array[wp.float32],  # [shape_count] written
+):
+    """One thread a shape sums over its Gaussians. Where an opacity with its fade lies outside [0, 1], only a
+    gradient that leads back counts.
+    """
+    shape = offset + wp.tid()
+    stations = shape_stations[shape]
+    width = float(0.0)
+    sums = wp.vec3(0.0, 0.0, 0.0)
+    for i in range(gaussian_first[shape], gaussian_last[shape]):
+        k = third((i - gaussian_first[shape]) % stations, stations)
+        sums[k] = sums[k] + GAUSSIAN_MAX * strength_grad[i]
+        width += gaussian_width_grad[i]
+    for k in range(3):
+        opacity = opacities[shape] + fades[shape][k]
+        if opacity > 1.0:
+            sums[k] = wp.max(sums[k], 0.0)
+        if opacity < 0.0:
+            sums[k] = wp.min(sums[k], 0.0)
+    opacities_grad[shape] = sums[0] + sums[1] + sums[2]
+    fades_grad[shape] = sums
+    widths_grad[shape] = width

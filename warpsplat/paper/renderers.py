@@ -1,0 +1,99 @@
+"""What a fit asks of the two renderers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpsplat.errors import UsageError
+from warpsplat.fit.renderers import FitRenderer
+from warpsplat.fit.settings import Settings
+from warpsplat.kernels import constants
+from warpsplat.paper.as_paths import as_paths
+from warpsplat.paper.chains import as_chains
+from warpsplat.paper.models import GaussianModel, SplatModel
+from warpsplat.paper.split import faded, split
+from warpsplat.portable import elementary
+from warpsplat.rendering.models import Model
+from warpsplat.scene import Basis, IndexArray, Scene
+
+ITERATIONS = 0.5
+"""Iterations over those of the exact renderer: a step takes several times as long."""
+
+
+def fold_weight(settings: Settings, step: int) -> float:
+    """Return the weight of the fold loss, which grows geometrically over the run."""
+    growth = settings.fold_end / settings.fold_start
+    return float(settings.fold_start * elementary.power(growth, step / settings.iterations))
+
+
+class Splat(FitRenderer):
+    """Gaussians that cover what a path covers."""
+
+    exact = False
+    opacity_scale = constants.PLATEAU
+    step_cost = (38.0, 0.59, 0.052, 0.85)
+    default_model: Model = SplatModel()
+
+    def preset(self, preset: Settings) -> Settings:
+        """See ``FitRenderer``."""
+        return replace(preset, iterations=round(ITERATIONS * preset.iterations), basis=Basis.CUBIC)
+
+    def check(self, settings: Settings) -> None:
+        """See ``FitRenderer``."""
+        if settings.mixed:
+            raise UsageError(f"mixed and the renderer {settings.renderer} do not go together")
+        if settings.basis != Basis.CUBIC:
+            raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
+
+    def model(self, settings: Settings, step: int, slack: float) -> Model:
+        """See ``FitRenderer``."""
+        return SplatModel(settings.through_scales, fold_weight(settings, step))
+
+    def drawable(self, scene: Scene) -> Scene:
+        """See ``FitRenderer``."""
+        return as_chains(scene)
+
+
+class Gaussian(Splat):
+    """Soft Gaussians; the render's own squared error is what counts."""
+
+    soft = True
+    opacity_scale = 1.0
+    step_cost = (14.0, 1.1, 0.075, 1.0)
+    default_model = GaussianModel()
+    cannot_draw_files = (
+        "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of each "
+        "Gaussian; vectorize --renderer gaussian reports the figures of its own render"
+    )
+
+    def preset(self, preset: Settings) -> Settings:
+        """See ``FitRenderer``."""
+        return replace(super().preset(preset), order="area", texture=0.0, viewer=False)
+
+    def check(self, settings: Settings) -> None:
+        """See ``FitRenderer``."""
+        if settings.opaque or settings.is_limited:
+            raise UsageError("opaque fills and the renderer gaussian do not go together")
+        super().check(settings)
+        if settings.paint != "flat":
+            raise UsageError("renderer gaussian needs the paint flat")
+
+    def model(self, settings: Settings, step: int, slack: float) -> Model:
+        """See ``FitRenderer``."""
+        fold = fold_weight(settings, step)
+        return GaussianModel(settings.softness, settings.gaussian_density, settings.through_scales, fold)
+
+    def to_paths(self, scene: Scene, settings: Settings) -> Scene:
+        """See ``FitRenderer``."""
+        return as_paths(scene, settings.softness)
+
+    def split(self, scene: Scene, keep: IndexArray, most: int) -> tuple[IndexArray, Scene]:
+        """Split strokes whose middle fades (paper section 3.4)."""
+        broken = np.intersect1d(faded(scene), keep)[:most]
+        return np.setdiff1d(keep, broken), split(scene, broken)
+
+
+SPLAT = Splat()
+GAUSSIAN = Gaussian()

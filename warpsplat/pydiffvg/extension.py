@@ -1,0 +1,5 @@
+"""DiffVG's interface adds nothing to the command line."""
+
+from warpsplat.extensions import Extension
+
+EXTENSION = Extension(requires=("torch",))

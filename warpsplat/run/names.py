@@ -1,0 +1,201 @@
+"""What results are called, and whether they can be written: found out before the work."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from warpsplat.errors import UsageError, shown
+from warpsplat.files.output import check_folder, check_target
+from warpsplat.files.remote import check_remote, is_remote, is_url, remote
+from warpsplat.fit.settings import DEFAULT_QUALITY, Settings
+from warpsplat.run.formats import ENDINGS, check_format
+from warpsplat.run.options import KINDS
+
+FIELD = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
+"""What braces mean in the name of a result: themselves, doubled, or a field."""
+
+LIKELY = "out/{stem}-{curves}.svg"
+"""An example, for messages."""
+
+
+Place = Callable[[str], UsageError]
+"""Makes the error that names where something was given: a line of a file, or the command line."""
+
+
+class Found(NamedTuple):
+    """An image, and the folder under which it was looked for."""
+
+    path: Path
+    root: Path
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An image, its settings, and what is said of its result's name."""
+
+    image: Found
+    output: Path | None
+    """A folder, a name or a pattern of names (``is_pattern``); None: beside the image."""
+    settings: Settings
+    fields: Mapping[str, Any]
+    """What names may hold, besides the image's own."""
+    place: Place
+    """Where the name was given."""
+
+
+def is_pattern(output: str) -> bool:
+    """Whether an output says the name of a file, not that of a folder."""
+    return "{" in output or "}" in output or output.lower().endswith(ENDINGS)
+
+
+def root_of(output: Path) -> Path:
+    """The folder that all results of an output lie in: what stands before the first field."""
+    if not is_pattern(str(output)):
+        return output
+    root = output.parent
+    while "{" in str(root) or "}" in str(root):
+        root = root.parent
+    return root
+
+
+def fields_of(settings: Settings, given: Mapping[str, Any]) -> dict[str, Any]:
+    """What names may hold: settings as they were given, or as they are."""
+    own = {key.replace("_", "-"): value for key, value in vars(settings).items()}
+    own["kind"] = next(name for name, kind in KINDS.items() if kind == settings.kind)
+    return {**own, "quality": DEFAULT_QUALITY, **given}
+
+
+def name_results(wanted: Sequence[Wanted], masks: Iterable[Path] = ()) -> list[Path]:
+    """The path of each result; no two may have one, and none that of an image, or of one of the ``masks``.
+
+    Where a folder is all that is said, results have the image's name: of a.png and a.jpg in one folder with
+    its ending.
+
+    Raises:
+        UsageError: an unknown field, or results that would lie in one place.
+    """
+    folders = [item.output if item.output else item.image.path.parent for item in wanted]
+    patterns = [item.output is not None and is_pattern(str(item.output)) for item in wanted]
+    distinct = {
+        (folder, item.image.path)
+        for item, folder, pattern in zip(wanted, folders, patterns, strict=True)
+        if not pattern
+    }
+    stems = Counter((folder, path.stem) for folder, path in distinct)
+    outputs: list[Path] = []
+    for item, folder, pattern in zip(wanted, folders, patterns, strict=True):
+        path = item.image.path
+        if pattern:
+            outputs.append(filled_in(item))
+        else:
+            outputs.append(folder / f"{path.stem if stems[folder, path.stem] == 1 else path.name}.svg")
+    inputs = {_real(path) for path in (*(item.image.path for item in wanted), *masks)}
+    counts = Counter(outputs)
+    for item, output in zip(wanted, outputs, strict=True):
+        if (real := _real(output)) in inputs:
+            path = item.image.path
+            by = "its own result" if real == _real(path) else f"the result of {path}"
+            raise item.place(f"output: {output} would be overwritten by {by}; give another one")
+        if counts[output] > 1:
+            cause = f"{counts[output]} results would be {output}; give other outputs, as {LIKELY}"
+            raise item.place(f"output: {cause}")
+    return outputs
+
+
+def filled_in(item: Wanted) -> Path:
+    """The name of a result, by its pattern.
+
+    Raises:
+        UsageError: a field that there is not.
+    """
+    path, root = item.image
+    away = is_remote(path)
+    folder = path.parent.relative_to(root).as_posix() if away else os.path.relpath(path.parent, root)
+    fields = {**item.fields, "stem": path.stem, "name": path.name, "folder": folder}
+
+    def value(found: re.Match[str]) -> str:
+        if found[0] in ("{{", "}}"):
+            return found[0][0]
+        if found[1] not in fields:
+            named = shown(found[0])
+            raise item.place(f"output: {named} is no field; they are stem, name, folder, and all keys")
+        text = _text(fields[found[1]])
+        return text if found[1] == "folder" else text.replace("/", "_").replace(os.sep, "_")
+
+    name = FIELD.sub(value, str(item.output))
+    if not name.lower().endswith(ENDINGS):
+        known = f"{', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"
+        raise item.place(f"output: {name}: names of results end with {known}")
+    return remote(name.replace("/./", "/")) if is_url(name) else Path(os.path.normpath(name))
+
+
+def _real(path: Path) -> str:
+    """The file itself, behind all links."""
+    return str(path) if is_remote(path) else os.path.realpath(path)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    return "-".join(map(_text, value)) if isinstance(value, (tuple, list)) else str(value)
+
+
+def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
+    """Find out before the work whether every result can be written.
+
+    Raises:
+        UsageError: a folder that is none, cannot be written or cannot be made, a name that is too long, a
+            result that is a folder, a pipe, a device or a loop of links, or one that needs a package.
+    """
+    usable: set[Path] = set()
+    for place, output in zip(places, outputs, strict=True):
+        folder = output.parent
+        try:
+            check_format(output)
+            if is_remote(folder):
+                check_remote(folder)
+                continue
+            if folder not in usable:
+                _check_folder(folder)
+                usable.add(folder)
+            if folder.is_dir():
+                check_target(output)
+            else:
+                _check_names(folder, output.name)
+        except OSError as error:
+            raise place(f"output: {output} cannot be written: {error.strerror or error}") from error
+        except UsageError as error:
+            raise place(f"output: {error}") from error
+
+
+def _check_folder(folder: Path) -> None:
+    """Check that ``folder`` can be written, or made."""
+    if folder.is_dir():
+        check_folder(folder)
+        return
+    above = folder
+    while not os.path.lexists(above):
+        above = above.parent
+    if not above.is_dir():
+        raise UsageError(f"{above} is a file, not a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise UsageError(f"{folder} cannot be made: no permission to write to {above}")
+    _check_names(folder)
+
+
+def _check_names(folder: Path, name: str = "") -> None:
+    """Check the lengths of names in a folder that is yet to be made."""
+    above = folder
+    while not above.is_dir():
+        above = above.parent
+    longest = os.pathconf(above, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
+    for part in (*folder.relative_to(above).parts, name):
+        if len(os.fsencode(part)) > longest:
+            raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))

@@ -1,0 +1,114 @@
+"""``warpsplat bench``."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import click
+
+from warpsplat.cli.echo import echo
+from warpsplat.cli.options import threads_option
+from warpsplat.errors import UsageError, shown
+from warpsplat.extensions import renderer_names
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """``768x512`` -> (width, height) in px.
+
+    Raises:
+        UsageError: not a size, or one side is not between 16 and 16384.
+    """
+    found = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.strip().lower())
+    if not found or not all(16 <= int(n) <= 16384 for n in found.groups()):
+        raise UsageError(f"not a size: {shown(text)}; write 768x512, each side from 16 to 16384")
+    return int(found[1]), int(found[2])
+
+
+def table(values: dict[str, Any], verbose: int) -> str:
+    """The figures, for people."""
+    rows = [("step", values["step"]), ("forward + backward", values["forward_backward"])]
+    rows += [(f"  {name}", spread) for name, spread in values["stages"].items()]
+    if verbose:
+        rows += [(f"    {name}", spread) for name, spread in values["kernels"].items()]
+    both = values.get("through_torch", {})
+    rows += [(f"by turns, {name}", both[name]) for name in ("own", "torch") if both]
+    memory = values["peak_memory"]
+    where = values["device"] + (
+        f", {values['threads']} threads" if values["device"] == "cpu" else f" ({values['device_name']})"
+    )
+    return "\n".join(
+        [
+            f"{values['shapes']} {values['kind']} shapes, {values['width']}x{values['height']} px, "
+            f"opacity {values['opacity']:g}, {values['renderer']} renderer, {where}",
+            f"{values['pairs']} (tile, shape) pairs, {values['samples']} samples",
+            f"{'':36}{'median':>10}{'low':>10}{'high':>10}  ms",
+            *(f"{name:36}{s['median']:10.2f}{s['low']:10.2f}{s['high']:10.2f}" for name, s in rows),
+            f"{values['megapixels_per_s']:.1f} megapixels/s, {values['us_per_shape']:.1f} us a shape, "
+            f"{values['ns_per_pixel']:.1f} ns a pixel"
+            + (f", peak memory {memory / 1e6:.0f} MB" if memory else "")
+            + (f"; through PyTorch {both['ratio']:.2f} times as long" if both else ""),
+        ]
+    )
+
+
+@click.command("bench", context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--curves", type=click.IntRange(1, 100_000), default=512, show_default=True, metavar="N", help="Shapes."
+)
+@click.option("--size", default="768x512", show_default=True, metavar="WxH", help="Of the canvas [px].")
+@click.option(
+    "--kind",
+    type=click.Choice(["closed", "open"]),
+    default="closed",
+    show_default=True,
+    help="Fills, or strokes.",
+)
+@click.option(
+    "--renderer",
+    type=click.Choice(renderer_names()),
+    default="exact",
+    show_default=True,
+    help="How shapes are seen, as in vectorize.",
+)
+@click.option(
+    "--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True, help="Of each shape."
+)
+@click.option("--device", default="auto", show_default=True, help="auto, cpu, or cuda:N.")
+@threads_option
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 10_000),
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="Steps that are timed.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**32 - 1),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Of the random scene.",
+)
+@click.option("--torch", "through_torch", is_flag=True, help="Time the passes through PyTorch as well.")
+@click.option("-v", "--verbose", count=True, help="List the kernels as well.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
+    """Time a training step and its stages on a random scene.
+
+    Shapes have uniform centres and radii of 5 to 10 % of the width (half of
+    that on canvases wider than 2000 px): closed outlines of 4 cubics on a
+    jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves
+    while it is timed.
+    """
+    width, height = parse_size(size)
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
+    from warpsplat.tools.bench import bench
+
+    start_warp()
+    values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)
+    echo(json.dumps(values) if as_json else table(values, verbose))

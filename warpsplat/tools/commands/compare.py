@@ -1,0 +1,189 @@
+"""``warpsplat compare``."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from warpsplat.cli.echo import echo
+from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
+from warpsplat.errors import Stopped, UsageError, printable, shown
+from warpsplat.run.options import BY_NAME, settings_from
+from warpsplat.tools.tracer import TRACERS, require
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from warpsplat.fit.settings import Settings
+    from warpsplat.run.result import Result
+    from warpsplat.scene import FloatArray
+    from warpsplat.tools.compare import Comparison, Row
+    from warpsplat.tools.tracer import Tracer
+
+TABLES, FIGURES, PLOT = "comparison.md", "comparison.json", "comparison.svg"
+"""What a folder gets besides the SVGs."""
+
+
+def parse_curves(text: str) -> list[int]:
+    """``64,256`` -> [64, 256], each once, from few to many.
+
+    Raises:
+        UsageError: not whole numbers.
+    """
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isascii() and part.isdigit() and len(part) < 9 for part in parts):
+        raise UsageError(f"not numbers of shapes: {shown(text)}; write 64,256,512")
+    return sorted({int(part) for part in parts})
+
+
+def svg_name(image: Path, program: str, setting: str) -> str:
+    """Name of the file that ``program`` makes of ``image`` at ``setting``."""
+    return f"{image.stem}.{program.lower()}-{setting}.svg"
+
+
+def result_names(images: Sequence[Path], settings: Sequence[Settings], tracer: Tracer) -> list[str]:
+    """Names of all files that a comparison writes."""
+    from warpsplat.tools.compare import OURS
+
+    made = [(OURS, str(ours.curves)) for ours in settings]
+    made += [(tracer.name, setting) for setting in tracer.settings]
+    return [*(svg_name(image, *one) for image in images for one in made), TABLES, FIGURES, PLOT]
+
+
+def prepare_folder(folder: Path, names: Sequence[str], images: Sequence[Path], *, overwrite: bool) -> None:
+    """Make the folder of the results, and find out before the work whether they can be written.
+
+    Raises:
+        UsageError: they cannot, or are there already and ``overwrite`` is not given.
+    """
+    from warpsplat.files.output import check_output
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be made: {error.strerror}") from error
+    for name in names:
+        check_output(folder / name, *images, overwrite=overwrite)
+
+
+def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
+    """The bytes of all images; what cannot be read as one is found before the work.
+
+    Raises:
+        ImageError: one cannot be read.
+        UsageError: two would give their results the same names.
+    """
+    from warpsplat.files.image import load_image
+    from warpsplat.files.inputs import input_name, read_input
+
+    found: dict[Path, bytes] = {}
+    for path in images:
+        if path.stem in {other.stem for other in found}:
+            raise UsageError(f"{path}: another image has the name {path.stem} as well")
+        found[path] = read_input(path)
+        load_image(found[path], input_name(path))
+    return found
+
+
+@click.command("compare", context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("images", nargs=-1, required=True, type=FILE)
+@click.option("--against", type=click.Choice(list(TRACERS)), required=True, help="The other program.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help=f"For all SVGs, {TABLES}, {FIGURES} and the plot {PLOT}.",
+)
+@overwrite_option
+@click.option(
+    "--curves", default="64,256,512", show_default=True, metavar="N,N...", help="Numbers of shapes."
+)
+@flag(BY_NAME["closed"])
+@flag(BY_NAME["open"])
+@flag(BY_NAME["quality"])
+@flag(BY_NAME["iterations"])
+@flag(BY_NAME["seed"])
+@run_options
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    images: tuple[Path, ...],
+    against: str,
+    output: Path | None,
+    overwrite: bool,
+    curves: str,
+    device: str,
+    threads: int | None,
+    verbose: int,
+    quiet: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Compare our files of IMAGES with those of another program.
+
+    Each image is vectorized by us with several numbers of shapes, and by the
+    other program at several of its settings. All files are measured as eval
+    measures them: PSNR, SSIM, size, paths, nodes; and the seconds that they
+    took. Both get the same pixels, transparency on white.
+
+    VTracer and, with -o, Matplotlib must be installed: the extra "compare".
+    """
+    settings = [settings_from({**given, "curves": n}) for n in parse_curves(curves)]
+    tracer = TRACERS[against]()
+    sources = read_images(images)
+    if output:
+        require("matplotlib")
+        prepare_folder(output, result_names(images, settings, tracer), images, overwrite=overwrite)
+    from warpsplat.cli.run import progress_bar
+    from warpsplat.cli.signals import Interrupt
+    from warpsplat.files.image import load_image
+    from warpsplat.files.output import write_result
+    from warpsplat.rendering.backend import Backend
+    from warpsplat.rendering.device import choose_device, start_warp
+    from warpsplat.run.vectorize import vectorize
+    from warpsplat.tools.compare import Comparison, compare, warm_up
+
+    start_warp()
+    backend = Backend.on(choose_device(device), threads)
+    interrupt = Interrupt()
+
+    def run(path: Path, target: FloatArray, ours: Settings, write: Callable[[str], None]) -> Result:
+        with interrupt.watching(), progress_bar(path, ours, quiet=quiet, verbose=verbose) as report:
+            return vectorize(target, ours, backend, report=report, stop=interrupt, write=write)
+
+    rows: list[Row] = []
+    try:
+        warm_up(settings[0], backend)
+        for path, data in sources.items():
+            name = printable(path.name)
+            for row in compare(name, load_image(data), settings, tracer, partial(run, path)):
+                rows.append(row)
+                if output and row.svg:
+                    write_result(output / svg_name(path, row.program, row.setting), row.svg.encode())
+                if verbose:
+                    echo(f"{row.image}: {row.program}, {row.setting}: {row.seconds:.1f} s", err=True)
+    except Stopped as error:
+        raise KeyboardInterrupt from error
+    finally:
+        if rows:  # whatever cut it short, the rows that there are count
+            publish(Comparison(rows, settings[0], tracer), output, as_json=as_json, quiet=quiet)
+
+
+def publish(found: Comparison, output: Path | None, *, as_json: bool, quiet: bool) -> None:
+    """Write tables, figures and plot into the folder, and print tables or figures."""
+    from warpsplat.files.output import write_result
+    from warpsplat.tools.compare_tables import markdown, plot
+
+    tables, figures = markdown(found), json.dumps(found.as_dict())
+    if output:
+        write_result(output / TABLES, f"{tables}\n".encode())
+        write_result(output / FIGURES, f"{figures}\n".encode())
+        write_result(output / PLOT, plot(found))
+    if as_json:
+        echo(figures)
+    elif not quiet:
+        echo(tables)
