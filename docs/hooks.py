@@ -1,5 +1,5 @@
 """What the site shows of texts that have their home elsewhere: files of the repository's top, parts of the
-README, and the help of the commands.
+README, the help of the commands, and the table of options.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 import click
 import gallery_pages
 import gallery_reports
+import option_tables
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
@@ -52,8 +53,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put parts of files where a page says ``<!-- FILE: NAME -->``."""
-    return re.sub(r"^<!-- (\S+): (\w+) -->$", lambda m: part(m[1], m[2]), markdown, flags=re.MULTILINE)
+    """Put parts of files where a page says ``<!-- FILE: NAME -->``; of the ``options``, tables."""
+
+    def found(place: re.Match[str]) -> str:
+        return option_tables.table(place[2]) if place[1] == "options" else part(place[1], place[2])
+
+    return re.sub(r"^<!-- (\S+): (\w+) -->$", found, markdown, flags=re.MULTILINE)
 
 
 def on_page_content(text: str, **_: Any) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 import io
+import re
 import subprocess
 import sys
 import threading
@@ -17,7 +17,6 @@ from PIL import Image
 import warpsplat
 from tests import ROOT
 from tests.cli.helpers import run
-from warpsplat.run.options import OPTIONS
 from warpsplat.scene import Kind
 
 QUICK = {"curves": 6, "iterations": 30, "subject": "photo"}
@@ -84,9 +83,14 @@ def test_another_thing_is_refused() -> None:
         warpsplat.load_svg(1.0)
 
 
-def test_arguments_are_those_of_the_command_line() -> None:
-    names = set(inspect.signature(warpsplat.vectorize).parameters)
-    assert {option.name.replace("-", "_") for option in OPTIONS} <= names
+def test_unknown_keywords_are_refused_with_the_nearest() -> None:
+    for name, words in (
+        ("colour", "'colour'; did you mean 'colors'?"),
+        ("outptu", "'output'"),
+        ("xing", "'xing'"),
+    ):
+        with pytest.raises(TypeError, match=rf"^vectorize\(\) has no keyword .*{re.escape(words)}"):
+            warpsplat.vectorize(photograph(), **{name: 3})
 
 
 def test_settings_and_their_values_exclude_each_other() -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import empty_scene
-from warpsplat.errors import UsageError
 from warpsplat.fit.density import densify
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.streaks import Streaks
@@ -69,9 +68,3 @@ def test_a_run_has_both_kinds(device: str) -> None:
     assert np.isfinite(result.scene.points).all()
     assert result.score
     assert result.score.psnr > 15, "20 to 22 dB over five seeds"
-
-
-def test_what_does_not_go_together() -> None:
-    for given in ({"kind": Kind.STROKE}, {"renderer": "splat"}):
-        with pytest.raises(UsageError, match="mixed and"):
-            make_settings(mixed=True, **given)

@@ -9,7 +9,6 @@ import pytest
 
 from tests.fit.pictures import picture
 from tests.scenes import random_scene, with_two_stops
-from warpsplat.errors import UsageError
 from warpsplat.fit.paints import choose_paints
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
@@ -114,8 +113,3 @@ def test_a_circle_stays_one_in_training(device: str) -> None:
     assert (np.abs(moved - frames)[round_, :4] > 0.1).all()
     np.testing.assert_array_equal(moved[round_, 4], -moved[round_, 3])
     np.testing.assert_array_equal(moved[round_, 5], moved[round_, 2])
-
-
-def test_soft_gaussians_have_no_gradients() -> None:
-    with pytest.raises(UsageError, match="gaussian needs the paint flat"):
-        make_settings(renderer="gaussian", paint="auto")

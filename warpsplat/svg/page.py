@@ -114,16 +114,11 @@ def _checked(sheet: Sheet, name: str) -> Sheet:
 
 
 def check_placing(size: str, page: str, unit: str) -> None:
-    """Whether ``placed`` will understand these.
+    """Check that ``placed`` will understand these.
 
     Raises:
-        UsageError: as there, or one is no text.
+        UsageError: as there.
     """
-    for name, value in (("size", size), ("page", page), ("units", unit)):
-        if not isinstance(value, str):  # as batch files and callers in Python may give it
-            raise UsageError(f"{name} must be text, not {shown(value)}")
-    if size and page:
-        raise UsageError("size and page do not go together")
     if size:
         parse_size(size, unit or "mm")
     elif page:
@@ -142,7 +137,7 @@ def placed(text: str, size: str, page: str, unit: str) -> str:
         unit: in which the file says its size; empty: pixels, or millimetres of a size or page.
 
     Raises:
-        UsageError: one of them is not understood, or both a size and a page are given.
+        UsageError: one of them is not understood.
     """
     check_placing(size, page, unit)
     if not (size or page or unit):
