@@ -1,4 +1,4 @@
-"""What is made from the table of options: ``warpsplat/api/options.py`` and the tables of docs/settings.md.
+"""What is made from the table of options: ``warpsplat/run/typed.py`` and the tables of docs/settings.md.
 
 python docs/option_tables.py      # writes the former, after a change in fit/settings.py
 """
@@ -12,9 +12,9 @@ from warpsplat.fit.options import Option, options_of
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.run.options import OPTIONS
 
-TYPED = Path(__file__).parents[1] / "warpsplat" / "api" / "options.py"
+TYPED = Path(__file__).parents[1] / "warpsplat" / "run" / "typed.py"
 
-HEAD = '''"""Keywords of ``warpsplat.vectorize``; made by ``python docs/option_tables.py``, not by hand."""
+HEAD = '''"""Keywords of ``vectorize`` and others; made by ``python docs/option_tables.py``, not by hand."""
 
 from __future__ import annotations
 
@@ -24,16 +24,28 @@ from typing import TypedDict
 from warpsplat.fit.settings import Painting, Quality, Renderer, Subject
 
 
-class Options(TypedDict, total=False):
-    """The options of the command line, with ``_`` for ``-``. One that is None counts as not given."""
+class RefineOptions(TypedDict, total=False):
+    """Options that ``refine`` shares with ``vectorize``. One that is None counts as not given."""
 
-'''
+%s
+
+class Options(RefineOptions, total=False):
+    """The options of the command line, with ``_`` for ``-``: these, and those of ``RefineOptions``."""
+
+%s'''
 
 
 def typed_options() -> str:
-    """Return the source of ``Options``: all but the number of shapes, which functions take by itself."""
-    rows = (f'    {each.keyword}: {annotation(each)} | None\n    """{each.help}"""\n' for each in OPTIONS[1:])
-    return HEAD + "".join(rows)
+    """Return the source of both: all but the number of shapes, which functions take by itself."""
+    shared, others = (
+        "".join(
+            f'    {option.keyword}: {annotation(option)} | None\n    """{option.help}"""\n'
+            for option in OPTIONS[1:]
+            if option.refine == refine
+        )
+        for refine in (True, False)
+    )
+    return HEAD % (shared, others)
 
 
 def annotation(option: Option) -> str:

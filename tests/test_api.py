@@ -94,8 +94,13 @@ def test_unknown_keywords_are_refused_with_the_nearest() -> None:
 
 
 def test_settings_and_their_values_exclude_each_other() -> None:
+    settings = warpsplat.make_settings()
     with pytest.raises(warpsplat.UsageError, match="seed besides"):
-        warpsplat.vectorize(photograph(), settings=warpsplat.make_settings(), seed=3)
+        warpsplat.vectorize(photograph(), settings=settings, seed=3)
+    with pytest.raises(warpsplat.UsageError, match="quality besides"):
+        warpsplat.suggest(photograph(), settings=settings, quality="draft")
+    with pytest.raises(warpsplat.UsageError, match="several numbers of shapes and max-bytes"):
+        warpsplat.vectorize_several(photograph(), [4, 8], max_bytes="2KB")
     with pytest.raises(warpsplat.UsageError, match="closed and open"):
         warpsplat.vectorize(photograph(), closed=True, open=True)
     with pytest.raises(warpsplat.UsageError, match="threads"):

@@ -7,21 +7,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpsplat.api.keywords import settings_given, takes_options
-from warpsplat.api.options import Options
 from warpsplat.api.run import Callback, Watch, backend_on, checkpoint_file
 from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import INTERVAL
+from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.result import Result
+from warpsplat.run.typed import Options
 from warpsplat.run.vectorize import vectorize_image
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 
-@takes_options
+@takes(Options)
 def vectorize(
     image: ImageSource,
     curves: int | None = None,

@@ -158,7 +158,7 @@ def options_of(declaring: type) -> tuple[Option, ...]:
             name=field.name.replace("_", "-"),
             field=field.name,
             type=get_origin(kind) or kind,
-            choices=choices,
+            choices=choices or declared.choices,
             shorthands=tuple(dataclasses.replace(s, field=field.name) for s in declared.shorthands),
         )
         found.append(made)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -516,7 +516,8 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
         if name not in known:
             raise UsageError(f"unknown setting {shown(name)}{nearest(name, known)}")
         given[name] = known[name].parsed(value)
-    settings = Settings(**_implied(given))
+    preset = _preset(given)  # which changes them
+    settings = replace(preset, **given)
     if settings.size or settings.page or settings.units:
         from warpsplat.svg.page import check_placing  # brings what writes files
 
@@ -524,13 +525,12 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     return settings
 
 
-def _implied(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of fields, in order: shorthands, what the given ones imply, and they themselves.
+def _preset(given: dict[str, Any]) -> Settings:
+    """Return the settings that the ``given`` ones imply, in which shorthands become values of fields.
 
     Raises:
         UsageError: shorthands that contradict each other, or a value that is implied otherwise.
     """
-    values = {"simplify": "curves" not in given, **PRESETS[given.pop("quality", DEFAULT_QUALITY)]}
     closed, is_open = given.pop("closed", None), given.pop("open", None)
     if closed and is_open:
         raise UsageError("closed and open do not go together")
@@ -540,17 +540,18 @@ def _implied(given: dict[str, Any]) -> dict[str, Any]:
         given.setdefault("levels", levels_of(given.get("curves", Settings.curves)))
     if given.get("levels"):  # the last of them is the whole
         given.setdefault("curves", given["levels"][-1])
-        values["simplify"] = False
-    rates = default_rates()
+    quality = given.pop("quality", DEFAULT_QUALITY)
+    preset = Settings(simplify="curves" not in given, **PRESETS[quality])
+    rates = dict(preset.rates)
     renderer = given.get("renderer", "exact")
     if renderer != "exact":  # Gaussians lie along cubics
         if given.setdefault("basis", Basis.CUBIC) != Basis.CUBIC:
             raise UsageError(f"renderer {renderer} needs the basis cubic")
-        values["iterations"] = round(SPLAT_SHARE * values.get("iterations", Settings.iterations))
+        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if renderer == "gaussian":  # its own render is what counts, by its squared error
-        values |= {"order": "area", "texture": 0.0, "viewer": False}
+        preset = replace(preset, order="area", texture=0.0, viewer=False)
     is_limited = bool(given.get("colors") or given.get("palette"))
     if is_limited:  # what lies below would make further colours
         given["opaque"] = True
@@ -561,4 +562,4 @@ def _implied(given: dict[str, Any]) -> dict[str, Any]:
     rates |= given.pop("rates", {})
     if is_limited:  # colours are chosen, not trained
         rates["colors"] = 0.0
-    return {**values, **given, "rates": rates}
+    return replace(preset, rates=rates)

@@ -1,4 +1,4 @@
-"""Keywords of ``warpsplat.vectorize``; made by ``python docs/option_tables.py``, not by hand."""
+"""Keywords of ``vectorize`` and others; made by ``python docs/option_tables.py``, not by hand."""
 
 from __future__ import annotations
 
@@ -8,8 +8,25 @@ from typing import TypedDict
 from warpsplat.fit.settings import Painting, Quality, Renderer, Subject
 
 
-class Options(TypedDict, total=False):
-    """The options of the command line, with ``_`` for ``-``. One that is None counts as not given."""
+class RefineOptions(TypedDict, total=False):
+    """Options that ``refine`` shares with ``vectorize``. One that is None counts as not given."""
+
+    time_budget: float | str | None
+    """As many steps as end within 60s, 2m ..."""
+    background: str | None
+    """auto: transparent where the image is; none; or a colour (#rrggbb)."""
+    title: str | None
+    """Title of the picture, in the file."""
+    ids: bool | None
+    """Name paths by their colours, and group neighbours of one, for editors."""
+    minify: bool | None
+    """Smallest text: no line breaks, no mark that warpsplat wrote it."""
+    precision: int | None
+    """Most decimals of a pixel in coordinates."""
+
+
+class Options(RefineOptions, total=False):
+    """The options of the command line, with ``_`` for ``-``: these, and those of ``RefineOptions``."""
 
     subject: Subject | None
     """What the image shows: to a photo shapes are fitted, the others are traced."""
@@ -39,27 +56,15 @@ class Options(TypedDict, total=False):
     """No translucent shapes."""
     target_psnr: float | None
     """The smallest file with a PSNR of at least DB."""
-    time_budget: float | str | None
-    """As many steps as end within 60s, 2m ..."""
     max_bytes: int | str | None
     """The best file of no more than 100KB, 1MB ..."""
     max_memory: int | str | None
     """Memory to stay below, as 4GB: a larger image is worked on at a smaller size."""
     seed: int | None
     """Random seed."""
-    background: str | None
-    """auto: transparent where the image is; none; or a colour (#rrggbb)."""
-    title: str | None
-    """Title of the picture, in the file."""
     size: str | None
     """For plotters: size that the picture fills, as 200x150mm."""
     page: str | None
     """For plotters: sheet that it fills but for margins: a3, a4, a5, letter."""
     units: str | None
     """Units in which the file says its size: mm, cm, in, pt, px."""
-    ids: bool | None
-    """Name paths by their colours, and group neighbours of one, for editors."""
-    minify: bool | None
-    """Smallest text: no line breaks, no mark that warpsplat wrote it."""
-    precision: int | None
-    """Most decimals of a pixel in coordinates."""
