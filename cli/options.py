@@ -1,7 +1,4 @@
-"""Options that commands share.
-
-Those that decide the result come from ``warpsplat.run.options``; one that is not given is None.
-"""
+"""Options that commands share. Those that decide the result are made from the table of ``Settings``."""
 
 from __future__ import annotations
 
@@ -15,7 +12,8 @@ import click
 
 from warpsplat.cli.echo import set_verbosity
 from warpsplat.errors import shown
-from warpsplat.run.options import OPTIONS, Option
+from warpsplat.fit.options import Option
+from warpsplat.run.options import OPTIONS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -117,15 +115,18 @@ class Numbers(click.ParamType):
 
 def flag(option: Option, *, several: bool = False) -> Callable[[Function], Function]:
     """The flag of an option of the table; ``several``: whether there may be several numbers of shapes."""
-    shown = f"{option.help}  [default: {option.default}]" if option.default else option.help
-    if option.kind is not None:
-        shown = f"{option.help}  [default]" if option.default else option.help
+    default = option.default_text
+    shown = f"{option.help}  [default: {default}]" if default else option.help
+    if option.value is not None:
+        shown = f"{option.help}  [default]" if default else option.help
         return click.option(
-            f"--{option.name}", "kind", flag_value=option.kind, type=click.UNPROCESSED, help=shown
+            f"--{option.name}", option.field, flag_value=option.value, type=click.UNPROCESSED, help=shown
         )
     if option.type is bool:
         return click.option(f"--{option.name}", is_flag=True, default=None, help=shown)
-    kind: click.ParamType | type = click.Choice(option.choices) if option.choices else option.type
+    kind: click.ParamType | type = str if option.parse else option.type
+    if option.choices:
+        kind = click.Choice(option.choices)
     if option.name == "curves":
         kind = Numbers(several=several)
     return click.option(f"--{option.name}", type=kind, metavar=option.metavar or None, help=shown)
@@ -135,6 +136,13 @@ def quality_options(function: Function, *, several: bool = False) -> Function:
     """What decides the result; ``several``: see ``flag``."""
     for option in reversed(OPTIONS):
         function = flag(option, several=several)(function)
+    return function
+
+
+def refine_options(function: Function) -> Function:
+    """Those of them that ``refine`` has."""
+    for option in reversed(OPTIONS):
+        function = flag(option)(function) if option.refine else function
     return function
 
 

@@ -10,12 +10,11 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
-from warpsplat.cli.options import FILE, checkpoint_options, flag, overwrite_option, run_options
+from warpsplat.cli.options import FILE, checkpoint_options, overwrite_option, refine_options, run_options
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
 from warpsplat.files.output import check_output
 from warpsplat.fit.settings import make_settings
-from warpsplat.run.options import BY_NAME
 
 
 @click.command("refine", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
@@ -30,15 +29,10 @@ from warpsplat.run.options import BY_NAME
 )
 @overwrite_option
 @click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
-@flag(BY_NAME["time-budget"])
 @click.option(
     "--max-memory", metavar="SIZE", help="Memory to stay below, as 4GB: an image that takes more is refused."
 )
-@flag(BY_NAME["precision"])
-@flag(BY_NAME["title"])
-@flag(BY_NAME["ids"])
-@flag(BY_NAME["minify"])
-@flag(BY_NAME["background"])
+@refine_options
 @click.option(
     "--keep",
     is_flag=True,

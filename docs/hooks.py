@@ -1,4 +1,4 @@
-"""Pages of the site whose text lives elsewhere: ARCHITECTURE.md and the like, and the commands' help."""
+"""Pages of the site whose text lives elsewhere: ARCHITECTURE.md and the like, the commands' help, the options."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import click
 import gallery_pages
 import gallery_reports
+import option_tables
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
@@ -46,6 +47,13 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for page, text in {**gallery_pages.pages(), **gallery_reports.reports()}.items():
         files.append(File.generated(config, page, content=text))
     return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put tables of options where a page says ``<!-- options: NAME -->``."""
+    return re.sub(
+        r"^<!-- options: (\w+) -->$", lambda m: option_tables.table(m[1]), markdown, flags=re.MULTILINE
+    )
 
 
 def on_page_content(text: str, **_: Any) -> str:

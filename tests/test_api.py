@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 import io
+import re
 import subprocess
 import sys
 import threading
@@ -17,7 +17,6 @@ from PIL import Image
 import warpsplat
 from tests import ROOT
 from tests.cli.helpers import run
-from warpsplat.run.options import OPTIONS
 from warpsplat.scene import Kind
 
 QUICK = {"curves": 6, "iterations": 30, "subject": "photo"}
@@ -84,14 +83,24 @@ def test_another_thing_is_refused() -> None:
         warpsplat.load_svg(1.0)
 
 
-def test_arguments_are_those_of_the_command_line() -> None:
-    names = set(inspect.signature(warpsplat.vectorize).parameters)
-    assert {option.name.replace("-", "_") for option in OPTIONS} <= names
+def test_unknown_keywords_are_refused_with_the_nearest() -> None:
+    for name, words in (
+        ("colour", "'colour'; did you mean 'colors'?"),
+        ("outptu", "'output'"),
+        ("xing", "'xing'"),
+    ):
+        with pytest.raises(TypeError, match=rf"^vectorize\(\) has no keyword .*{re.escape(words)}"):
+            warpsplat.vectorize(photograph(), **{name: 3})
 
 
 def test_settings_and_their_values_exclude_each_other() -> None:
+    settings = warpsplat.make_settings()
     with pytest.raises(warpsplat.UsageError, match="seed besides"):
-        warpsplat.vectorize(photograph(), settings=warpsplat.make_settings(), seed=3)
+        warpsplat.vectorize(photograph(), settings=settings, seed=3)
+    with pytest.raises(warpsplat.UsageError, match="quality besides"):
+        warpsplat.suggest(photograph(), settings=settings, quality="draft")
+    with pytest.raises(warpsplat.UsageError, match="several numbers of shapes and max-bytes"):
+        warpsplat.vectorize_several(photograph(), [4, 8], max_bytes="2KB")
     with pytest.raises(warpsplat.UsageError, match="closed and open"):
         warpsplat.vectorize(photograph(), closed=True, open=True)
     with pytest.raises(warpsplat.UsageError, match="threads"):

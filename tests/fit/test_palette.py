@@ -146,5 +146,3 @@ def test_palettes_as_texts(tmp_path: Path) -> None:
     assert settings_from({"palette": str(file)}).palette == ("#ffffff", "#010203")
     with pytest.raises(UsageError, match="No such file"):
         settings_from({"palette": str(tmp_path / "none")})
-    with pytest.raises(UsageError, match="colors"):
-        make_settings(colors=0)

@@ -1,48 +1,40 @@
-"""One home of options: flags, keys of batch files and the docs' table say the same."""
+"""Options are declared once: flags, keys of batch files, keywords and documentation are made from that."""
 
 from __future__ import annotations
 
-import re
+import inspect
+import runpy
 from pathlib import Path
 
 import click
 import pytest
 
+import warpsplat
 from tests import ROOT
 from warpsplat.cli.vectorize import command
 from warpsplat.errors import UsageError
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.options import Option
 from warpsplat.run import options
-from warpsplat.run.options import OPTIONS, Option, settings_from
+from warpsplat.run.options import OPTIONS, RESEARCH_KEYS, settings_from
 
-TABLE = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
-ROWS = [
-    [cell.strip() for cell in line.strip("|").split("|")] for line in TABLE.splitlines() if line[:3] == "| `"
-]
+MADE = runpy.run_path(str(ROOT / "docs" / "option_tables.py"))
 
 
 @pytest.mark.parametrize("option", OPTIONS, ids=lambda o: o.name)
-def test_flags_keys_and_readme(option: Option) -> None:
+def test_flags_keys_keywords_and_rows(option: Option) -> None:
     flags = {name: p for p in command.params if isinstance(p, click.Option) for name in p.opts}
     flag = flags[f"--{option.name}"]
-    assert option.kind is not None or command.make_context("vectorize", ["a.png"]).params[flag.name] is None
-    assert option.help.rstrip(".") in (flag.help or "")
-    rows = [row for row in ROWS if re.search(rf"`--{option.name}[ `]", row[0])]
-    assert len(rows) == 1, "a row of the table"
-    if option.default and option.kind is None:
-        assert rows[0][2].strip("`") == option.default
+    assert option.value is not None or command.make_context("vectorize", ["a.png"]).params[flag.name] is None
+    assert (flag.help or "").startswith(option.help)
+    assert option.name in KEYS
+    assert option.keyword in inspect.signature(warpsplat.vectorize).parameters
+    assert f"<code>--{option.name}" in MADE["table"]("options")
 
 
-@pytest.mark.parametrize("option", OPTIONS, ids=lambda o: o.name)
-def test_a_default_is_what_a_run_takes(option: Option) -> None:
-    settings = make_settings()
-    if option.kind is not None:
-        assert (settings.kind == option.kind) == bool(option.default)
-    elif option.default and hasattr(settings, option.setting):
-        value = getattr(settings, option.setting)
-        assert ("auto" if value is None else str(value)) == option.default.partition(";")[0]
-    else:
-        assert option.name in {"quality", "layered"} or option.setting in Settings.__dataclass_fields__
+def test_what_is_made_is_current() -> None:
+    assert MADE["TYPED"].read_text("utf-8") == MADE["typed_options"](), "python docs/option_tables.py"
+    rows = MADE["table"]("research")
+    assert all(f"| `{key}` |" in rows for key in (*RESEARCH_KEYS, "rates", "density", "density.stop"))
 
 
 def test_a_palette_is_read_up_to_its_limit(tmp_path: Path) -> None:

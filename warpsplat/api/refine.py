@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from warpsplat.api.run import Callback, Watch, backend_on, checkpoint_file
 from warpsplat.api.svg import SvgSource, svg_name_of, text_of
@@ -12,24 +13,24 @@ from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.stages import INTERVAL
 from warpsplat.run.formats import write_named
+from warpsplat.run.keywords import takes
 from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.refine import refine as refine_scene
 from warpsplat.run.result import Result
+from warpsplat.run.typed import RefineOptions
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
+@takes(RefineOptions)
 def refine(
     svg: SvgSource,
     image: ImageSource,
     *,
     iterations: int = 200,
-    time_budget: float | str | None = None,
     max_memory: int | str | None = None,
-    precision: int | None = None,
-    title: str | None = None,
-    ids: bool | None = None,
-    minify: bool | None = None,
-    background: str | None = None,
     keep: bool = False,
     settings: Settings | None = None,
     output: str | os.PathLike[str] | None = None,
@@ -42,6 +43,7 @@ def refine(
     resume: bool = False,
     checkpoint_every: float | str = INTERVAL,
     overwrite: bool = False,
+    **options: Unpack[RefineOptions],
 ) -> Result:
     """Improve the paths of any SVG against an image by gradient descent; none is added.
 
@@ -51,16 +53,10 @@ def refine(
         iterations: steps.
         keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
         name: how messages call the SVG.
-        time_budget: as for ``vectorize``, as is all that follows but for the memory.
         max_memory: bytes, or ``"4GB"``; without, what the machine has. An image that takes more is refused:
             whether a result is better is for all of its pixels to say.
-        precision: see there.
-        title: see there.
-        ids: see there.
-        minify: see there.
-        background: see there.
-        settings: in place of all of them.
-        output: see there.
+        settings: in place of all options.
+        output: as for ``vectorize``, as is all that follows.
         device: see there.
         threads: see there.
         callback: see there.
@@ -69,6 +65,7 @@ def refine(
         resume: see there.
         checkpoint_every: see there.
         overwrite: see there.
+        options: see ``RefineOptions``.
 
     Returns:
         the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better
@@ -78,16 +75,7 @@ def refine(
         UsageError, ImageError, CheckpointError, OutputError, ResourceError, TypeError: as for
             ``vectorize``; an SVG that cannot be read, or held, is an ``ImageError``.
     """
-    settings = settings or make_settings(
-        iterations=iterations,
-        time_budget=time_budget,
-        max_memory=max_memory,
-        precision=precision,
-        title=title,
-        ids=ids,
-        minify=minify,
-        background=background,
-    )
+    settings = settings or make_settings(iterations=iterations, max_memory=max_memory, **options)
     name = name or svg_name_of(svg)
     text, image_name = text_of(svg, name), source_name(image)
     pixels = held(image)

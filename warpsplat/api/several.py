@@ -5,15 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from warpsplat.api.run import Callback, Watch, backend_on
 from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import Settings
+from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.result import Result
 from warpsplat.run.several import vectorize_several as make_several
+from warpsplat.run.typed import Options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
+@takes(Options)
 def vectorize_several(
     image: ImageSource,
     curves: Sequence[int],
@@ -27,14 +34,15 @@ def vectorize_several(
     stop: Callable[[], bool] | None = None,
     ready: Callable[[Result], None] | None = None,
     name: str | None = None,
+    **options: Unpack[Options],
 ) -> tuple[Result, ...]:
     """Turn an image into SVGs of several numbers of shapes, which share what work they can.
 
     Args:
         image: as for ``vectorize``.
         curves: numbers of shapes; of a drawing, the most. They are made from few to many.
-        settings: all that decides the results but their numbers, made by ``make_settings``; default: those
-            of ``vectorize``.
+        settings: all that decides the results but their numbers, made by ``make_settings``; in place of
+            ``options``.
         importance: as for ``vectorize``.
         outputs: a file for each number, written as soon as it is made; missing folders are made.
         device: as for ``vectorize``.
@@ -44,6 +52,7 @@ def vectorize_several(
         stop: see there.
         ready: called with each result as soon as there is one.
         name: see ``vectorize``.
+        options: see there.
 
     Returns:
         a result for each number, in the order of ``curves``; where the run was stopped, of the smallest ones
@@ -61,7 +70,7 @@ def vectorize_several(
         return make_several(
             image,
             tuple(curves),
-            settings or make_settings(),
+            settings_given(settings, **options),
             backend,
             outputs=None if outputs is None else [Path(output) for output in outputs],
             name=name,

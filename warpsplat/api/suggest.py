@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from warpsplat.api.run import Callback, Watch, backend_on
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import Settings
+from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.suggest import Suggestion, suggest_curves
+from warpsplat.run.typed import Options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
+@takes(Options)
 def suggest(
     image: ImageSource,
     *,
@@ -20,6 +27,7 @@ def suggest(
     callback: Callback | None = None,
     stop: Callable[[], bool] | None = None,
     name: str | None = None,
+    **options: Unpack[Options],
 ) -> Suggestion | None:
     """How many shapes an image is worth: where its quality against shapes, and against bytes, has its knee.
 
@@ -28,13 +36,15 @@ def suggest(
 
     Args:
         image: as for ``vectorize``.
-        settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
+        settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal; in
+            place of ``options``.
         importance: as for ``vectorize``, as is all that follows.
         device: see there.
         threads: see there.
         callback: see there.
         stop: see there.
         name: see there.
+        options: see there.
 
     Returns:
         the number, the reason, and what it and others are expected to give at the default effort; None where
@@ -48,7 +58,7 @@ def suggest(
     with backend_on(device, threads) as backend:
         return suggest_curves(
             image,
-            settings or make_settings(),
+            settings_given(settings, **options),
             backend,
             name=name,
             importance=importance,

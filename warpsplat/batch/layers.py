@@ -17,8 +17,7 @@ import yaml
 from warpsplat.batch.file import BatchFile, plain
 from warpsplat.errors import UsageError, cut, shown
 from warpsplat.run.names import Place
-from warpsplat.run.options import BY_NAME, KINDS, settings_from
-from warpsplat.run.research import NESTED, RESEARCH_KEYS
+from warpsplat.run.options import BY_NAME, KINDS, NESTED, RESEARCH_KEYS, settings_from
 
 TEXT_KEYS = ("output", "device", "importance")
 KEYS = (*BY_NAME, *TEXT_KEYS, *RESEARCH_KEYS, *NESTED)

@@ -37,8 +37,7 @@ from warpsplat.files.inputs import STANDARD
 from warpsplat.files.remote import is_remote, is_url, remote
 from warpsplat.fit.settings import Settings
 from warpsplat.run.names import Found, Place, Wanted, check_outputs, fields_of, name_results, root_of
-from warpsplat.run.options import KINDS, settings_from
-from warpsplat.run.research import NESTED
+from warpsplat.run.options import NESTED, settings_from
 
 BATCH_ENDINGS = (".yaml", ".yml")
 """Of names of batch files."""
@@ -162,10 +161,8 @@ def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Ite
         options = {
             key.replace("-", "_"): value
             for key, value in given.items()
-            if key not in KINDS and key not in ("output", "importance", "device", PRESET)
+            if key not in ("output", "importance", "device", PRESET)
         }
-        for kind in given.keys() & KINDS.keys():
-            options["kind"] = KINDS[kind]
         try:
             settings = settings_from(options)
         except UsageError as error:  # values that do not go together

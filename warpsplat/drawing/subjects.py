@@ -43,7 +43,7 @@ def decided(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
     if settings.subject != "auto":
         return settings, ""
     # Of a size, drawings know as well: with fewer regions.
-    fitted = replace(settings, max_bytes=None).fitted_options()
+    fitted = settings.unsuited("drawing")
     guess = guess_subject(target) if fitted in ([], ["mixed"]) else None
     if guess is None or (fitted and guess.subject != "line"):
         return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"

@@ -1,361 +1,26 @@
-"""Settings of a run: the one home of every default, checked when made."""
+"""Settings of a run: every option with its default, range and words, what contradicts what, and presets."""
 
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
-import math
 import re
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal, get_args
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
+from warpsplat.fit.options import Option, nearest, option, options_of, research
 from warpsplat.fit.texts import parse_bytes, parse_duration, parse_levels, parse_palette
 from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
-Renderer = str
 Painting = Literal["flat", "linear", "radial", "auto"]
-
-
-FRACTION = (0.0, 1.0)
-WEIGHT = (0.0, 1e6)
-RANGES: dict[str, tuple[float, float]] = {
-    **dict.fromkeys(("coarse", "final_rate", "texture", "opacity"), FRACTION),
-    **dict.fromkeys(("ssim", "xing", "bending", "level_weight"), WEIGHT),
-    **dict.fromkeys(("fold_start", "fold_end"), (1e-6, 1e6)),
-    "softness": (0.0, 100.0),
-    "gaussian_density": (0.05, 20.0),
-}
-"""Least and largest values of the settings that are numbers."""
-DENSITY_RANGES: dict[str, tuple[float, float]] = {
-    **dict.fromkeys(("grown", "thin", "stop", "opacity_start", "opacity_end", "replace"), FRACTION),
-    **dict.fromkeys(("duplicate_color", "duplicate_overlap"), (0.0, 2.0)),
-    "start": (1e-3, 1.0),
-    "surplus": (1.0, 10.0),
-    "mean_points": (3.0, 100.0),
-    "area": (0.0, 1e9),
-}
-
-
-def check_whole(name: str, value: object, low: int, high: int) -> None:
-    """Whether a setting is a whole number in its range.
-
-    Raises:
-        UsageError: it is not.
-    """
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise UsageError(f"{name} must be a whole number from {low} to {high}, not {shown(value)}")
-
-
-def check_number(name: str, value: object, low: float, high: float) -> None:
-    """Whether a setting is a number in its range.
-
-    Raises:
-        UsageError: it is not.
-    """
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise UsageError(f"{name} must be a number from {low:g} to {high:g}, not {shown(value)}")
-
-
-def default_rates() -> dict[str, float]:
-    """Learning rates by attribute, in the units of the table (``ATTRIBUTES``)."""
-    return {attribute.name: attribute.rate for attribute in ATTRIBUTES}
-
-
-@dataclass(frozen=True)
-class Density:
-    """Pruning and densification (paper section 3.4), and growth from few shapes to all."""
-
-    start: float = 1 / 3
-    """Fraction of the shapes at the start: the first ones settle as large ones."""
-    grown: float = 0.5
-    """Fraction of the run at which all shapes are there; until then their number grows geometrically."""
-    surplus: float = 1.5
-    """Shapes at the most, over those that are left in the end."""
-    thin: float = 0.65
-    """Fraction of the run from which on the surplus is removed, until ``stop``."""
-    mean_points: float = 10.4
-    """Points that splines have in the mean in the end: those that their outlines need least are removed."""
-    interval: int = 25
-    """Steps between two turns."""
-    stop: float = 0.85
-    """Fraction of the run after which the set of shapes stays as it is."""
-    opacity_start: float = 0.2
-    """Prune below this opacity at the start; the threshold falls linearly to ``opacity_end`` at ``stop``."""
-    opacity_end: float = 0.05
-    area: float = 6.0
-    """Prune below this area [px of the canvas, squared]."""
-    duplicate_color: float = 0.03
-    """Two shapes are alike below this distance of colours ..."""
-    duplicate_overlap: float = 0.9
-    """... and above this overlap (intersection over union) of their boxes."""
-    replace: float = 0.1
-    """Replace at least this fraction of the shapes each turn: those without which the error grows least."""
-
-    def __post_init__(self) -> None:
-        """Check ranges.
-
-        Raises:
-            UsageError: a value is out of its range.
-        """
-        check_whole("density interval", self.interval, 0, 1_000_000)
-        for name, (low, high) in DENSITY_RANGES.items():
-            check_number(f"density {name.replace('_', '-')}", getattr(self, name), low, high)
-
-
-@dataclass(frozen=True)
-class Settings:
-    """All that decides the result, besides the image."""
-
-    subject: Subject = "auto"
-    """What the image shows: ``photo`` is fitted, the others are traced (``drawing.subjects``)."""
-    kind: Kind = Kind.FILL
-    """Of new shapes."""
-    mixed: bool = False
-    """Whether new shapes are strokes where these remove more error than fills: where it is a bar."""
-    basis: Basis = Basis.SPLINE
-    """Of new shapes; splats need cubics."""
-    spline_points: int = 12
-    """Control points of a new spline."""
-    curves: int = 512
-    simplify: bool = False
-    """Whether an image that is simple gets fewer shapes (``place.simple_curves``)."""
-    iterations: int = 1000
-    coarse: float = 0.82
-    """Fraction of the iterations on a reduced image."""
-    coarse_pixels: int = 100_000
-    """Size of that image [pixels]; a smaller image is not reduced."""
-    fine_pixels: int = 1_600_000
-    """Largest size of the image that the last iterations see [pixels]."""
-    seed: int = 0
-    opacity: float = 0.98
-    """Of a new shape: it hides what it should replace, and may still become translucent."""
-    chain_cubics: int = 2
-    """Cubics in each of the two chains of a fill."""
-    renderer: Renderer = "exact"
-    """Model of coverage in training: that of the exported paths, the paper's Gaussians placed so that they
-    look like the paths, or the paper's own soft ones."""
-    paint: Painting = "flat"
-    """Of each shape: a colour, a gradient of one kind, or a gradient where it is worth its bytes."""
-    softness: float = 0.6
-    """Standard deviation that soft Gaussians have at least [px of the canvas]."""
-    gaussian_density: float = 0.5
-    """Soft Gaussians along and across a shape over their usual number."""
-    order: Order = "age"
-    """Newest in front, or smallest in front as in the paper."""
-    ssim: float = 0.0
-    """Weight of 1 - SSIM of small windows beside the mean squared error. It raises the SSIM, and lowers PSNR
-    and SSIMULACRA2."""
-    texture: float = 0.1
-    """Power of the local variance by which the error of a pixel counts less: what is busy hides errors. 0.3
-    raises SSIMULACRA2 by some more points and lowers PSNR (docs/experiments.md)."""
-    xing: float = 0.0
-    """Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here."""
-    bending: float = 5e-4
-    """Weight of the bending of the cubics [squared error of a pixel, summed over channels, per pixel]: burrs
-    and loops that do not lower the error straighten."""
-    fold_start: float = 0.2
-    """Weight of the fold loss (the area where a fill's strip folds over itself) at the start; it
-    grows geometrically: folds are a way round obstacles at first and a fault in the file at the end."""
-    fold_end: float = 3.0
-    through_scales: bool = True
-    """Whether gradients flow through the Gaussians' scales and angles."""
-    viewer: bool = True
-    """Whether the last steps take what a viewer shows, its rounding included, for the render."""
-    background: str = "auto"
-    """``auto``: that of the image, transparent where it has opacity; ``none``: transparent in any case; or a
-    colour, ``#rrggbb``, that shows through as well."""
-    title: str = ""
-    """Of the picture, in the file; empty: none."""
-    size: str = ""
-    """How large a sheet the picture fills, as ``200x150mm``; empty: its own size."""
-    page: str = ""
-    """Format of the sheet in whose middle the picture lies, as ``a4``; empty: none."""
-    units: str = ""
-    """In which the file says its size; empty: pixels, millimetres of a sheet."""
-    ids: bool = False
-    """Whether paths have identifiers, by their colours, and those of one colour groups, in the file: they are
-    brought together where nothing lies between."""
-    minify: bool = False
-    """Whether the file has neither line breaks nor the mark that it was written here."""
-    precision: int | None = None
-    """Most decimals of a pixel that coordinates have in the file; None: as many as are needed to lose little
-    (``fit.rounding``)."""
-    target_psnr: float | None = None
-    """The smallest file that has this PSNR, as a viewer shows it [dB]; ``curves`` are the most that it may
-    have, unless ``simplify``."""
-    time_budget: float | None = None
-    """Size the run to end within this time [s], start of the program not included."""
-    max_bytes: int | None = None
-    """The best file that has no more [bytes]; ``curves`` as for ``target_psnr``."""
-    max_memory: int | None = None
-    """Memory that the run may take [bytes]: a larger image is worked on at a smaller size. None: what the
-    machine has (``run.memory``)."""
-    colors: int | None = None
-    """Most different colours that the file may have; its fills are opaque then."""
-    palette: tuple[str, ...] = ()
-    """The only colours that the file may have, ``#rrggbb``; its fills are opaque then."""
-    opaque: bool = False
-    """Whether no shape is translucent."""
-    tidy: bool = True
-    """Whether drawings lose nodes that are worth less than their bytes, which takes most of their time."""
-    levels: tuple[int, ...] = ()
-    """Numbers of shapes, ascending: the first so many are a picture of their own (``fit.layered``)."""
-    level_weight: float = 0.3
-    """What the squared error of each earlier level's picture counts beside that of the whole."""
-    rates: dict[str, float] = field(default_factory=default_rates)
-    """Adam's learning rates at the start, by attribute; they decay along a cosine."""
-    final_rate: float = 0.2
-    """Fraction of each rate that is left at the end."""
-    density: Density = field(default_factory=Density)
-
-    def __post_init__(self) -> None:
-        """Check ranges.
-
-        Raises:
-            UsageError: a value is out of its range.
-        """
-        checks = (
-            ("curves", self.curves, 1, 100_000),
-            ("iterations", self.iterations, 1, 1_000_000),
-            ("precision", 0 if self.precision is None else self.precision, 0, 6),
-            ("seed", self.seed, 0, 2**32 - 1),
-            ("chain-cubics", self.chain_cubics, 1, 8),
-            ("spline-points", self.spline_points, 3, 64),
-            ("coarse-pixels", self.coarse_pixels, 1, 10**9),
-            ("fine-pixels", self.fine_pixels, 1, 10**9),
-        )
-        for name, value, low, high in checks:
-            check_whole(name, value, low, high)
-        for name, (least, most) in RANGES.items():
-            check_number(name.replace("_", "-"), getattr(self, name), least, most)
-        for name, rate in self.rates.items():
-            check_number(f"rates {name}", rate, 0.0, 1e6)
-        goals = (
-            ("target-psnr", self.target_psnr),
-            ("time-budget", self.time_budget),
-            ("max-bytes", self.max_bytes),
-            ("max-memory", self.max_memory),
-        )
-        for name, goal in goals:
-            if goal is not None and (
-                isinstance(goal, bool) or not isinstance(goal, (int, float)) or not 0 < goal < math.inf
-            ):
-                raise UsageError(f"{name} must be a positive number, not {shown(goal)}")
-        for name, value, kind in (("kind", self.kind, Kind), ("basis", self.basis, Basis)):
-            if not isinstance(value, kind):
-                raise UsageError(f"{name} must be a {kind.__name__}, not {shown(value)}")
-        if not isinstance(self.title, str) or len(self.title) > MAX_TITLE:
-            raise UsageError(f"title must be a text of at most {MAX_TITLE} characters")
-        switches = ("through_scales", "viewer", "mixed", "ids", "minify", "opaque")
-        for name, given in ((name.replace("_", "-"), getattr(self, name)) for name in switches):
-            if not isinstance(given, bool):
-                raise UsageError(f"{name} must be true or false, not {shown(given)}")
-        self._check_levels()
-        if self.colors is not None:
-            check_whole("colors", self.colors, 1, MOST_COLORS)
-        if len(self.palette) > MOST_COLORS:
-            raise UsageError(f"palette has {len(self.palette)} colours, more than {MOST_COLORS}")
-        fitted = self.fitted_options()
-        if self.subject == "line":
-            fitted = [name for name in fitted if name != "mixed"]
-        if self.subject not in {"auto", "photo"} and fitted:
-            raise UsageError(f"subject {self.subject} and {fitted[0]} do not go together")
-        choices = (
-            ("subject", self.subject, get_args(Subject)),
-            ("order", self.order, get_args(Order)),
-            ("renderer", self.renderer, renderer_names()),
-            ("paint", self.paint, get_args(Painting)),
-        )
-        if self.background not in {"auto", "none"} and not COLOR.fullmatch(self.background):
-            given = shown(self.background)
-            raise UsageError(f"background must be auto, none or a colour as #ffffff, not {given}")
-        if self.mixed and self.kind != Kind.FILL:
-            raise UsageError("mixed and open do not go together")
-        for name, choice, allowed in choices:
-            if choice not in allowed:
-                raise UsageError(f"{name} must be one of {', '.join(allowed)}, not {shown(choice)}")
-
-    @property
-    def is_limited(self) -> bool:
-        """Whether the file may have some colours only."""
-        return self.colors is not None or bool(self.palette)
-
-    def fitted_options(self) -> list[str]:
-        """Options that say something of fitted shapes only, as they are given."""
-        given = {
-            "open": self.kind == Kind.STROKE,
-            "mixed": self.mixed,
-            "levels": bool(self.levels),
-            f"paint {self.paint}": self.paint != "flat",
-            f"renderer {self.renderer}": self.renderer != "exact",
-            "target-psnr": self.target_psnr is not None,
-            "max-bytes": self.max_bytes is not None and self.subject != "drawing",
-        }
-        return [name for name, is_given in given.items() if is_given]
-
-    def _check_levels(self) -> None:
-        levels = self.levels
-        for count in levels:
-            check_whole("levels", count, 1, 100_000)
-        if any(later <= earlier for earlier, later in itertools.pairwise(levels)):
-            raise UsageError(f"levels must ascend, not {','.join(map(str, levels))}")
-        if levels and levels[-1] != self.curves:
-            raise UsageError(f"curves {self.curves} and levels, whose last is {levels[-1]}, differ")
-        goals = {
-            "target-psnr": self.target_psnr,
-            "max-bytes": self.max_bytes,
-            "time-budget": self.time_budget,
-        }
-        for name, goal in goals.items():
-            if levels and goal is not None:
-                raise UsageError(f"levels and {name} do not go together")
-
-    def fingerprint(self) -> str:
-        """A short hash of all that decides the result."""
-        values = asdict(self)
-        if self.max_memory is None:  # which few runs depend on
-            del values["max_memory"]
-        text = json.dumps(values, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-MOST_COLORS = 256
-"""Of a palette."""
-
-MAX_TITLE = 1000
-"""Characters: a title is a line."""
-
-COLOR = re.compile(r"#[0-9a-fA-F]{6}")
-
-
-def solid_color(background: str) -> FloatArray | None:
-    """The colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if it names none."""
-    if not COLOR.fullmatch(background):
-        return None
-    return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
-
-
-LEVEL_FACTOR = 4
-"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
-
-LEAST_LEVEL = 8
-"""Shapes of the first of these levels, at the least."""
-
-
-def levels_of(curves: int) -> tuple[int, ...]:
-    """Up to three levels, the last with all the ``curves``."""
-    levels = [curves // LEVEL_FACTOR**2, curves // LEVEL_FACTOR, curves]
-    return tuple(count for count in levels if count >= LEAST_LEVEL or count == curves)
-
 
 PRESETS: dict[Quality, dict[str, Any]] = {
     "draft": {
@@ -368,72 +33,482 @@ PRESETS: dict[Quality, dict[str, Any]] = {
     "balanced": {},
     "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
 }
-"""What each preset changes in the defaults."""
-
-FILL_POINT_RATE = 6.0
-"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
+"""What each quality changes in the defaults."""
 
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 DEFAULT_QUALITY: Quality = "balanced"
 
+COLOR = "#[0-9a-fA-F]{6}"
 
-def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Settings:
-    """The preset ``quality`` with ``overrides`` on top; overrides that are None are left out.
+MOST_COLORS = 256
 
-    Without ``curves`` among them, a simple image gets fewer than the default (``Settings.simplify``).
+FRACTION = (0.0, 1.0)
+
+WEIGHT = (0.0, 1e6)
+
+FITTED: tuple[Subject, ...] = ("auto", "photo")
+"""Subjects of options that only fitted shapes have a use for."""
+
+
+def default_rates() -> dict[str, float]:
+    """Return the learning rates by attribute, in the units of the table (``ATTRIBUTES``)."""
+    return {attribute.name: attribute.rate for attribute in ATTRIBUTES}
+
+
+def parse_rates(value: object) -> object:
+    """Return some of the rates with underscores in their names; what is no mapping is left to be checked.
 
     Raises:
-        UsageError: an unknown name or a value out of range.
+        UsageError: an unknown name.
     """
-    if quality not in PRESETS:
-        raise UsageError(f"quality must be one of {', '.join(PRESETS)}, not {shown(quality)}")
-    known = {f.name for f in fields(Settings)}
-    given = {name: value for name, value in overrides.items() if value is not None}
-    layered = given.pop("layered", False)
-    if not isinstance(layered, bool):
-        raise UsageError(f"layered must be true or false, not {shown(layered)}")
-    if "levels" in given or layered:
-        curves = given.get("curves", Settings.curves)
-        given["levels"] = parse_levels(given["levels"]) if "levels" in given else levels_of(curves)
-        given.setdefault("curves", given["levels"][-1])
-    for name in given:
+    return _known("rates", value, default_rates()) if isinstance(value, Mapping) else value
+
+
+def parse_density(value: object) -> object:
+    """Return the default density with the values of a mapping; anything else is left to be checked.
+
+    Raises:
+        UsageError: an unknown name, or a value that is out of range.
+    """
+    known = [each.field for each in options_of(Density)]
+    return Density(**_known("density", value, known)) if isinstance(value, Mapping) else value
+
+
+def parse_basis(value: object) -> object:
+    """Return the basis of a name; anything else is left to be checked."""
+    return Basis.__members__.get(value.upper(), value) if isinstance(value, str) else value
+
+
+def _known(name: str, given: Mapping[Any, Any], known: Iterable[str]) -> dict[str, Any]:
+    """Return ``given`` with underscores in its keys.
+
+    Raises:
+        UsageError: one is not ``known``.
+    """
+    values = {str(key).replace("-", "_"): value for key, value in given.items()}
+    for key in values:
+        if key not in known:
+            raise UsageError(f"unknown setting {shown(key)} in {name}{nearest(key, known)}")
+    return values
+
+
+def check_fields(settings: Any, prefix: str = "") -> None:
+    """Check types and ranges; messages name ``prefix`` and the option.
+
+    Raises:
+        UsageError: a value is not accepted.
+    """
+    for each in options_of(settings.__class__):
+        each.check(getattr(settings, each.field), prefix)
+
+
+@dataclass(frozen=True)
+class Density:
+    """Pruning and densification (paper section 3.4), and growth from few shapes to all."""
+
+    start: float = research(
+        1 / 3, "Fraction of the shapes at the start: the first settle as large ones.", (1e-3, 1.0)
+    )
+    grown: float = research(
+        0.5,
+        "Fraction of the run until which the number of shapes grows, geometrically, to all of them.",
+        FRACTION,
+    )
+    surplus: float = research(1.5, "Most shapes at any time, over those that are left in the end.", (1, 10))
+    thin: float = research(
+        0.65, "Fraction of the run from which on the surplus is removed, until `stop`.", FRACTION
+    )
+    mean_points: float = research(
+        10.4, "Mean number of points of splines in the end: those of least use are removed.", (3, 100)
+    )
+    interval: int = research(25, "Steps between two densification steps; 0: none.", (0, 1_000_000))
+    stop: float = research(
+        0.85, "Fraction of the run after which the set of shapes stays as it is.", FRACTION
+    )
+    opacity_start: float = research(
+        0.2, "Prune below this opacity at the start; it falls linearly to `opacity-end` at `stop`.", FRACTION
+    )
+    opacity_end: float = research(0.05, "Prune below this opacity at `stop`.", FRACTION)
+    area: float = research(6.0, "Prune below this area [px² of the canvas].", (0, 1e9))
+    duplicate_color: float = research(
+        0.03, "Two shapes are alike below this distance of colours, and above `duplicate-overlap`.", (0, 2)
+    )
+    duplicate_overlap: float = research(
+        0.9, "Overlap (intersection over union) of the boxes of two shapes that are alike.", (0, 2)
+    )
+    replace: float = research(
+        0.1, "Replace at least this fraction in each densification step: the shapes of least use.", FRACTION
+    )
+
+    def __post_init__(self) -> None:
+        """Check ranges.
+
+        Raises:
+            UsageError: a value is out of its range.
+        """
+        check_fields(self, "density ")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All that decides the result, besides the image. Fields without help follow from other options."""
+
+    curves: int = option(
+        512,
+        "Number of shapes; with a goal the most.",
+        limits=(1, 100_000),
+        metavar="N",
+        shown_default="512; fewer for a simple image",
+        details="Several (`50,200,1000`) make a file each. With `--target-psnr` or `--max-bytes` there are at"
+        " most this many (by default, 20,000). If it is not given, a drawing in a few flat colours gets eight"
+        " shapes for each region of one colour (at least 32), and a tiny image at most one for eight pixels.",
+    )
+    subject: Subject = option(
+        "auto",
+        "What the image shows: to a photo shapes are fitted, the others are traced.",
+        details="`photo`: translucent shapes are fitted. `drawing` (logos, icons, emoji, flags): one opaque"
+        " path a region, its outline fitted. `line` (line art, scanned signatures): opaque strokes along the"
+        " middle of the ink, a group for each pen, ordered to minimise pen-up travel. `pixel` (pixel art, QR"
+        " codes): cell by cell, without loss. `auto` detects the subject and reports it.",
+    )
+    kind: Kind = option(
+        Kind.FILL,
+        subjects=FITTED,
+        shorthands=(
+            Option(name="closed", type=bool, help="Filled shapes.", shown_default="yes", value=Kind.FILL),
+            Option(name="open", type=bool, help="Strokes.", value=Kind.STROKE),
+        ),
+    )
+    mixed: bool = option(
+        False,
+        "Fills, and strokes where they remove more error; of line art, fills where it is filled.",
+        subjects=(*FITTED, "line"),
+        details="A stroke is taken where the error is elongated.",
+    )
+    iterations: int = option(
+        1000,
+        "Steps; overrides the effort's number.",
+        limits=(1, 1_000_000),
+        metavar="N",
+        shown_default="",
+        shorthands=(
+            Option(
+                name="quality",
+                help="Effort: how many steps.",
+                default=DEFAULT_QUALITY,
+                choices=QUALITIES,
+                details="The draft of a drawing keeps needless nodes, in as little as a third of the time.",
+            ),
+        ),
+    )
+    renderer: str = option(
+        "exact",
+        "How the fit sees shapes: as viewers do, as Gaussians much like that, or as the paper's soft ones.",
+        subjects=FITTED,
+        choices=renderer_names(),
+        details="`exact`: what the file shows. `splat`: the paper's Gaussians, placed so that they look like"
+        " the file. `gaussian`: [the paper's own](paper.md), whose render is better than the file.",
+    )
+    paint: Painting = option(
+        "flat",
+        "A colour for each shape, a gradient for each, or whichever is worth its bytes.",
+        subjects=FITTED,
+        details="`linear`, `radial`: a gradient of two stops. `auto`: a gradient of either kind where it"
+        " saves more than its bytes, as on skies, studio backgrounds and shaded drawings.",
+    )
+    levels: tuple[int, ...] = option(
+        (),
+        "Numbers of shapes up to the end of each group of --layered, as 64,256,1024.",
+        subjects=FITTED,
+        metavar="N,N",
+        parse=parse_levels,
+        details="The last is the number of all; by default a sixteenth, a quarter and all of the shapes.",
+        shorthands=(
+            Option(
+                name="layered",
+                type=bool,
+                help="Groups from coarse to fine, each with those before it a picture of its own.",
+                details="Hiding groups leaves a simpler picture. It takes about twice the time.",
+            ),
+        ),
+    )
+    colors: int | None = option(
+        None,
+        "No more than N colours; the fills are opaque then.",
+        limits=(1, MOST_COLORS),
+        metavar="N",
+        details="They represent its pixels best; each shape has the one that suits what is seen of it. In a"
+        " drawing, what is less than half opaque is left out.",
+    )
+    palette: tuple[str, ...] = option(
+        (), "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS", parse=parse_palette
+    )
+    opaque: bool = option(False, "No translucent shapes.")
+    target_psnr: float | None = option(
+        None,
+        "The smallest file with a PSNR of at least DB.",
+        subjects=FITTED,
+        metavar="DB",
+        details="Measured on the file as a viewer shows it; exit code 6 if it is out of reach.",
+    )
+    time_budget: float | None = option(
+        None,
+        "As many steps as end within 60s, 2m ...",
+        metavar="TIME",
+        parse=parse_duration,
+        refine=True,
+        details="The start of the program is not included. Exit code 6 if it takes longer.",
+    )
+    max_bytes: int | None = option(
+        None,
+        "The best file of no more than 100KB, 1MB ...",
+        subjects=(*FITTED, "drawing"),
+        metavar="SIZE",
+        parse=parse_bytes,
+        details="With `--target-psnr`, the most that the file may take. A drawing gets simpler outlines, or"
+        " fewer regions where that is seen less.",
+    )
+    max_memory: int | None = option(
+        None,
+        "Memory to stay below, as 4GB: a larger image is worked on at a smaller size.",
+        metavar="SIZE",
+        parse=parse_bytes,
+        details="A message says so; the file has the full size. By default nine tenths of the memory of the"
+        " machine or its container. Images may have up to 120 million pixels, which take 2.4 GB. `refine`"
+        " refuses an image that takes more.",
+    )
+    seed: int = option(0, "Random seed.", limits=(0, 2**32 - 1), metavar="N")
+    background: str = option(
+        "auto",
+        "auto: transparent where the image is; none; or a colour (#rrggbb).",
+        pattern=f"auto|none|{COLOR}",
+        wanted="auto, none or a colour as #ffffff",
+        metavar="COLOR",
+        refine=True,
+        details="With `auto`, an image with opacity has no background, any other one that of its colour. A"
+        " colour lies under the image as well.",
+    )
+    title: str = option(
+        "", "Title of the picture, in the file.", limits=(0, 1000), metavar="TEXT", refine=True
+    )
+    size: str = option(
+        "",
+        "For plotters: size that the picture fills, as 200x150mm.",
+        metavar="WxH",
+        details="Or in `cm`, `in`, `pt`, `px`; proportions are kept. Figures stay those of the image.",
+    )
+    page: str = option(
+        "",
+        "For plotters: sheet that it fills but for margins: a3, a4, a5, letter.",
+        metavar="NAME",
+        details="Upright or on its side, as suits it; the margins are 10 mm.",
+    )
+    units: str = option(
+        "",
+        "Units in which the file says its size: mm, cm, in, pt, px.",
+        metavar="UNIT",
+        shown_default="",
+        details="By default pixels, or millimetres of a sheet. Without a sheet, an inch is 96 pixels.",
+    )
+    ids: bool = option(
+        False,
+        "Name paths by their colours, and group neighbours of one, for editors.",
+        refine=True,
+        details="Names are `navy`, `navy-2` ...; those of one colour are brought together in a group"
+        " `navy-group` where nothing lies between.",
+    )
+    minify: bool = option(
+        False,
+        "Smallest text: no line breaks, no mark that warpsplat wrote it.",
+        refine=True,
+        details="Then only `--overwrite` replaces it, or the batch whose manifest lists it.",
+    )
+    precision: int | None = option(
+        None,
+        "Most decimals of a pixel in coordinates.",
+        limits=(0, 6),
+        metavar="N",
+        shown_default="auto",
+        refine=True,
+        details="`auto`: as many as are needed to lose little.",
+    )
+    simplify: bool = option(False)
+    basis: Basis = research(
+        Basis.SPLINE,
+        "Basis of new shapes; Gaussians need `cubic`.",
+        parse=parse_basis,
+        wanted="one of cubic, spline",
+        shown_default="spline",
+    )
+    spline_points: int = research(12, "Control points of a new spline.", (3, 64))
+    chain_cubics: int = research(2, "Cubics in each of the two chains of a fill.", (1, 8))
+    coarse: float = research(0.82, "Fraction of the iterations on a reduced image.", FRACTION)
+    coarse_pixels: int = research(
+        100_000, "Size of that image [pixels]; a smaller image is not reduced.", (1, 10**9)
+    )
+    fine_pixels: int = research(
+        1_600_000, "Largest size of the image in the last iterations [pixels].", (1, 10**9)
+    )
+    opacity: float = research(
+        0.98, "Opacity of a new shape: it hides what it replaces, and may still become translucent.", FRACTION
+    )
+    softness: float = research(
+        0.6, "Least standard deviation of soft Gaussians [px of the canvas].", (0, 100)
+    )
+    gaussian_density: float = research(
+        0.5, "Soft Gaussians along and across a shape, over their usual number.", (0.05, 20)
+    )
+    order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
+    ssim: float = research(
+        0.0, "Weight of 1 - SSIM of small windows: raises SSIM, lowers PSNR and SSIMULACRA2.", WEIGHT
+    )
+    texture: float = research(
+        0.1,
+        "Power of the local variance by which errors count less, since textured areas mask them. 0.3 raises"
+        " SSIMULACRA2 by some points and lowers PSNR (docs/experiments.md).",
+        FRACTION,
+    )
+    xing: float = research(
+        0.0, "Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here.", WEIGHT
+    )
+    bending: float = research(
+        5e-4,
+        "Weight of the bending of cubics [squared error of a pixel, summed over channels, per pixel]: burrs"
+        " and loops that do not lower the error straighten.",
+        WEIGHT,
+    )
+    fold_start: float = research(
+        0.2,
+        "Weight of the fold loss (the area where a fill's strip folds over itself) at the start. It grows"
+        " geometrically: at first folds are a way round obstacles, in the file they are a fault.",
+        (1e-6, 1e6),
+    )
+    fold_end: float = research(3.0, "Weight of the fold loss at the end.", (1e-6, 1e6))
+    through_scales: bool = research(True, "Whether gradients flow through the Gaussians' scales and angles.")
+    viewer: bool = research(
+        True, "Whether the last steps train on what a viewer shows, its rounding included."
+    )
+    tidy: bool = research(
+        True, "Whether drawings lose nodes that are worth less than their bytes: most of their time."
+    )
+    level_weight: float = research(
+        0.3, "Weight of the squared error of each earlier level's picture beside that of the whole.", WEIGHT
+    )
+    rates: dict[str, float] = research(
+        default_rates,
+        "Adam's learning rates at the start, by attribute; they decay along a cosine.",
+        WEIGHT,
+        parse=parse_rates,
+    )
+    final_rate: float = research(0.2, "Fraction of each rate that is left at the end.", FRACTION)
+    density: Density = research(
+        Density, "Pruning and densification.", parse=parse_density, wanted="a mapping"
+    )
+
+    def __post_init__(self) -> None:
+        """Check types, ranges and contradictions.
+
+        Raises:
+            UsageError: a value is out of its range, or two contradict each other.
+        """
+        check_fields(self)
+        for is_broken, message in RULES:
+            if is_broken(self):
+                raise UsageError(message.format(self))
+        if unsuited := self.unsuited(self.subject):
+            raise UsageError(f"subject {self.subject} and {unsuited[0]} do not go together")
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether the file may have some colours only."""
+        return self.colors is not None or bool(self.palette)
+
+    @property
+    def counting(self) -> list[str]:
+        """Names of the options given that decide the number of shapes, besides ``curves``."""
+        given = (("levels", self.levels), ("target-psnr", self.target_psnr), ("max-bytes", self.max_bytes))
+        return [name for name, value in (*given, ("time-budget", self.time_budget)) if value]
+
+    def unsuited(self, subject: Subject) -> list[str]:
+        """Return the options given that a subject has no use for, as users name them."""
+        names = []
+        for each in options_of(Settings):
+            value = getattr(self, each.field)
+            if each.subjects and subject not in each.subjects and value != each.default:
+                of_value = [shorthand.name for shorthand in each.shorthands if shorthand.value == value]
+                names += of_value or [f"{each.name} {value}" if each.choices else each.name]
+        return names
+
+    def fingerprint(self) -> str:
+        """Return a short hash of all that decides the result."""
+        values = asdict(self)
+        if self.max_memory is None:  # which few runs depend on
+            del values["max_memory"]
+        text = json.dumps(values, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
+    (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open do not go together"),
+    (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and a palette do not go together"),
+    (lambda s: len(s.palette) > MOST_COLORS, f"palette has more than {MOST_COLORS} colours"),
+    (
+        lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),
+        "levels must be numbers of shapes that ascend, not {0.levels}",
+    ),
+    (
+        lambda s: s.levels and s.levels[-1] != s.curves,
+        "curves {0.curves} and the last of the levels {0.levels} differ",
+    ),
+    (lambda s: s.levels and s.counting[1:], "levels and {0.counting[1]} do not go together"),
+    (lambda s: s.size and s.page, "size and page do not go together"),
+)
+"""Contradictions: whether settings have one, and its message, in which ``{0}`` stands for them. Those with a
+subject follow from ``Option.subjects``, those with a renderer from ``FitRenderer.check``."""
+
+
+def solid_color(background: str) -> FloatArray | None:
+    """The colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if it names none."""
+    if not re.fullmatch(COLOR, background):
+        return None
+    return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
+
+
+LEVEL_FACTOR = 4
+"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
+
+LEAST_LEVEL = 8
+"""Shapes of the first of these levels, at the least."""
+
+
+def levels_of(curves: int) -> tuple[int, ...]:
+    """Return up to three levels, the last with all the ``curves``."""
+    levels = [curves // LEVEL_FACTOR**2, curves // LEVEL_FACTOR, curves]
+    return tuple(count for count in levels if count >= LEAST_LEVEL or count == curves)
+
+
+FILL_POINT_RATE = 6.0
+"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
+
+
+def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Settings:
+    """Return the preset ``quality`` with ``options`` on top; those that are None are left out.
+
+    Without ``curves`` among them, a simple image gets fewer than the default.
+
+    Raises:
+        UsageError: an unknown name, a value out of range, or options that contradict each other.
+    """
+    known = {each.keyword: each for made in options_of(Settings) for each in (made, *made.shorthands)}
+    given: dict[str, Any] = {}
+    for name, value in {"quality": quality, **options}.items():
+        if value is None:
+            continue
         if name not in known:
-            raise UsageError(f"unknown setting {shown(name)}")
-    if "time_budget" in given:
-        given["time_budget"] = parse_duration(given["time_budget"])
-    if "max_bytes" in given:
-        given["max_bytes"] = parse_bytes(given["max_bytes"])
-    if "max_memory" in given:
-        given["max_memory"] = parse_bytes(given["max_memory"])
-    if "palette" in given:
-        given["palette"] = parse_palette(given["palette"])
-    if given.get("paint", "flat") != "flat" and (given.get("colors") or given.get("palette")):
-        raise UsageError(f"paint {given['paint']} and a palette do not go together")
-    if given.get("colors") or given.get("palette"):
-        given["opaque"] = True
-    preset = Settings(simplify="curves" not in given, **PRESETS[quality])
-    if given.get("renderer", "exact") != "exact":
-        preset = load_renderer(given["renderer"]).preset(preset)
-    elif given.get("kind", Kind.FILL) == Kind.FILL:
-        preset = replace(preset, rates={**preset.rates, "points": FILL_POINT_RATE})
-    if given.get("opaque"):
-        preset = replace(preset, rates={**preset.rates, "opacities": 0.0})
-    if given.get("paint", "flat") != "flat":
-        # They have bytes for what colours and frames can say as well.
-        preset = replace(preset, rates={**preset.rates, "stop_opacities": 0.0, "stop_offsets": 0.0})
-    if "rates" in given:
-        given["rates"] = {**preset.rates, **_known("rates", given["rates"], tuple(preset.rates))}
-    if given.get("colors") or given.get("palette"):  # colours are chosen, not trained
-        given["rates"] = {**given.get("rates", preset.rates), "colors": 0.0}
-    if isinstance(given.get("density"), Mapping):
-        names = tuple(f.name for f in fields(Density))
-        given["density"] = replace(preset.density, **_known("density", given["density"], names))
-    if isinstance(given.get("basis"), str):
-        if given["basis"].upper() not in Basis.__members__:
-            choices = ", ".join(Basis.__members__).lower()
-            raise UsageError(f"basis must be one of {choices}, not {shown(given['basis'])}")
-        given["basis"] = Basis[given["basis"].upper()]
+            raise UsageError(f"unknown setting {shown(name)}{nearest(name, known)}")
+        given[name] = known[name].parsed(value)
+    preset = _preset(given)  # which changes them
     settings = replace(preset, **given)
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
@@ -444,14 +519,37 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **overrides: Any) -> Setti
     return settings
 
 
-def _known(name: str, given: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Any]:
-    """``given`` with underscores in its keys.
+def _preset(given: dict[str, Any]) -> Settings:
+    """Return the settings that the ``given`` ones imply, in which shorthands become values of fields.
 
     Raises:
-        UsageError: one is not ``known``.
+        UsageError: shorthands that contradict each other, or a value that is implied otherwise.
     """
-    values = {key.replace("-", "_"): value for key, value in given.items()}
-    for key in values:
-        if key not in known:
-            raise UsageError(f"unknown setting {shown(key)} in {name}")
-    return values
+    closed, is_open = given.pop("closed", None), given.pop("open", None)
+    if closed and is_open:
+        raise UsageError("closed and open do not go together")
+    if closed or is_open or closed is False:
+        given["kind"] = Kind.FILL if closed else Kind.STROKE
+    if given.pop("layered", False):
+        given.setdefault("levels", levels_of(given.get("curves", Settings.curves)))
+    if given.get("levels"):  # the last of them is the whole
+        given.setdefault("curves", given["levels"][-1])
+    quality = given.pop("quality", DEFAULT_QUALITY)
+    preset = Settings(simplify="curves" not in given, **PRESETS[quality])
+    rates = dict(preset.rates)
+    renderer = given.get("renderer", "exact")
+    if renderer != "exact":
+        preset = load_renderer(renderer).preset(preset)
+    elif given.get("kind", Kind.FILL) == Kind.FILL:
+        rates["points"] = FILL_POINT_RATE
+    is_limited = bool(given.get("colors") or given.get("palette"))
+    if is_limited:  # what lies below would make further colours
+        given["opaque"] = True
+    if given.get("opaque"):
+        rates["opacities"] = 0.0
+    if given.get("paint", "flat") != "flat":  # colours and frames can do the same for fewer bytes
+        rates |= {"stop_opacities": 0.0, "stop_offsets": 0.0}
+    rates |= given.pop("rates", {})
+    if is_limited:  # colours are chosen, not trained
+        rates["colors"] = 0.0
+    return replace(preset, rates=rates)

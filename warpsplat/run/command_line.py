@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 from warpsplat.errors import UsageError
@@ -48,12 +48,12 @@ def several_command(
 
 def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:
     """The line that makes ``output`` of ``svg`` and ``image``."""
-    names = ("iterations", "time_budget", "precision", "title", "ids", "minify", "background")
     default = make_settings(iterations=REFINE_ITERATIONS)
+    names = ("iterations", *(option.field for option in OPTIONS if option.refine))
     given = {
-        name: getattr(settings, name)
+        name: value
         for name in names
-        if getattr(settings, name) != getattr(default, name) and getattr(settings, name) is not None
+        if (value := getattr(settings, name)) is not None and value != getattr(default, name)
     }
     words = _words(DEFAULT_QUALITY, given)
     return shlex.join(["warpsplat", "refine", as_path(svg), as_path(image), *words, *further, "-o", output])
@@ -82,10 +82,8 @@ def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
     if settings.kind == Kind.STROKE:
         given["kind"] = Kind.STROKE
     implied = ("curves", "levels", "kind", "opaque", "renderer")
-    known = {field.name for field in fields(Settings)}
-    for option in OPTIONS:
-        name = option.setting
-        if name in known and name not in implied and getattr(settings, name) != getattr(default, name):
+    for name in (option.field for option in OPTIONS if option.keyword == option.field):
+        if name not in implied and getattr(settings, name) != getattr(default, name):
             given[name] = getattr(settings, name)
     if settings.opaque and not settings.is_limited:
         given["opaque"] = True
@@ -93,12 +91,9 @@ def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
 
 
 def _settings(quality: Quality, given: dict[str, Any]) -> Settings | None:
-    """What these make; None: they do not go together."""
-    values = dict(given)
-    if "palette" in values:
-        values["palette"] = ",".join(values["palette"])
+    """Return what these make; None if they contradict each other."""
     try:
-        return make_settings(quality, **values)
+        return make_settings(quality, **given)
     except UsageError:
         return None
 
@@ -107,16 +102,10 @@ def _words(quality: Quality, given: dict[str, Any]) -> Iterator[str]:
     if quality != DEFAULT_QUALITY:
         yield from ("--quality", quality)
     for option in OPTIONS:
-        value = given.get(option.setting)
-        if value is None or option.setting == "quality":
-            continue
-        if option.kind is not None:
-            if value == option.kind:
-                yield f"--{option.name}"
-        elif option.type is bool:
-            if value:
-                yield f"--{option.name}"
-        else:
+        value = given.get(option.keyword if option.value is None else option.field)
+        if option.type is bool and (value if option.value is None else value == option.value):
+            yield f"--{option.name}"
+        elif option.type is not bool and value is not None:
             text = _text(option.name, value)
             yield from (f"--{option.name}={text}",) if text.startswith("-") else (f"--{option.name}", text)
 

@@ -10,7 +10,8 @@ from warpsplat.files.image import ImageFacts, boxed
 from warpsplat.files.sources import ImageSource
 from warpsplat.files.whole import load_whole
 from warpsplat.fit.loop import Fit
-from warpsplat.fit.settings import RANGES, Settings, solid_color
+from warpsplat.fit.options import limits_of
+from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import Rows, Score, score_svg
 from warpsplat.rendering.room import in_words
 from warpsplat.run.memory import (
@@ -47,7 +48,9 @@ class Reduction:
 
     def settings(self, settings: Settings) -> Settings:
         """Those of the file: what is counted in pixels of the canvas grows as that does."""
-        return replace(settings, softness=min(settings.softness * self.factor, RANGES["softness"][1]))
+        return replace(
+            settings, softness=min(settings.softness * self.factor, limits_of(Settings, "softness")[1])
+        )
 
     def score(self, svg: str, target: FloatArray, stop: Callable[[], bool] | None) -> Score:
         """Of the file against the image itself, else against the smaller one (``target``)."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from warpsplat.fit.settings import Renderer, Subject
+from warpsplat.fit.settings import Subject
 from warpsplat.fit.work import Progress
 from warpsplat.metrics import Score
 from warpsplat.run.formats import write_named
@@ -43,7 +43,7 @@ class Result:
     seconds: float
     stopped: bool
     """Whether it was interrupted."""
-    renderer: Renderer = "exact"
+    renderer: str = "exact"
     """Of the training."""
     render_ssim: float | None = None
     """Of soft Gaussians' own render."""

@@ -36,15 +36,8 @@ def check_several(settings: Settings, numbers: Sequence[int]) -> None:
         replace(settings, curves=number, levels=())
         if numbers.count(number) > 1:
             raise UsageError(f"curves: {number} is there twice")
-    others = {
-        "levels": settings.levels,
-        "target-psnr": settings.target_psnr,
-        "max-bytes": settings.max_bytes,
-        "time-budget": settings.time_budget,
-    }
-    for name, value in others.items():
-        if value:
-            raise UsageError(f"several numbers of shapes and {name} do not go together")
+    if settings.counting:
+        raise UsageError(f"several numbers of shapes and {settings.counting[0]} do not go together")
 
 
 def vectorize_several(

@@ -92,18 +92,10 @@ def check_suggesting(settings: Settings) -> None:
     Raises:
         UsageError: the settings say how many shapes there are to be.
     """
-    others = {
-        "curves": not settings.simplify and not settings.levels,
-        "levels": settings.levels,
-        "target-psnr": settings.target_psnr,
-        "max-bytes": settings.max_bytes,
-        "time-budget": settings.time_budget,
-    }
-    for name, value in others.items():
-        if value:
-            raise UsageError(
-                f"suggest says how many shapes are worth it, and {name} as well: give one of them"
-            )
+    if others := settings.counting or ([] if settings.simplify else ["curves"]):
+        raise UsageError(
+            f"suggest says how many shapes are worth it, and {others[0]} as well: give one of them"
+        )
 
 
 def suggest_curves(

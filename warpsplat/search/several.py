@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from warpsplat.fit.costs import Course, score_cost
-from warpsplat.fit.settings import DENSITY_RANGES, Settings
+from warpsplat.fit.options import limits_of
+from warpsplat.fit.settings import Density, Settings
 from warpsplat.fit.state import Past
 from warpsplat.fit.work import Progress, Report
 from warpsplat.portable import elementary
@@ -131,5 +132,5 @@ def growing(settings: Settings, shapes: int, begin: int) -> Settings:
     left = 1 - begin / (density.grown * settings.iterations)
     share = elementary.power(shapes / (density.surplus * settings.curves), 1 / left)
     start = density.surplus * float(share)
-    low, high = DENSITY_RANGES["start"]
+    low, high = limits_of(Density, "start")
     return replace(settings, density=replace(density, start=min(max(start, low), high)))

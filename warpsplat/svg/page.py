@@ -106,11 +106,6 @@ def _checked(sheet: Sheet, name: str) -> Sheet:
 
 def check_placing(size: str, page: str, unit: str) -> None:
     """Raise ``UsageError`` for options that ``placed`` does not understand."""
-    for name, value in (("size", size), ("page", page), ("units", unit)):
-        if not isinstance(value, str):  # batch files and callers in Python may give anything
-            raise UsageError(f"{name} must be text, not {shown(value)}")
-    if size and page:
-        raise UsageError("size and page do not go together")
     if size:
         parse_size(size, unit or "mm")
     elif page:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from warpsplat.fit.options import Option
 from warpsplat.pages import page
 from warpsplat.pages.serve.form import FIELDS
 from warpsplat.pages.serve.limits import Limits
-from warpsplat.run.options import BY_NAME, Option
+from warpsplat.run.options import BY_NAME
 
 
 def serve_page(limits: Limits) -> str:

@@ -1,0 +1,178 @@
+"""Options: each is declared once, with the field that it sets.
+
+``Settings`` declares its fields with ``option``. Flags, keys of batch files, keywords of the Python API, the
+form of ``serve``, the documentation's tables and all checks of types and ranges are made from that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import functools
+import math
+import re
+import types
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from warpsplat.errors import UsageError, shown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """A setting as it is given. What a declaration leaves out follows from the field's type and default."""
+
+    name: str = ""
+    """The flag without its dashes, and the key of batch files."""
+    field: str = ""
+    """The field that it sets."""
+    value: Any = None
+    """What the flag stands for, if it is a switch for one value of the field."""
+    type: Any = str
+    default: Any = None
+    shown_default: str | None = None
+    """The default as help shows it, if not as it is; empty where none is shown."""
+    help: str = ""
+    """A line; empty if it cannot be given by this name."""
+    details: str = ""
+    """What the documentation says besides, in Markdown."""
+    research: bool = False
+    """Whether it is for researchers: a key of batch files and a keyword of ``make_settings``, but no flag."""
+    refine: bool = False
+    """Whether ``refine`` takes it as well."""
+    limits: tuple[float, float] | None = None
+    """Least and largest value of a number, or length of a text. A number without is positive."""
+    choices: tuple[str, ...] = ()
+    pattern: str = ".*"
+    """Regular expression for a text, which ``wanted`` describes."""
+    wanted: str = ""
+    """Values that are accepted, in words."""
+    metavar: str = ""
+    subjects: tuple[str, ...] = ()
+    """Subjects that it is for, if not for all."""
+    parse: Callable[[Any], Any] | None = None
+    """Makes a value of what users write: of times, sizes and lists."""
+    shorthands: tuple[Option, ...] = ()
+    """Further options that set the field."""
+
+    @property
+    def keyword(self) -> str:
+        """The keyword of ``make_settings``."""
+        return self.name.replace("-", "_")
+
+    @property
+    def default_text(self) -> str:
+        """The default as help shows it; empty if there is none."""
+        if self.shown_default is not None:
+            return self.shown_default
+        return "" if self.default in (None, "", ()) or self.default is False else str(self.default)
+
+    @property
+    def accepts(self) -> str:
+        """Values that are accepted, in words."""
+        if self.wanted or self.choices:
+            return self.wanted or f"one of {', '.join(self.choices)}"
+        if self.type is str:
+            return f"a text of at most {self.limits[1]} characters" if self.limits else "text"
+        if self.type in (int, float):
+            if self.limits is None:
+                return "a positive number"
+            low, high = self.limits
+            whole = self.type is int
+            return f"a whole number from {low} to {high}" if whole else f"a number from {low:g} to {high:g}"
+        return {bool: "true or false", dict: "a mapping"}.get(self.type, f"a {self.type.__name__}")
+
+    def parsed(self, value: Any) -> Any:
+        """Return a value as users write it as one of the option's type.
+
+        Raises:
+            UsageError: it is not accepted.
+        """
+        value = self.parse(value) if self.parse else value
+        self.check(value)
+        return value
+
+    def check(self, value: Any, prefix: str = "") -> None:
+        """Check the type and range of a value; messages name ``prefix`` and the option.
+
+        Raises:
+            UsageError: it is not accepted.
+        """
+        if isinstance(value, dict) and self.type is dict:
+            for key, inner in value.items():
+                dataclasses.replace(self, name=f"{self.name} {key}", type=float).check(inner)
+        elif not (self._accepted(value) or (value is None and self.default is None)):
+            raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}")
+
+    def _accepted(self, value: Any) -> bool:
+        if self.choices:
+            return value in self.choices
+        if self.type is str:
+            matches = isinstance(value, str) and re.fullmatch(self.pattern, value, re.DOTALL)
+            return bool(matches) and (self.limits is None or len(value) <= self.limits[1])
+        if self.type not in (int, float):
+            return isinstance(value, self.type)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return False
+        if self.limits is None:
+            return 0 < value < math.inf
+        return self.limits[0] <= value <= self.limits[1] and (self.type is float or isinstance(value, int))
+
+
+def option(default: Any, help: str = "", limits: tuple[float, float] | None = None, **declared: Any) -> Any:
+    """Declare a dataclass's field with its option.
+
+    Args:
+        default: the field's default, or the function that makes it.
+        help: see ``Option``, as for all that follows.
+        limits: see there.
+        declared: further fields of ``Option``.
+    """
+    makes = callable(default)
+    made = Option(default=None if makes else default, help=help, limits=limits, **declared)
+    metadata = {"option": made}
+    if makes:
+        return dataclasses.field(default_factory=default, metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+research = functools.partial(option, research=True)
+"""Declare a field that only researchers change."""
+
+
+@functools.cache
+def options_of(declaring: type) -> tuple[Option, ...]:
+    """Return the options of a dataclass's fields, in their order and without shorthands."""
+    hints = get_type_hints(declaring)
+    found = []
+    for field in dataclasses.fields(declaring):
+        kind, choices = hints[field.name], ()
+        if get_origin(kind) is types.UnionType:
+            kind = get_args(kind)[0]  # the other one is None
+        if get_origin(kind) is Literal:
+            kind, choices = str, get_args(kind)
+        declared = field.metadata["option"]
+        made = dataclasses.replace(
+            declared,
+            name=field.name.replace("_", "-"),
+            field=field.name,
+            type=get_origin(kind) or kind,
+            choices=choices or declared.choices,
+            shorthands=tuple(dataclasses.replace(s, field=field.name) for s in declared.shorthands),
+        )
+        found.append(made)
+    return tuple(found)
+
+
+def limits_of(declaring: type, name: str) -> tuple[float, float]:
+    """Return the least and the largest value of a number's field."""
+    found = next(each.limits for each in options_of(declaring) if each.field == name)
+    assert found
+    return found
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean 'colors'?"`` for a name like one of the ``known``, else nothing."""
+    found = difflib.get_close_matches(name, [*known], 1)
+    return f"; did you mean {found[0]!r}?" if found else ""
