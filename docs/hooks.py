@@ -1,4 +1,4 @@
-"""Pages of the site whose text lives elsewhere: ARCHITECTURE.md and the like, the commands' help, the options."""
+"""Pages made from text that lives elsewhere: ARCHITECTURE.md and others, the commands' help, the options."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import pytest
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import FILL_POINT_RATE, PRESETS, Settings, make_settings
 from warpsplat.fit.texts import parse_bytes, parse_duration
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind
 
 FINGERPRINTS: list[tuple[dict[str, Any], str]] = [
     ({}, "29a37fc6573de4e5"),

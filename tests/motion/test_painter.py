@@ -12,7 +12,7 @@ from PIL import Image
 from tests.scenes import mixed_scene, with_gradients
 from warpsplat.errors import CapacityError
 from warpsplat.fit.export import export
-from warpsplat.fit.settings import Renderer, Settings
+from warpsplat.fit.settings import Settings
 from warpsplat.metrics import psnr
 from warpsplat.motion.painter import Painter
 from warpsplat.rendering import renderer as rendering
@@ -42,7 +42,7 @@ def painted(scene: Scene, settings: Settings) -> Image.Image:
 
 @pytest.mark.parametrize("renderer", ["exact", "splat", "gaussian"])
 @pytest.mark.parametrize("make", [flat, ramped, transparent])
-def test_pictures_look_as_a_viewer_shows_the_file(renderer: Renderer, make: Callable[[], Scene]) -> None:
+def test_pictures_look_as_a_viewer_shows_the_file(renderer: str, make: Callable[[], Scene]) -> None:
     scene, settings = make(), Settings(renderer=renderer)
     made, seen = painted(scene, settings), render_svg(export(scene, settings, GRIDS[-1]), zoom=2.0)
     assert made.size == SIZE

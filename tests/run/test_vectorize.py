@@ -13,7 +13,7 @@ from tests import ROOT
 from tests.fit.pictures import picture
 from warpsplat.extensions import renderer_names
 from warpsplat.files.image import load_image
-from warpsplat.fit.settings import Density, Renderer, make_settings
+from warpsplat.fit.settings import Density, make_settings
 from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.figures import has_time_for_eyes
@@ -27,7 +27,7 @@ CAT = ROOT / "docs" / "images" / "cat.jpg"
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("renderer", renderer_names())
-def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: Renderer) -> None:
+def test_same_seed_same_file_whatever_the_threads(device: str, kind: Kind, renderer: str) -> None:
     settings = make_settings(
         kind=kind, renderer=renderer, curves=16, iterations=40, seed=3, coarse_pixels=1000
     )
@@ -85,7 +85,7 @@ FIGURES = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("renderer", "kind", "figure", "gap"), FIGURES)
-def test_a_photograph_reaches_its_figure(renderer: Renderer, kind: Kind, figure: float, gap: float) -> None:
+def test_a_photograph_reaches_its_figure(renderer: str, kind: Kind, figure: float, gap: float) -> None:
     """451x300, 192 curves, 100 steps: PSNR of the file, and how much more the training render has."""
     settings = make_settings(renderer=renderer, kind=kind, curves=192, iterations=100, coarse_pixels=30_000)
     result = vectorize(load_image(CAT), settings, Backend.on("cpu"))

@@ -18,7 +18,7 @@ from warpsplat.rendering.program import Program
 class SplatCoverage:
     """The paper's Gaussians: 1 - product of 1 - g."""
 
-    law = constants.PRODUCT
+    mapping = constants.PRODUCT
     kernels: ClassVar[tuple[wp.Kernel, wp.Kernel]] = (
         splat_coverage.splat_forward,
         splat_coverage.splat_backward,
