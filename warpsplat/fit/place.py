@@ -1,4 +1,4 @@
-"""Placement of new shapes: small circles or strokes with the colours of the image, the first on a grid."""
+"""Placement: new shapes are circles or strokes with the colours of the image, a start near the optimum."""
 
 from __future__ import annotations
 
