@@ -31,8 +31,8 @@ HALF_LENGTH = 2.0
 sqrt(3)."""
 
 MAX_CENTRE_DISTANCE = 4.0
-"""Maximum distance of a radial ramp's centre from the middle of its shape's box, in halves of the longer side of
-the box: beyond, a linear ramp is as good."""
+"""Maximum distance of a radial ramp's centre from the middle of its shape's box, in halves of the longer side
+of the box: beyond, a linear ramp is as good."""
 
 RIDGE = 1e-6
 """Added to variances, in the same unit: a shape of one pixel has no ramp."""
