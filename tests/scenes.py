@@ -179,7 +179,7 @@ def with_two_stops(scene: Scene, *, seed: int = 0) -> Scene:
 
 
 def with_stops(scene: Scene, offsets: Sequence[float], *, seed: int = 0) -> Scene:
-    """Give all shapes but the last padded gradients with stops at ``offsets``, linear and radial in turn."""
+    """Give each shape but the last a padded gradient with stops at ``offsets``, linear or radial in turn."""
     scene = with_gradients(scene, seed=seed)
     rng = np.random.default_rng(seed)
     stops = len(offsets) * (scene.paint != Paint.FLAT)

@@ -10,7 +10,7 @@ import pytest
 from tests.fit.pictures import picture, step_for
 from tests.scenes import random_scene, with_two_stops
 from warpsplat.fit.paints import choose_paints
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -49,11 +49,6 @@ def stripes(grey: float) -> Scene:
 def run(image: FloatArray, device: str, **options: object) -> Result:
     settings = make_settings("draft", **{"curves": 12, "iterations": 160} | options)
     return vectorize(image, settings, Backend.on(device))
-
-
-def test_flat_is_the_default() -> None:
-    assert Settings().paint == "flat"
-    assert make_settings(paint="flat") == make_settings()
 
 
 def test_auto_paints_a_sky_with_ramps(device: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from tests.fit.pictures import picture, step_for
 from warpsplat.errors import UsageError
-from warpsplat.fit.palette import CHOICE_INTERVAL, Palette, best_colors, main_colors
+from warpsplat.fit.palette import Palette, best_colors, main_colors
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.texts import parse_palette
 from warpsplat.rendering.backend import Backend
@@ -35,15 +35,21 @@ def squares(colors: list[list[float]]) -> Scene:
 
 
 @pytest.mark.parametrize("kind", Kind)
-@pytest.mark.parametrize("given", [{"colors": 4}, {"palette": "#000,#fc2,#284,#48c"}])
-def test_a_file_has_no_other_colours(device: str, kind: Kind, given: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    "given",
+    [{"colors": 4}, {"palette": "#000,#fc2,#284,#48c"}, {"opaque": True}],
+    ids=["4", "palette", "any"],
+)
+def test_files_are_opaque_and_have_no_other_colours(
+    device: str, kind: Kind, given: dict[str, object]
+) -> None:
     settings = make_settings(kind=kind, curves=20, iterations=60, **given)
     result = vectorize(picture(), settings, Backend.on(device))
     found = set(COLOR.findall(result.svg))
-    assert 0 < len(found) <= 4
-    if "palette" in given:
-        assert found <= {"#000", "#fc2", "#284", "#48c"}
+    assert found if "opaque" in given else 0 < len(found) <= 4
+    assert "palette" not in given or found <= {"#000", "#fc2", "#284", "#48c"}
     assert "opacity" not in result.svg
+    assert (result.scene.opacities > 0.99).all()
     assert result.score
     assert result.score.psnr > 12
 
@@ -102,17 +108,6 @@ def test_hidden_shapes_keep_their_colour() -> None:
     assert (best_colors(step_for(scene, picture()), scene)[0] == scene.colors[0]).all()
 
 
-def test_new_shapes_choose_at_once() -> None:
-    scene = squares([[0.0, 0.0, 0.0]])
-    step = step_for(scene, picture())
-    palette = Palette(np.array([[0, 0, 0], [1, 1, 1]], np.float32))
-    palette.choose(step)
-    step.state.step = CHOICE_INTERVAL + 1
-    assert not palette.is_due(step.state)
-    step.state.parameters.rearrange(np.arange(1), squares([[0.3, 0.3, 0.3]]))
-    assert palette.is_due(step.state)
-
-
 def test_main_colours_are_the_pictures_own() -> None:
     own = np.array([[255, 0, 0], [0, 128, 255], [20, 20, 20]], np.float32) / 255
     rng = np.random.default_rng(0)
@@ -122,12 +117,6 @@ def test_main_colours_are_the_pictures_own() -> None:
     found = main_colors(everything, np.ones(len(everything), np.int64), 3)
     assert {tuple(color) for color in found} == {tuple(color) for color in own}
     assert len(main_colors(own, np.ones(3, np.int64), 8)) == 3
-
-
-def test_opaque_shapes_are_opaque(device: str) -> None:
-    result = vectorize(picture(), make_settings(curves=16, iterations=60, opaque=True), Backend.on(device))
-    assert "opacity" not in result.svg
-    assert (result.scene.opacities > 0.99).all()
 
 
 def test_colours_of_a_palette_are_not_trained() -> None:

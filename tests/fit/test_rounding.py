@@ -95,6 +95,8 @@ def opacity_step(device: str) -> Step:
 def test_opacities_are_frozen_at_tenths_or_opaque(device: str) -> None:
     step = opacity_step(device)
     before = step.state.scene()
+    before.opacities[:4] = [0.02, 0.051, 0.149, 0.5]
+    step.state.parameters.assign(before)
     freeze_opacities(step)
     after = step.state.scene()
     opaque = after.opacities == OPAQUE
@@ -108,28 +110,6 @@ def test_opacities_are_frozen_at_tenths_or_opaque(device: str) -> None:
     np.testing.assert_array_equal(moved.opacities, after.opacities)
     assert (moved.colors != after.colors).any()
     assert (moved.points != after.points).any()
-
-
-@pytest.mark.parametrize(("worth", "all_opaque"), [(0.0, False), (1e6, True)])
-def test_the_worth_of_a_byte_decides_what_is_opaque(
-    device: str, worth: float, all_opaque: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    step = opacity_step(device)
-    before = step.state.scene().opacities
-    monkeypatch.setattr(rounding, "byte_worth", lambda square_error, size: worth)
-    freeze_opacities(step)
-    opaque = step.state.scene().opacities == OPAQUE
-    assert (opaque == (all_opaque | (before > 0.95))).all()
-
-
-@pytest.mark.parametrize("opacity", [0.02, 0.051, 0.149, 0.5])
-def test_no_opacity_is_rounded_away(device: str, opacity: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rounding, "byte_worth", lambda square_error, size: 0.0)
-    step = opacity_step(device)
-    scene = step.state.scene()
-    step.state.parameters.assign(replace(scene, opacities=np.full(len(scene), opacity, np.float32)))
-    freeze_opacities(step)
-    np.testing.assert_array_equal(step.state.scene().opacities, np.float32(max(0.1, round(opacity, 1))))
 
 
 def test_a_byte_is_worth_what_more_shapes_gain() -> None:

@@ -23,7 +23,7 @@ MAX_ROUNDS = 40
 """Nearly all images are clear after ten."""
 
 FIRST_MOVE = 0.2
-"""Farthest that a point moves in the first round [px]; what spills over is part of a pixel wide."""
+"""Maximum move of a point in the first round [px]; spills are a fraction of a pixel wide."""
 
 ROUNDS_PER_MOVE = 8
 """Rounds after which points may move by ``FIRST_MOVE`` more."""
@@ -51,14 +51,14 @@ def clear_empty(
     for picture in scene.pictures:  # which are drawn as they are
         (top, left), (height, width) = picture.corner, picture.pixels.shape[:2]
         empty[top : top + height, left : left + width] &= picture.pixels[..., 3] == 0
-    best, least = scene, -1
+    best, fewest = scene, -1
     for number in range(MAX_ROUNDS):
         tried = rounded(scene, per_pixel)
         shown = np.asarray(show(export(tried, settings, per_pixel), tried).convert("RGBA"))
         spill = empty & (shown[..., 3] > 0)
         count = int(spill.sum())
-        if least < 0 or count < least:
-            best, least = tried, count
+        if fewest < 0 or count < fewest:
+            best, fewest = tried, count
         if count == 0:
             break
         scene = _drawn_back(scene, spill, backend, FIRST_MOVE * (1 + number / ROUNDS_PER_MOVE))

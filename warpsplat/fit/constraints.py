@@ -24,7 +24,7 @@ SAME_COORDINATE = 1e-3
 """Difference [canvas units] below which coordinates are equal, like those of the ends of an upright line."""
 
 MAX_LEVERAGE = 8.0
-"""Longest handle that a line directs, in lengths of the line: rounding its ends would turn longer ones."""
+"""Maximum length of a handle that a line directs, in lengths of the line: rounding would turn longer ones."""
 
 BEFORE, AFTER = 1, 2
 """Flags of the neighbours of a smooth joint that are free handles; another one is the far end of a line."""

@@ -16,10 +16,10 @@ MIN_ASPECT = 8.0
 (docs/experiments.md)."""
 
 MIN_STROKE_SHARE = 0.8
-"""Least share of the component that a stroke has to cover ..."""
+"""Minimum share of the component that a stroke has to cover ..."""
 
 MIN_ADVANTAGE = 2.0
-"""... and least ratio of that share to the one that a fill covers."""
+"""... and minimum ratio of that share to the one that a fill covers."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Growth: new shapes on the components of the error (paper section 3.4 and appendix B)."""
+"""Growth: new shapes come on the components of the error, largest first (paper section 3.4, appendix B)."""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from warpsplat.alpha import on
@@ -35,7 +37,7 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
             in foliage (masking), and the shapes that foliage takes are worth more elsewhere.
     """
     height, width = image.shape[:2]
-    weights: FloatArray | None = None
+    factors: list[FloatArray] = []
     if texture > 0:
         grey = filters.grey(np.asarray(on(image, 1.0), np.float32))
         grey = grey - np.float32(0.5)  # so that 32 bits are enough for the squares
@@ -43,17 +45,16 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
         weights = np.maximum(squares - mean * mean, 0) + np.float32(TEXTURE_NOISE * TEXTURE_NOISE)
         for rows in np.array_split(weights, weights.size // PIXELS_PER_CHUNK + 1):
             rows[:] = elementary.power(rows, -texture)
+        factors.append(weights)
     if mask is not None:
         shrinks = mask.shape[1] >= width and mask.shape[0] >= height
         resize = filters.resize_area if shrinks else filters.resize_linear
         shares = BLACK_WEIGHT + (1 - BLACK_WEIGHT) * np.clip(resize(mask, (width, height)), 0, 1)
         # Divided by the mean, so that a mask of one grey is exactly none.
-        factors = np.asarray(shares / shares.mean(dtype=np.float64), np.float32)
-        weights = factors if weights is None else weights * factors
+        factors.append(np.asarray(shares / shares.mean(dtype=np.float64), np.float32))
     if image.shape[2] == 4:
-        factors = np.where(image[..., 3] == 0, np.float32(EMPTY_WEIGHT), np.float32(1))
-        weights = factors if weights is None else weights * factors
-    return weights
+        factors.append(np.where(image[..., 3] == 0, np.float32(EMPTY_WEIGHT), np.float32(1)))
+    return functools.reduce(np.multiply, factors) if factors else None
 
 
 def weights_at(weights: FloatArray, width: int, height: int) -> FloatArray:

@@ -152,3 +152,11 @@ SHAPE_LOSSES: tuple[Loss, ...] = (
         reason="Straightens burrs and loops too small for the image error to remove.",
     ),
 )
+
+
+def image_program(inputs: LossInputs) -> Program:
+    """Record the image losses."""
+    program = inputs.renderer.backend.program("loss")
+    for loss in IMAGE_LOSSES:
+        loss.record(program, inputs)
+    return program

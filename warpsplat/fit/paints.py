@@ -21,7 +21,7 @@ GRADIENT_BYTES = 185
 """Bytes of a gradient of two stops in a file, with the reference to it."""
 
 GAIN_TO_TRY = 1.0
-"""Least gain of a ramp over the worth of its bytes while shapes are still added."""
+"""Minimum gain of a ramp over the worth of its bytes while shapes are still added."""
 
 GAIN_TO_KEEP = 4.0
 """The same while the surplus is removed: the shapes removed then save about as much."""
@@ -41,29 +41,29 @@ def choose_paints(step: Step) -> None:
     settings, state = step.settings, step.state
     solver = RampSolver(step)
     scene = solver.scene
-    least = 0.0
+    min_gain = 0.0
     if settings.paint == "auto":
         size = len(export(scene, settings, min(USUAL_GRID, finest(settings))))
-        least = GRADIENT_BYTES * byte_worth(step.square_error(), size)
+        min_gain = GRADIENT_BYTES * byte_worth(step.square_error(), size)
     surplus = state.step > settings.density.thin * settings.iterations
-    least *= GAIN_TO_KEEP if surplus else GAIN_TO_TRY
-    kind, ramps = _best_ramps(settings, solver, least)
+    min_gain *= GAIN_TO_KEEP if surplus else GAIN_TO_TRY
+    kind, ramps = _best_ramps(settings, solver, min_gain)
     trained = np.arange(len(scene)) >= state.base  # shapes of earlier levels stay as they are
     flat, gradient = scene.paint == Paint.FLAT, np.isin(scene.paint, GRADIENTS)
-    gained = trained & flat & (ramps.gain > least) & ~_are_same(ramps.colors)
-    lost = trained & gradient & ((solver.flattening <= least) | _are_same(_end_colors(scene)))
+    gained = trained & flat & (ramps.gain > min_gain) & ~_are_same(ramps.colors)
+    lost = trained & gradient & ((solver.flattening <= min_gain) | _are_same(_end_colors(scene)))
     repainted = without_gradients(with_ramps(scene, gained, kind, ramps), lost, solver.flat)
     if (repainted.paint != scene.paint).any():
         state.parameters.repaint(repainted)
 
 
-def _best_ramps(settings: Settings, solver: RampSolver, least: float) -> tuple[IntArray, Ramps]:
-    """Return the kind and the best ramp of each shape; where the gain is below ``least``, any."""
+def _best_ramps(settings: Settings, solver: RampSolver, min_gain: float) -> tuple[IntArray, Ramps]:
+    """Return the kind and the best ramp of each shape; where the gain is below ``min_gain``, any."""
     count = len(solver.scene)
     linear = solver.linear()
     if settings.paint == "linear":
         return np.full(count, Paint.LINEAR, np.int32), linear
-    radial = solver.radial(least)
+    radial = solver.radial(min_gain)
     if settings.paint == "radial":
         return np.full(count, Paint.RADIAL, np.int32), radial
     chosen = radial.gain > RADIAL_ADVANTAGE * linear.gain

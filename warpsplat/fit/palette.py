@@ -22,10 +22,10 @@ CHOICE_INTERVAL = 5
 """Steps between two choices of colours, each of which takes as long as a step."""
 
 MIN_VISIBLE = 1e-6
-"""Least sum of a shape's squared visibility [pixels] at which it chooses a colour."""
+"""Minimum sum of a shape's squared visibility [pixels] at which it chooses a colour."""
 
 SOLID_OPACITY = 0.5
-"""Least opacity of a pixel whose colour counts, and of a shape that is kept where all are made opaque."""
+"""Minimum opacity of a pixel whose colour counts, and of a shape that is kept where all are made opaque."""
 
 Floats = npt.NDArray[np.floating]
 

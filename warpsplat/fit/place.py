@@ -1,4 +1,4 @@
-"""Placement of new shapes: small circles or strokes with the colours of the image, the first on a grid."""
+"""Placement: new shapes are circles or strokes with the colours of the image, a start near the optimum."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GRID_COVER = 1.3
 """Area of the first shapes over that of the canvas: circles on a grid then leave few gaps."""
 
 JITTER = 0.25
-"""Farthest offset of a first shape along each axis, in cells of the grid."""
+"""Maximum offset of a first shape along each axis, in cells of the grid."""
 
 STROKE_CUBICS = 3
 """Cubics in a new stroke (paper section 3.2, as in DiffVG)."""
@@ -29,22 +29,22 @@ STROKE_ASPECT = 3.0
 """Length over width of a new stroke."""
 
 REDUCED_PIXELS = 400_000
-"""Largest image that colours and directions of the first shapes are taken from [pixels]."""
+"""Maximum size of the image that the first shapes take colours and directions from [pixels]."""
 
 REDUCED_SIGMA = 128.0
-"""Widest blur of that image [px], whose cost grows with the width."""
+"""Maximum standard deviation of its blur [px], whose cost grows with it."""
 
 COLOR_LEVELS = 32
 """Levels of a channel by which flat colours are told apart."""
 
 FLAT_SHARE = 0.98
-"""Least share of a flat image's pixels that have one of its few colours; the others antialias outlines."""
+"""Minimum share of a flat image's pixels that have one of its few colours; the others antialias outlines."""
 
 MAX_FLAT_COLORS = 12
-"""Most colours of an image whose regions are counted."""
+"""Maximum number of colours of a flat image, whose regions are counted."""
 
 MIN_REGION_SHARE = 1e-4
-"""Least area of a region that counts, over the area of the image."""
+"""Minimum area of a region that counts, over the area of the image."""
 
 SHAPES_PER_REGION = 8
 """Shapes for a region of one colour: an outline has corners and holes."""
@@ -53,13 +53,13 @@ MIN_SIMPLE_CURVES = 32
 """Shapes for the simplest of flat images."""
 
 PIXELS_PER_CURVE = 8
-"""Least pixels of an image for each shape: a shape has about as many numbers as these."""
+"""Minimum number of pixels per shape: a shape has about as many parameters as these have values."""
 
 MIN_OCCUPIED_SHARE = 0.02
-"""Least share of a transparent image that is taken as occupied: bounds the number of places tried."""
+"""Minimum share of a transparent image that is taken as occupied: bounds the number of places tried."""
 
 MIN_PLACE_OPACITY = 0.05
-"""Least opacity of a transparent image around a first shape."""
+"""Minimum opacity of a transparent image around a first shape."""
 
 Floats = npt.NDArray[np.floating]
 
@@ -68,7 +68,7 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     """Return ``count`` shapes on a jittered grid that covers the canvas, or its occupied part."""
     height, width = target.shape[:2]
     wanted = count
-    if target.shape[2] == 4:  # so many places that enough are left once those where nothing is are dropped
+    if target.shape[2] == 4:  # enough places that ``wanted`` remain without the empty ones
         count = round(count / max(float((target[..., 3] > CLEAR).mean()), MIN_OCCUPIED_SHARE))
     rows = max(1, min(count, round(np.sqrt(count * height / width))))
     per_row = np.full(rows, count // rows)

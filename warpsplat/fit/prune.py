@@ -1,4 +1,4 @@
-"""Pruning: which shapes are removed (paper section 3.4 and appendix B)."""
+"""Pruning: shapes that show next to nothing are removed, as others are worth more (paper section 3.4)."""
 
 from __future__ import annotations
 

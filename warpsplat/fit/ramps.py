@@ -31,8 +31,8 @@ HALF_LENGTH = 2.0
 sqrt(3)."""
 
 MAX_CENTRE_DISTANCE = 4.0
-"""Farthest centre of a radial ramp from the middle of its shape's box, in halves of the box's longer side:
-beyond, a linear ramp does as well."""
+"""Maximum distance of a radial ramp's centre from the middle of its shape's box, in halves of the longer side
+of the box: beyond, a linear ramp is as good."""
 
 RIDGE = 1e-6
 """Added to variances, in the same unit: a shape of one pixel has no ramp."""
@@ -182,12 +182,12 @@ class RampSolver:
             self.flat + HALF_LENGTH * tints,
         )
 
-    def radial(self, least: float) -> Ramps:
-        """Return the best radial ramp of each shape if its gain may exceed ``least``; other gains are 0."""
+    def radial(self, min_gain: float) -> Ramps:
+        """Return the best radial ramp of each shape where its gain may exceed ``min_gain``, else gain 0."""
         along, _, bound = self._steepest(3)
         bend = np.where(np.abs(along[:, 2]) > 1e-9, along[:, 2], 1e-9)
         centre = -along[:, :2] / (2 * bend[:, None])
-        chosen = (np.linalg.norm(centre, axis=1) < MAX_CENTRE_DISTANCE) & (bound > least)
+        chosen = (np.linalg.norm(centre, axis=1) < MAX_CENTRE_DISTANCE) & (bound > min_gain)
         count = len(chosen)
         gain, radii, slope = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
         for slots in self._slots(chosen):

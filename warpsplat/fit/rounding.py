@@ -25,10 +25,10 @@ STAGE_SHARE = 0.015
 """Steps after each stage, as a share of the run."""
 
 MAX_LOSS = 0.03
-"""Most that rounding may cost [dB]."""
+"""Maximum loss by rounding [dB]."""
 
 MAX_TRADED_LOSS = 0.06
-"""Most that rounding may cost where bytes are traded for error [dB]: beyond, refitting fails."""
+"""Maximum loss by rounding where bytes are traded for error [dB]: beyond, refitting fails."""
 
 STAGED_COST = 0.2
 """Cost of rounding in stages over that of rounding at once, measured."""

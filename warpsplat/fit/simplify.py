@@ -1,4 +1,4 @@
-"""Simplification: points of splines that their outlines need least are removed."""
+"""Simplification: points of splines that outlines need least are removed, as each costs bytes."""
 
 from __future__ import annotations
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import warp as wp
 
 from warpsplat.alpha import squares
 from warpsplat.fit import losses
 from warpsplat.fit.importance import weights_at
-from warpsplat.fit.levels import Level
+from warpsplat.fit.levels import level_programs
 from warpsplat.fit.losses import LossInputs, LossTarget
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.renderers import renderer_of
@@ -67,7 +69,6 @@ class Step:
         *,
         capacity: Capacity | None = None,
         loss_target: LossTarget | None = None,
-        level_target: LossTarget | None = None,
         began: int | None = None,
     ) -> None:
         """Allocate the renderers and record the launches.
@@ -78,34 +79,26 @@ class Step:
             target: what to fit, at the size of the phase.
             capacity: of the renderer's arrays; default: as much as a first render needs.
             loss_target: what renders are compared with; default: the image of ``target``.
-            level_target: what renders of earlier levels are compared with; likewise.
             began: steps done when the step was first recorded, by which scheduled weights go; default: now.
         """
         self.state, self.settings, self.target = state, settings, target
         self.began = state.step if began is None else began
         model = model_for(settings, self.began, target.slack)
         self.renderer = Renderer(state.parameters, target.viewport, model=model, capacity=capacity)
-        self.loss_target = loss_target or self._image_target()
-        if capacity is None:
-            self.renderer.forward_complete()
-        self.level_target, self.levels = level_target, list[Level]()
-        if ends := state.parameters.level_ends:
-            shared = self.level_target = level_target or self._image_target()
-            self.levels = [Level.of(state, end, target.viewport, model, shared) for end in ends]
+        levels = [state.parameters.prefix(end) for end in state.parameters.level_ends]
+        self.level_renderers = [Renderer(level, target.viewport, model=model) for level in levels]
+        image = (target.image, self.renderer.backend, target.viewport, target.weights)
+        self.loss_target = loss_target or LossTarget(*image)
+        self._level_target = LossTarget(*image) if levels else self.loss_target
+        for renderer in self.renderers if capacity is None else self.level_renderers:
+            renderer.forward_complete()
         self.record()
-
-    def _image_target(self) -> LossTarget:
-        target = self.target
-        return LossTarget(target.image, self.renderer.backend, target.viewport, target.weights)
 
     def record(self) -> None:
         """Record the launches for the arrays and settings as they are now."""
         self.renderer.check_current()
         backend, state = self.renderer.backend, self.state
         inputs = LossInputs(self.renderer, self.loss_target, self.settings, state.clock)
-        measure = backend.program("loss")
-        for loss in losses.IMAGE_LOSSES:
-            loss.record(measure, inputs)
         update = backend.program("update")
         for loss in losses.SHAPE_LOSSES:
             loss.record(update, inputs)
@@ -115,11 +108,13 @@ class Step:
         record_adam(update, state.parameters, state.clock, self.settings, units)
         if state.projection:
             state.projection.record(update)
+        target = self._level_target
+        levels = [replace(inputs, renderer=renderer, target=target) for renderer in self.level_renderers]
         self.programs: tuple[Program, ...] = (
-            self.renderer.forward_program,
-            measure,
-            self.renderer.backward_program,
-            *(program for level in self.levels for program in level.programs(self.settings)),
+            self.renderer.forward_program,  # render
+            losses.image_program(inputs),  # compare
+            self.renderer.backward_program,  # back-propagate
+            *(program for level in levels for program in level_programs(level, state.parameters)),
             update,
         )
         self._graph = capture(backend.device, self.programs)
@@ -145,7 +140,7 @@ class Step:
     @property
     def renderers(self) -> tuple[Renderer, ...]:
         """The renderer of the whole scene, and those of the levels."""
-        return (self.renderer, *(level.renderer for level in self.levels))
+        return (self.renderer, *self.level_renderers)
 
     def ensure_capacity(self) -> None:
         """Enlarge arrays that were too small in the last steps."""
@@ -171,7 +166,6 @@ class Step:
             self.target,
             capacity=self.renderer.capacity,
             loss_target=self.loss_target,
-            level_target=self.level_target,
         )
 
     def removal_costs(self) -> FloatArray:

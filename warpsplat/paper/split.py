@@ -8,7 +8,7 @@ import numpy.typing as npt
 from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Scene
 
 MIN_FADE = 0.5
-"""Least difference in opacity between a stroke's middle and both ends at which it is split."""
+"""Minimum difference in opacity between a stroke's middle and both ends at which it is split."""
 
 STROKE_POINTS = 10
 """Control points of strokes that are split: of three cubics, each with an opacity of its own."""
