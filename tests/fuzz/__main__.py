@@ -6,31 +6,29 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.fuzz.campaign import campaign
+from tests.fuzz.campaign import campaigns
 from tests.fuzz.cases import TARGETS, Cases
 
 
 def main() -> None:
-    """Run and print a summary."""
+    """Run and print a summary of each worker."""
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--count", type=int, default=1000, help="cases")
     parser.add_argument("--seed", type=int, default=0, help="another seed, other cases")
     parser.add_argument("--first", type=int, default=0, help="number of the first case, to see one again")
     parser.add_argument("--target", choices=["all", *TARGETS], default="all")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--corpus", type=Path, help="folder of further files to change")
     parser.add_argument("--keep", type=Path, help="folder for the inputs of findings")
     given = parser.parse_args()
-    report = campaign(
-        Cases(given.seed, given.target, given.corpus),
-        given.count,
-        first=given.first,
-        workers=given.workers,
-        kept=given.keep,
-        say=lambda text: print(ascii(text)[1:-1], flush=True),
+    tallies = campaigns(
+        Cases(given.seed, given.target),
+        range(given.first, given.first + given.count),
+        given.workers,
+        given.keep,
+        lambda text: print(ascii(text)[1:-1], flush=True),
     )
-    print(report.line())
-    sys.exit(bool(report.findings))
+    print(*(tally.line() for tally in tallies), sep="\n")
+    sys.exit(any(tally.findings for tally in tallies))
 
 
 if __name__ == "__main__":

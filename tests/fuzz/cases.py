@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import json
 import random
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from PIL import Image
 
 from tests.fuzz import checkpoints, corpus, manifests, mutate
+from tests.fuzz import vocabulary as words
 from tests.fuzz.corpus import Seed
-from tests.fuzz.vocabulary import (
-    FITS,
-    SVG_SNIPPETS,
-    SVG_WORDS,
-    TEXT_OPTIONS,
-    TOKENS,
-    YAML_SNIPPETS,
-    YAML_WORDS,
-)
 from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, Outcome
 from warpsplat.errors import ExitCode
 
@@ -31,17 +22,17 @@ QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "2")
 
 @dataclass(frozen=True)
 class Command:
-    """A command line; what it writes and what it may end with."""
+    """A command line, and what is expected of it."""
 
     arguments: tuple[str, ...]
     codes: tuple[int, ...]
-    """Exit codes that are right, besides 0; ``RESOURCES`` always is."""
+    """Exit codes that are right, besides 0 and ``RESOURCES``."""
     output: str = ""
-    """File that is there, whole, if the exit code is 0, and else is not."""
+    """File that exists, complete, if and only if the exit code is 0."""
     stdin: str = ""
-    """File that the standard input is."""
+    """File for the standard input."""
     consumes: bool = False
-    """Whether the input is gone if the exit code is 0; else it is as it was."""
+    """Whether the input is gone if the exit code is 0."""
 
 
 @dataclass(frozen=True)
@@ -51,34 +42,24 @@ class Case:
     target: str
     index: int
     seed: str
-    """Name of the seed that was changed."""
+    """Name of the input that was mutated."""
     name: str
     """File name of the input."""
     data: bytes
     commands: tuple[Command, ...] = field(repr=False)
 
-    def with_data(self, data: bytes) -> Case:
-        """The same commands on another input."""
-        return replace(self, data=data)
 
-
-def _reference() -> bytes:
-    buffer = io.BytesIO()
-    corpus.picture().save(buffer, "PNG")
-    return buffer.getvalue()
-
-
-GOOD_IMAGE, GOOD_SVG = "good.picture", "good.svg"  # not found in a folder that is given as a whole
+GOOD_IMAGE, GOOD_SVG = "good.picture", "good.svg"  # the former is not found in a folder given as a whole
 FILES: dict[str, bytes] = {
-    GOOD_IMAGE: _reference(),
+    GOOD_IMAGE: corpus.saved(corpus.picture(), "PNG"),
     GOOD_SVG: corpus.own_svg("fill"),
-    # What batch files find: their images fail, so that no case trains for long.
+    # Images of batch files: they fail, so that no case trains for long.
     "in/a.png": b"no image",
     "in/b.jpg": b"",
     "in/deep/c.gif": b"GIF89a",
     "in/é.png": b"\x89PNG\r\n\x1a\n",
 }
-"""Laid into every case's folder; must be as they were afterwards."""
+"""Files in every case's folder, which must not change."""
 
 INPUT, USAGE, MISSED = int(ExitCode.INPUT), int(ExitCode.USAGE), int(ExitCode.GOAL_MISSED)
 
@@ -87,7 +68,7 @@ def _image_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
     given, stdin = ("-", name) if rng.random() < 0.05 else (name, "")
     commands = [Command(("eval", given, GOOD_SVG, "--json"), (INPUT,), stdin=stdin)]
     if rng.random() < 0.15:
-        kind = rng.choice(FITS)
+        kind = rng.choice(words.FITS)
         fit = ("vectorize", name, "-o", "out.svg", *kind, *QUICK)
         if rng.random() < 0.2:
             fit = (*fit, "--report", "out.html")
@@ -122,12 +103,12 @@ def _yaml_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
 
 
 def _option_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    """Values of options. The image is none, so that whatever is accepted ends there."""
+    """Try values of options, on an image that is none, so that no run takes long."""
     given: list[str] = []
     for _ in range(rng.choice((1, 1, 2))):
-        value = "".join(rng.choice(TOKENS) for _ in range(rng.choice((1, 1, 2))))
-        given += [rng.choice(TEXT_OPTIONS), value]
-    # "--help" and its like come about by no combination, so that 0 is not right here.
+        value = "".join(rng.choice(words.TOKENS) for _ in range(rng.choice((1, 1, 2))))
+        given += [rng.choice(words.TEXT_OPTIONS), value]
+    # No combination gives "--help" or the like, so that 0 is not right.
     return (Command(("vectorize", "in/a.png", *given), (USAGE, INPUT)),)
 
 
@@ -138,11 +119,11 @@ def _changed_image(rng: random.Random, data: bytes, other: bytes) -> bytes:
 
 
 def _changed_svg(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    return mutate.mutate_text(rng, data, other, SVG_WORDS, SVG_SNIPPETS)
+    return mutate.mutate_text(rng, data, other, words.SVG_WORDS, words.SVG_SNIPPETS)
 
 
 def _changed_yaml(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    return mutate.mutate_text(rng, data, other, YAML_WORDS, YAML_SNIPPETS)
+    return mutate.mutate_text(rng, data, other, words.YAML_WORDS, words.YAML_SNIPPETS)
 
 
 def _checkpoint_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
@@ -162,34 +143,29 @@ class Target:
     """A kind of input."""
 
     seeds: Callable[[], list[Seed]]
-    endings: tuple[str, ...] | None
-    """Of a folder's files that belong here; None: all that are no text."""
     change: mutate.Mutation
     commands: Callable[[random.Random, str], tuple[Command, ...]]
     share: int
-    """Of a run over all targets."""
+    """Its weight in a run over all targets."""
 
 
 TARGETS = {
-    "image": Target(corpus.images, None, _changed_image, _image_commands, 9),
-    "svg": Target(corpus.svgs, (".svg", ".svgz"), _changed_svg, _svg_commands, 8),
-    "yaml": Target(corpus.yamls, (".yaml", ".yml"), _changed_yaml, _yaml_commands, 2),
-    "options": Target(lambda: [Seed("in.txt", b"-")], (), lambda rng, data, other: data, _option_commands, 1),
-    "manifest": Target(_manifests, (), manifests.changed, _manifest_commands, 1),
-    "checkpoint": Target(checkpoints.checkpoints, (), checkpoints.changed, _checkpoint_commands, 2),
+    "image": Target(corpus.images, _changed_image, _image_commands, 9),
+    "svg": Target(corpus.svgs, _changed_svg, _svg_commands, 8),
+    "yaml": Target(corpus.yamls, _changed_yaml, _yaml_commands, 2),
+    "options": Target(lambda: [Seed("in.txt", b"-")], lambda rng, data, other: data, _option_commands, 1),
+    "manifest": Target(_manifests, manifests.changed, _manifest_commands, 1),
+    "checkpoint": Target(checkpoints.checkpoints, checkpoints.changed, _checkpoint_commands, 2),
 }
 
 
 class Cases:
-    """All cases of a seed: the same number, the same case, in any order."""
+    """All cases of a seed; a case depends on the seed and its number only."""
 
-    def __init__(self, seed: int, target: str = "all", folder: Path | None = None) -> None:
+    def __init__(self, seed: int, target: str = "all") -> None:
         self.seed = seed
         self.names = [name for name, t in TARGETS.items() if target in ("all", name) for _ in range(t.share)]
         self.seeds = {name: TARGETS[name].seeds() for name in set(self.names)}
-        if folder:
-            for name in self.seeds:
-                self.seeds[name] += corpus.from_folder(folder, TARGETS[name].endings)
 
     def __getitem__(self, index: int) -> Case:
         rng = random.Random(f"{self.seed} {index}")
@@ -206,7 +182,7 @@ BATCH_LINE = re.compile(r"(warpsplat: |\[\d+/\d+\] |failed:|  |in/|case)[^\x00-\
 
 
 def judge(command: Command, outcome: Outcome, folder: Path) -> str:
-    """What is wrong with the outcome, in a few words; empty if nothing is."""
+    """Return what is wrong with the outcome, in a few words; empty: nothing is."""
     code = outcome.code
     if outcome.ended:
         return f"no end within {MAX_SECONDS:g} s" if outcome.ended == "time" else "over 2 GiB"
@@ -229,11 +205,8 @@ def judge(command: Command, outcome: Outcome, folder: Path) -> str:
 def _judge_messages(command: Command, outcome: Outcome) -> str:
     lines = outcome.stderr.splitlines(keepends=True)
     if command.arguments[0] == "batch" and outcome.code in (0, ExitCode.SOME_FAILED):
-        wrong = [
-            line
-            for line in outcome.stderr.rstrip("\n").split("\n")
-            if line and not BATCH_LINE.fullmatch(line)
-        ]
+        given = outcome.stderr.rstrip("\n").split("\n")
+        wrong = [line for line in given if line and not BATCH_LINE.fullmatch(line)]
         return f"odd line on stderr: {wrong[0][:100]!r}" if wrong else ""
     if (outcome.code and len(lines) > 1) or any(not LINE.fullmatch(line) for line in lines):
         return f"not one line on stderr: {outcome.stderr[:200]!r}"
@@ -254,10 +227,11 @@ def _judge_output(command: Command, code: int, folder: Path) -> str:
             return f"exit code {code}, and {command.output} is {'there' if path.exists() else 'missing'}"
         if made:
             if path.suffix == ".png":
-                whole = _is_png(path)
+                with Image.open(path) as image:
+                    whole = bool(image.load())
             else:
                 whole = path.read_bytes().rstrip().endswith(f"</{path.suffix[1:]}>".encode())
-            # Of a foreign SVG that cannot be improved, the copy ends as that does.
+            # The copy of a foreign SVG that cannot be improved ends as that does.
             if not whole and command.arguments[0] != "refine":
                 return f"{command.output} is not whole"
             path.unlink()
@@ -274,14 +248,8 @@ def _refused(name: str) -> None:
 
 
 def _is_json(text: str) -> bool:
-    """Whether a text is one JSON object, in which there is no NaN."""
+    """Return whether a text is one JSON object, without NaN."""
     try:
         return isinstance(json.loads(text, parse_constant=_refused), dict)
     except ValueError:
         return False
-
-
-def _is_png(path: Path) -> bool:
-    with Image.open(path) as image:
-        image.load()
-    return True

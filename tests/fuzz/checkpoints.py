@@ -1,4 +1,4 @@
-"""Checkpoints to change: of short runs, nearly done, so that what is accepted soon ends."""
+"""Checkpoints to mutate, of short runs that are nearly done, so that accepted ones end soon."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RUNS = {
 """Flags by the endings of the checkpoints' names."""
 
 STOPPED = 53
-"""Steps, behind the first look at the file; more in the first fit of several."""
+"""Steps, past the first evaluation of the file; more in the first fit of several."""
 
 WORDS = (
     "step", "began", "curves", "per_pixel", "settled", "rounding", "colored", "generator", "room",
@@ -45,7 +45,7 @@ FLOATS = np.float32([0, -0.0, 1, -1, 1e-40, 3e38, -3e38, np.inf, -np.inf, np.nan
 
 
 def checkpoints() -> list[Seed]:
-    """One of each of ``RUNS``."""
+    """Return one of each of ``RUNS``."""
     seeds = []
     for ending, flags in RUNS.items():
         with tempfile.TemporaryDirectory() as folder:
@@ -67,13 +67,13 @@ def checkpoints() -> list[Seed]:
 
 
 def arguments(name: str, image: str) -> tuple[str, ...]:
-    """The command line that goes on from a checkpoint ``name`` of the picture ``image``."""
+    """Return the command line that resumes from a checkpoint ``name`` of the picture ``image``."""
     flags = RUNS[Path(name).suffix]
     return ("vectorize", image, "-o", "out.svg", *COMMON, *flags, "--checkpoint", name, "--resume")
 
 
 def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    """Bytes of the file changed; or of a part of it, with checksums that are right: it gets past the door."""
+    """Change bytes of the file, or those of a part of it with correct checksums."""
     if rng.random() < 0.2:
         return mutate.mutate_bytes(rng, data, other)
     parts, others = _parts(data), _parts(other)
@@ -82,7 +82,7 @@ def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:
         name, part = parts[place]
         action = rng.randrange(10)
         if place == 0:
-            # What lies before says which run it is of: most changes there end at the door.
+            # What comes before identifies the run: most changes there are refused at once.
             head, mark, rest = part.partition(b'"fits"' if rng.random() < 0.9 else b'"format"')
             text = mutate.mutate_text(rng, mark + rest, part, WORDS, SNIPPETS)
             parts[0] = (name, head + text)
@@ -105,16 +105,16 @@ def _parts(data: bytes) -> list[tuple[str, bytes]]:
 
 
 def _other_numbers(rng: random.Random, part: bytes) -> bytes:
-    """An array with some of its numbers changed, or with rows more or less."""
+    """Return an array with some numbers changed, or with rows added or removed."""
     try:
         array = np.load(io.BytesIO(part))
-    except Exception:  # of whatever kind: it was changed already
+    except Exception:  # it was mutated before
         return mutate.mutate_bytes(rng, part, part)
     flat = array.reshape(-1)
     whole = array.dtype == np.int32
     for _ in range(rng.choice((1, 1, 2, 8)) if len(flat) else 0):
         other = rng.choice(mutate.INTERESTING) if whole else rng.choice(FLOATS)
-        if rng.random() < 0.7:  # another one's, which is one that there may be
+        if rng.random() < 0.7:  # a value from elsewhere in the array is valid
             other = rng.choice(flat)
         flat[rng.randrange(len(flat))] = np.int64(other).astype(np.int32) if whole else other
     if rng.random() < 0.15:
@@ -127,7 +127,7 @@ def _other_numbers(rng: random.Random, part: bytes) -> bytes:
 
 
 def _packed(parts: list[tuple[str, bytes]], rng: random.Random) -> bytes:
-    """An archive; seldom a compressed one."""
+    """Return an archive; seldom a compressed one."""
     how = zipfile.ZIP_STORED if rng.random() < 0.97 else zipfile.ZIP_DEFLATED
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", how, compresslevel=zlib.Z_BEST_SPEED) as archive:

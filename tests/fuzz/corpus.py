@@ -1,10 +1,10 @@
-"""Inputs that are in order, from which mutation starts."""
+"""Valid inputs, from which mutation starts."""
 
 from __future__ import annotations
 
 import io
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -17,14 +17,21 @@ from warpsplat.svg.write import write_svg
 
 @dataclass(frozen=True)
 class Seed:
-    """An input: the name's ending says what it is."""
+    """An input; the ending of its name is that of its kind."""
 
     name: str
     data: bytes
 
 
+def saved(image: Image.Image, form: str, **options: Any) -> bytes:
+    """Return an image's file."""
+    buffer = io.BytesIO()
+    image.save(buffer, form, **options)
+    return buffer.getvalue()
+
+
 def picture(mode: str = "RGB") -> Image.Image:
-    """A ramp with noise, of any Pillow mode."""
+    """Return a ramp with noise, of any Pillow mode."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     noise = np.random.default_rng(0).integers(0, 32, (HEIGHT, WIDTH))
     rgba = np.stack([7 * x, 9 * y, 3 * x + noise, 255 - 4 * y], axis=2).astype(np.uint8)
@@ -55,16 +62,15 @@ FORMATS: dict[str, tuple[tuple[str, ...], tuple[dict[str, object], ...]]] = {
     "dds": (("L", "RGB", "RGBA"), ({},)),
     "qoi": (("RGB", "RGBA"), ({},)),
 }  # fmt: skip
-"""Ending -> modes and ways of saving."""
+"""Modes and options of saving, by ending."""
 
 
 def images() -> list[Seed]:
-    """Every mode of every format, saved in several ways; an EXIF rotation, animations, a colour profile."""
+    """Return every mode of every format, saved in several ways; EXIF rotations, an animation."""
     seeds = []
     for ending, (modes, ways) in FORMATS.items():
         for mode in modes:
             for number, options in enumerate(ways):
-                buffer = io.BytesIO()
                 given = dict(options)
                 if "append_images" in given:
                     given["append_images"] = [picture(mode).rotate(180)]
@@ -73,24 +79,20 @@ def images() -> list[Seed]:
                 if given.get("transparency") == 0 and mode == "RGB":
                     given["transparency"] = (0, 0, 16)
                 try:
-                    picture(mode).save(buffer, Image.registered_extensions()["." + ending], **given)
+                    data = saved(picture(mode), Image.registered_extensions()["." + ending], **given)
                 except (OSError, KeyError, ValueError, RuntimeError):  # not built in, or not of this mode
                     continue
-                seeds.append(Seed(f"{mode.replace(';', '')}-{number}.{ending}", buffer.getvalue()))
-    for turn in (3, 6, 8):
+                seeds.append(Seed(f"{mode.replace(';', '')}-{number}.{ending}", data))
+    for orientation in (3, 6, 8):
         exif = Image.Exif()
-        exif[0x0112] = turn
-        buffer = io.BytesIO()
-        picture().save(buffer, "JPEG", exif=exif)
-        seeds.append(Seed(f"turned-{turn}.jpg", buffer.getvalue()))
-    buffer = io.BytesIO()
-    picture().save(buffer, "PNG", save_all=True, append_images=[picture().rotate(180)])
-    seeds.append(Seed("animated.png", buffer.getvalue()))
-    return seeds
+        exif[0x0112] = orientation
+        seeds.append(Seed(f"rotated-{orientation}.jpg", saved(picture(), "JPEG", exif=exif)))
+    animated = saved(picture(), "PNG", save_all=True, append_images=[picture().rotate(180)])
+    return [*seeds, Seed("animated.png", animated)]
 
 
 def svgs() -> list[Seed]:
-    """Each of ``SHAPES`` alone, mixtures of them, files as this tool writes them, other heads."""
+    """Return each of ``SHAPES`` alone, mixtures of them, files written here, other heads."""
     seeds = [Seed(f"shape-{i}.svg", f"{HEAD}{shape}</svg>".encode()) for i, shape in enumerate(SHAPES)]
     for step in (2, 3, 5):
         seeds.append(Seed(f"every-{step}.svg", f"{HEAD}{''.join(SHAPES[::step])}</svg>".encode()))
@@ -106,7 +108,7 @@ def svgs() -> list[Seed]:
 
 
 def own_svg(kind: str, per_pixel: float = 8) -> bytes:
-    """An SVG as this tool writes it, with curves of both bases: ``kind`` is "fill" or "stroke"."""
+    """Return an SVG written here, with curves of both bases; ``kind``: "fill" or "stroke"."""
     painted = Kind[kind.upper()]
     outlines = [(painted, basis, beziers) for beziers in (3, 9, 4) for basis in Basis]
     scene = ragged_scene(outlines, WIDTH, HEIGHT, seed=1)
@@ -114,20 +116,20 @@ def own_svg(kind: str, per_pixel: float = 8) -> bytes:
 
 
 def gradient_svg() -> bytes:
-    """One of shapes with gradients of every kind, named for editors."""
+    """Return one with gradients of every kind, and identifiers."""
     scene = random_scene(Kind.FILL, 8, width=WIDTH, height=HEIGHT, seed=2)
     return write_svg(with_gradients(scene), per_pixel=8, title="A <title>", ids=True).encode()
 
 
 def layered_svg() -> bytes:
-    """One of three levels in few colours."""
+    """Return one of three levels in few colours."""
     scene = random_scene(Kind.FILL, 6, width=WIDTH, height=HEIGHT, seed=4)
     layers = np.array([0, 0, 1, 1, 2, 2], np.int32)
     return write_svg(replace(scene, layer=layers, colors=np.round(scene.colors)), per_pixel=4).encode()
 
 
 def older_svg(kind: str) -> bytes:
-    """An SVG as this tool wrote it at first: coordinates with decimals, paths that are closed."""
+    """Return an SVG as the first version wrote it: coordinates with decimals, closed paths."""
     rng = np.random.default_rng(1)
     rows = []
     for _ in range(6):
@@ -146,17 +148,5 @@ def older_svg(kind: str) -> bytes:
 
 
 def yamls() -> list[Seed]:
-    """Batch files."""
+    """Return batch files."""
     return [Seed(f"batch-{i}.yaml", text.encode()) for i, text in enumerate(YAMLS)]
-
-
-def from_folder(folder: Path, endings: tuple[str, ...] | None, most: int = 200_000) -> list[Seed]:
-    """Files of a folder (and those below) with one of ``endings``, or all that are no text."""
-    texts = (".svg", ".svgz", ".yaml", ".yml")
-    return [
-        Seed(path.name, path.read_bytes())
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-        and 0 < path.stat().st_size <= most
-        and (path.suffix.lower() in endings if endings else path.suffix.lower() not in texts)
-    ]

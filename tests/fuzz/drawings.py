@@ -1,4 +1,4 @@
-"""SVGs that hypothesis makes up, of features that ``refine`` holds and of such as it cannot."""
+"""Strategies of hypothesis for SVGs, of features that ``refine`` supports and of others."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ curves = st.one_of(
 
 
 def _ring(controls: list[tuple[int, int]], letters: str, ending: str) -> str:
-    """A closed spline as a path: one quadratic and smooth ones, back at its start."""
+    """Return a closed spline as a path: one quadratic and smooth ones, back at its start."""
     joints = [(a[0] + b[0], a[1] + b[1]) for a, b in zip(controls, controls[1:] + controls[:1], strict=True)]
     x, y = joints[-1]
     data = f"M{x} {y}"
@@ -72,7 +72,7 @@ stroked = st.tuples(elements, paints, st.sampled_from(CLAIMS_OF_STROKES)).map(
 
 
 def _drawing(group: str, shapes: list[str], per_pixel: int) -> str:
-    """``per_pixel``: units of the view box a pixel."""
+    """``per_pixel``: units of the view box to a pixel."""
     name = group.strip("<>").split()[0]
     drawn = f"{group}{''.join(shapes)}</{name}>"
     if per_pixel == 1:

@@ -15,8 +15,8 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from tests import ROOT
 from tests.forks import make_image
@@ -47,16 +47,12 @@ def lay_out(folder: Path, command: str) -> None:
 
 
 def start(folder: Path, command: str, cache: Path | None = None) -> subprocess.Popen[str]:
-    """Start a command; ``cache``: where its compiled kernels are, if not where they always are."""
+    """Start a command; ``cache``: folder of its compiled kernels, if not the usual one."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), TOKEN: str(folder)}
     return subprocess.Popen(
         [sys.executable, "-m", "warpsplat", *ARGUMENTS[command]],
         cwd=folder,
-        env={
-            **os.environ,
-            "PYTHONPATH": str(ROOT),
-            TOKEN: str(folder),
-            **({"WARP_CACHE_PATH": str(cache)} if cache else {}),
-        },
+        env=environment | ({"WARP_CACHE_PATH": str(cache)} if cache else {}),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -64,11 +60,11 @@ def start(folder: Path, command: str, cache: Path | None = None) -> subprocess.P
 
 
 TOKEN = "WARPSPLAT_KILLS"
-"""Environment variable by which all processes of a run are known."""
+"""Environment variable that marks all processes of a run."""
 
 
 def orphans(folder: Path) -> list[int]:
-    """Processes of a run in ``folder`` that outlived it, a second later; Linux only."""
+    """Return the processes of a run in ``folder`` that live a second after it; Linux only."""
     found: list[int] = []
     for _ in range(10):
         found = []
@@ -82,8 +78,8 @@ def orphans(folder: Path) -> list[int]:
     return found
 
 
-def noted(folder: Path) -> list[str]:
-    """What is wrong with the manifest of a batch that is done: each result is in it once, with its bytes."""
+def manifest_faults(folder: Path) -> list[str]:
+    """Return what is wrong with a finished batch's manifest: it has each result once, with its digest."""
     entries = [entry_of(line) for line in (folder / NAME).read_bytes().splitlines() if line]
     made = [entry for entry in entries if entry and entry.event == "made"]
     latest = {entry.output: entry.digest for entry in made}
@@ -94,65 +90,52 @@ def noted(folder: Path) -> list[str]:
 
 
 def results(folder: Path) -> dict[str, bytes]:
-    """The SVGs that are there."""
+    """Return the SVGs in ``folder``."""
     return {path.name: path.read_bytes() for path in folder.glob("*.svg")}
 
 
 def broken(folder: Path) -> list[str]:
-    """Results that are no whole SVG."""
+    """Return the results that are no complete SVG."""
     found = []
     for name, data in results(folder).items():
         try:
             render_svg(data.decode(), width=32, height=24)
+            is_whole = data.rstrip().endswith(b"</svg>")
         except (WarpsplatError, UnicodeDecodeError):
-            found.append(name)
-        else:
-            if not data.rstrip().endswith(b"</svg>"):
-                found.append(name)
+            is_whole = False
+        found += [] if is_whole else [name]
     return found
 
 
 COMPILING = 8.0
-"""About what the kernels take to compile [s]; that is native code, which a signal does not reach."""
+"""Time to compile the kernels [s], in native code that a signal does not interrupt."""
 
 LATE = 5.0
-"""A run must have ended so long after a signal [s], on a busy machine; the summary has the longest."""
+"""Longest time from a signal to the end of a run [s], on a busy machine."""
 
 ENDING = 0.3
-"""What Python's own end takes [s]: a signal in it changes the exit code no more."""
+"""Time of Python's own end [s], in which a signal no longer changes the exit code."""
 
 
-@dataclass(frozen=True)
-class Kill:
-    """One run that was ended, and the next one."""
+class Kill(NamedTuple):
+    """A run that was ended, and the next one."""
 
     command: str
     cold: bool
     """Whether it had to compile its kernels."""
-    number: signal.Signals
+    signal: str
     moment: float
     """[s] after the start."""
     code: int
     wait: float
     """From the signal to the end [s]."""
-    left: str
-    """What was there afterwards: "none", "old", "new", or "mixed" in a batch."""
-    faults: tuple[str, ...]
+    faults: list[str]
 
     def line(self) -> str:
-        """A row of the table."""
         return (
-            f"{self.command:10}{'cold' if self.cold else 'warm':5}{self.number.name:8}{self.moment:6.2f} s  "
-            f"{self.code:5}{self.wait:7.2f} s  {self.left:7}{'; '.join(self.faults) or 'ok'}"
+            f"{self.command:10}{'cold' if self.cold else 'warm':5}{self.signal:8}{self.moment:6.2f} s  "
+            f"{self.code:5}{self.wait:7.2f} s  {'; '.join(self.faults) or 'ok'}"
         )
-
-
-def _state(before: dict[str, bytes], after: dict[str, bytes], count: int) -> str:
-    if not after:
-        return "none"
-    if after == before:
-        return "old"
-    return "new" if len(after) == count and all(after[n] != before.get(n) for n in after) else "mixed"
 
 
 def kill_once(
@@ -163,18 +146,17 @@ def kill_once(
     signals: Sequence[signal.Signals],
     chance: float,
 ) -> Kill | None:
-    """End a run at a random moment, then run again; half of the runs find old results, some no kernels
-    (with a probability of ``chance``).
+    """End a run at a random moment, then run again; None: the run was done before that moment.
 
-    None where the run was done before that moment.
+    Half of the runs find old results, and some, with a probability of ``chance``, no kernels.
     """
     command, number, cold = rng.choice(list(whole)), rng.choice(signals), rng.random() < chance
     folder, cache = scratch / "folder", scratch / "cache" if cold else None
     folder.mkdir()
     lay_out(folder, command)
-    if rng.random() < 0.5 and command != "minified":  # which would not be known as ours
+    if rng.random() < 0.5 and command != "minified":  # minified files would not be known as ours
         for name, data in whole[command].items():
-            # An older version's, so that a batch makes it anew.
+            # An older version's, so that a batch makes it again.
             (folder / name).write_bytes(data.replace(b"<!--warpsplat ", b"<!--warpsplat 0"))
     before = results(folder)
     moment = rng.uniform(0, span[command] + (COMPILING if cold else 0))
@@ -186,38 +168,36 @@ def kill_once(
     process.send_signal(number)
     sent = time.monotonic()
     try:
-        said = process.communicate(timeout=60)[1]
+        stderr = process.communicate(timeout=60)[1]
     except subprocess.TimeoutExpired:
         process.kill()
-        said = process.communicate()[1]
+        stderr = process.communicate()[1]
     wait, code = time.monotonic() - sent, process.returncode
     faults = [f"process {number} lives on" for number in orphans(folder)]
-    after = results(folder)
     faults += [f"{name} is not whole" for name in broken(folder)]
-    faults += [f"{name} is gone" for name in before if name not in after]
-    # Python's own start can be interrupted before a line of this program runs, and says so its own way.
-    begun = "warpsplat" in said or "Traceback" not in said
-    # 0: it was just done; minus the signal: Python had not begun, or was ending; a shell says 128 + it.
+    faults += [f"{name} is gone" for name in before if name not in results(folder)]
+    # Python may be interrupted before a line of this program runs, and prints a traceback then.
+    begun = "warpsplat" in stderr or "Traceback" not in stderr
+    # 0: just done; minus the signal: Python had not begun, or was ending; 128 + signal: as in a shell.
     if code not in (0, 128 + number, -number) and begun:
         faults.append(f"exit code {code}")
-    if "Traceback" in said and begun:
+    if "Traceback" in stderr and begun:
         faults.append("traceback")
     if wait > (LATE + COMPILING if cold else LATE):
         faults.append("late")
     if code == 0 and wait > ENDING:
         faults.append("went on")
     again = start(folder, command, cache)
-    said = again.communicate(timeout=600)[1]
+    again.communicate(timeout=600)
     if again.returncode:
         faults.append(f"next run: exit code {again.returncode}")
     if results(folder) != whole[command]:
         faults.append("next run: other results")
     if command != "vectorize":
-        faults += [f"next run: {fault}" for fault in noted(folder)]
+        faults += [f"next run: {fault}" for fault in manifest_faults(folder)]
     known = {*INPUTS[command], *whole[command], "jobs.yaml", NAME}
     faults += [f"next run: left {name}" for name in os.listdir(folder) if name not in known]
-    left = _state(before, after, len(whole[command]))
-    return Kill(command, cold, number, moment, code, wait, left, tuple(faults))
+    return Kill(command, cold, number.name, moment, code, wait, faults)
 
 
 def main() -> None:
@@ -238,10 +218,10 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as scratch:
                 lay_out(Path(scratch), command)
                 begin = time.monotonic()
-                said = start(Path(scratch), command).communicate()[1]
+                stderr = start(Path(scratch), command).communicate()[1]
                 span[command] = time.monotonic() - begin
                 whole[command] = results(Path(scratch))
-                assert len(whole[command]) == len(INPUTS[command]), said
+                assert len(whole[command]) == len(INPUTS[command]), stderr
     kills: list[Kill] = []
     while len(kills) < given.count:
         with tempfile.TemporaryDirectory() as scratch:
@@ -250,9 +230,9 @@ def main() -> None:
             kills.append(kill)
             print(kill.line(), flush=True)
     print()
-    counts = Counter((k.command, k.number.name, k.code, k.left, bool(k.faults)) for k in kills)
-    for (command, name, code, left, is_faulty), count in sorted(counts.items()):
-        print(f"{command:10}{name:9} exit {code:4}  {left:6} {'FAULTY' if is_faulty else 'ok':7}{count:4}")
+    counts = Counter((k.command, k.signal, k.code, bool(k.faults)) for k in kills)
+    for (command, name, code, is_faulty), count in sorted(counts.items()):
+        print(f"{command:10}{name:9} exit {code:4}  {'FAULTY' if is_faulty else 'ok':7}{count:4}")
     faulty = sum(bool(k.faults) for k in kills)
     slowest = max((k.wait for k in kills), default=0.0)
     print(f"{len(kills)} runs ended, {faulty} with faults; the longest wait after a signal: {slowest:.2f} s")

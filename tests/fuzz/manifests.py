@@ -1,4 +1,4 @@
-"""Manifests to change: of what a batch finds in the folder ``in``, so that its entries are looked up."""
+"""Manifests to mutate, of the images that a batch finds in the folder ``in``."""
 
 from __future__ import annotations
 
@@ -27,17 +27,13 @@ SNIPPETS = (
 
 
 def arguments(json: bool) -> tuple[str, ...]:
-    """The command line of a batch that reads the manifest, and does nothing."""
+    """Return the command line of a batch that only reads the manifest."""
     fit = ("--curves", "4", "--iterations", "2", "--device", "cpu", "--dry-run", "--manifest", NAME)
     return ("batch", "in", "-o", "out", *fit, *(("--json",) if json else ()))
 
 
 def manifests(images: Mapping[str, bytes]) -> list[Seed]:
-    """One of failures, one of results that are gone, one of both.
-
-    Args:
-        images: by their paths.
-    """
+    """Return one of failures, one of missing results, and one of both; ``images``: by path."""
     settings = make_settings(curves=4, iterations=2)
     keys = {f"out/{Path(name).stem}.svg": job_key(settings, data) for name, data in images.items()}
     failed = b"".join(
@@ -48,7 +44,7 @@ def manifests(images: Mapping[str, bytes]) -> list[Seed]:
 
 
 def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    """Words and numbers, or bytes; seldom nothing but a torn end."""
+    """Change words and numbers, or bytes, or truncate it."""
     if rng.random() < 0.1:
         return data[: rng.randrange(len(data) + 1)]
     if rng.random() < 0.3:

@@ -15,14 +15,14 @@ MOST = 200_000
 """Longest input that is made [bytes]."""
 
 INTERESTING = (*range(4), *(2**n + d for n in (3, 4, 5, 7, 8, 12, 15, 16, 31, 32) for d in (-1, 0)))
-"""Numbers at which something often changes."""
+"""Numbers at which behaviour often changes."""
 
 Mutation = Callable[[random.Random, bytes, bytes], bytes]
-"""(generator, input, another input) -> changed input."""
+"""(generator, input, another input) -> mutated input."""
 
 
 def _place(rng: random.Random, data: bytes, width: int = 1) -> int:
-    """A place in ``data``; headers, where the meaning is dense, more often."""
+    """Return a place in ``data``, more often in its header, where meaning is dense."""
     end = max(1, len(data) - width + 1)
     return rng.randrange(min(end, 64)) if rng.random() < 0.4 else rng.randrange(end)
 
@@ -78,7 +78,7 @@ def _png_chunks(data: bytes) -> list[tuple[bytes, bytes]]:
 
 
 def png(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    """Change a PNG's chunks and make its checksums right again: the change gets past the door."""
+    """Mutate a PNG's chunks and correct its checksums, so that the mutation gets past the first checks."""
     chunks = _png_chunks(data)
     if not chunks:
         return mutate_bytes(rng, data, other)
@@ -90,10 +90,8 @@ def png(rng: random.Random, data: bytes, other: bytes) -> bytes:
     elif action == 1:
         chunks.insert(rng.randrange(len(chunks) + 1), chunks[place])
     elif action == 2:
-        chunks[place] = (
-            rng.choice((b"tRNS", b"gAMA", b"iCCP", b"eXIf", b"PLTE", b"acTL", b"fdAT", b"zTXt")),
-            body,
-        )
+        kinds = b"tRNS", b"gAMA", b"iCCP", b"eXIf", b"PLTE", b"acTL", b"fdAT", b"zTXt"
+        chunks[place] = (rng.choice(kinds), body)
     elif action == 3 and kind == b"IDAT":
         try:
             raw = zlib.decompress(body)
@@ -107,7 +105,7 @@ def png(rng: random.Random, data: bytes, other: bytes) -> bytes:
 
 
 def mutate_bytes(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    """One to a few changes, of any kind, anywhere."""
+    """Make one to a few changes, of any kind, anywhere."""
     for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
         data = rng.choice(BYTES)(rng, data, other)[:MOST] if data else b"\0"
     return data
@@ -121,7 +119,7 @@ TAG = re.compile(r"</?[a-zA-Z][^<>]*>")
 
 
 def _replace(rng: random.Random, text: str, pattern: re.Pattern[str], new: Callable[[str], str]) -> str:
-    """``text`` with one match of ``pattern``, chosen at random, replaced."""
+    """Return ``text`` with one match of ``pattern``, chosen at random, replaced."""
     matches = list(pattern.finditer(text))
     if not matches:
         return text
@@ -161,9 +159,8 @@ def _elements_many(rng: random.Random, text: str) -> str:
 def _nested(rng: random.Random, text: str) -> str:
     depth = rng.choice((2, 20, 200, 300, 1000, 3000))
     tag = rng.choice(("g", "g", "svg", "a", "switch", "symbol", "defs", "mask"))
-    given = rng.choice(
-        ("", "", ' transform="scale(1e9)"', ' opacity=".9"', ' style="fill:red"', ' fill="#123"')
-    )
+    attributes = "", "", ' transform="scale(1e9)"', ' opacity=".9"', ' style="fill:red"', ' fill="#123"'
+    given = rng.choice(attributes)
     return _replace(rng, text, ELEMENT, lambda e: f"<{tag}{given}>" * depth + e + f"</{tag}>" * depth)
 
 
@@ -173,12 +170,11 @@ def _attribute_moved(rng: random.Random, text: str) -> str:
 
 
 def _encoded(rng: random.Random, text: str) -> bytes:
-    """As bytes: UTF-8, or now and then another encoding, packed, or with a false declaration."""
+    """Return bytes: in UTF-8, or sometimes in another encoding, packed, or with a false declaration."""
     if rng.random() < 0.93:
         return text.encode("utf-8", "surrogatepass")
-    name = rng.choice(
-        ("utf-8-sig", "utf-16", "utf-16-le", "latin-1", "utf-32", "cp037", "gzip", "gzip", "declared")
-    )
+    encodings = "utf-8-sig", "utf-16", "utf-16-le", "latin-1", "utf-32", "cp037"
+    name = rng.choice((*encodings, "gzip", "gzip", "declared"))
     if name == "gzip":
         packed = gzip.compress(text.encode("utf-8", "replace"), 1, mtime=0)
         return packed if rng.random() < 0.5 else mutate_bytes(rng, packed, packed)
@@ -191,24 +187,16 @@ def _encoded(rng: random.Random, text: str) -> bytes:
 def mutate_text(
     rng: random.Random, data: bytes, other: bytes, words: tuple[str, ...], snippets: tuple[str, ...]
 ) -> bytes:
-    """One to a few changes to tokens of a text (XML or YAML), seldom to its bytes."""
+    """Make one to a few changes to tokens of a text (XML or YAML), or seldom to its bytes."""
     if rng.random() < 0.1:
         return mutate_bytes(rng, data, other)
     text = data.decode("utf-8", "replace")
-    changes: tuple[Callable[[], str], ...] = (
-        lambda: _number(rng, text),
-        lambda: _number(rng, text),
-        lambda: _number(rng, text),
-        lambda: _word(rng, text, words),
-        lambda: _word(rng, text, words),
-        lambda: _snippet(rng, text, snippets),
-        lambda: _snippet(rng, text, snippets),
-        lambda: _token_twice(rng, text),
-        lambda: _element_gone(rng, text),
-        lambda: _elements_many(rng, text),
-        lambda: _attribute_moved(rng, text),
-        lambda: _nested(rng, text),
+    changes: tuple[Callable[[random.Random, str], str], ...] = (
+        *(3 * (_number,)),
+        *(2 * (lambda rng, text: _word(rng, text, words),)),
+        *(2 * (lambda rng, text: _snippet(rng, text, snippets),)),
+        *(_token_twice, _element_gone, _elements_many, _attribute_moved, _nested),
     )
     for _ in range(rng.choice((1, 1, 2, 2, 3, 5))):
-        text = rng.choice(changes)()[:MOST]
+        text = rng.choice(changes)(rng, text)[:MOST]
     return _encoded(rng, text)

@@ -1,8 +1,7 @@
-"""``python -m tests.fuzz.resumes --count 5 --seed N``: runs ended at random steps that go on, as a table.
+"""``python -m tests.fuzz.resumes --count 5 --seed N``: runs ended at random steps and resumed, as a table.
 
-Each is ended twice: by SIGKILL right after its state was saved, and, gone on, by SIGTERM in the middle of a
-step. What the third run makes must be the bytes of one that nobody disturbed.
-"""
+Each is ended twice: by SIGKILL right after a checkpoint, and, resumed, by SIGTERM in the middle of a step.
+The third run must give the bytes of one that was not interrupted."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ from warpsplat.files.packed import unpack
 
 IMAGE = ROOT / "docs" / "images" / "cat.jpg"
 SIDE = 96
-"""Of the image's reduction [px]."""
+"""Side of the reduced image [px]."""
 
 COMMON = ("--curves=32", "--iterations=160", "--subject=photo", "--device=cpu", "--threads=1")
 RUNS = {
@@ -33,7 +32,7 @@ RUNS = {
     "layered": ("--levels=8,32",),
 }
 STEPS = 156
-"""Which all of these do, at the least."""
+"""Least number of steps of these runs."""
 
 DRIVER = """
 import os, sys
@@ -56,11 +55,13 @@ struck(*((stages.Stages, "save") if number == 9 else (Step, "advance")))
 from warpsplat.cli.main import main
 main({arguments!r})
 """
-"""Ends itself: by SIGKILL after a save, by another signal in a step, both counted."""
+"""A program that ends itself, by SIGKILL after a checkpoint or by another signal in a step, both counted."""
 
 
 def run(folder: Path, kind: str, name: str, number: int = 0, step: int = 0) -> int:
-    """Make ``name`` of a kind; with a ``number``, until that signal at that step. The exit code."""
+    """Run a kind with the result ``name``, until signal ``number`` at ``step`` if given; return the exit
+    code.
+    """
     given = ["vectorize", "image.png", "-o", name, "-q", *COMMON, *RUNS[kind]]
     if name != "whole.svg":
         given += ["--checkpoint=run.checkpoint", "--resume", f"--checkpoint-every={0 if number == 9 else 30}"]

@@ -1,8 +1,7 @@
-"""What must hold of any input, tried on inputs that hypothesis makes up."""
+"""Properties that must hold for any input, on inputs from hypothesis."""
 
 from __future__ import annotations
 
-import io
 import math
 import os
 import tempfile
@@ -18,6 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from PIL import Image
 
+from tests.fuzz.corpus import saved
 from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
@@ -36,7 +36,7 @@ pytestmark = pytest.mark.slow
 
 
 def examples(count: int) -> Callable[[Any], Any]:
-    """The same ``count`` examples on every run; none is stored."""
+    """Use the same ``count`` examples on every run, and store none."""
     return settings(
         max_examples=count,
         derandomize=True,
@@ -47,7 +47,7 @@ def examples(count: int) -> Callable[[Any], Any]:
 
 
 def one_line(error: BaseException) -> str:
-    """What a user is told."""
+    """Return the message of an error, which must be one line."""
     message, _ = explain(error)
     assert message.isprintable()
     return message
@@ -70,47 +70,30 @@ def test_durations_and_sizes_are_numbers_or_refused(text: str) -> None:
             assert value >= 0
 
 
-@examples(100)
-@given(
-    st.integers(0, 10**6), blanks, st.sampled_from([("ms", 0.001), ("s", 1), ("", 1), ("m", 60), ("h", 3600)])
-)
-def test_durations_are_in_seconds(number: int, blank: str, unit: tuple[str, float]) -> None:
-    assert parse_duration(f"{number}{blank}{unit[0]}") == pytest.approx(number * unit[1])
+SECONDS = {"ms": 0.001, "s": 1, "": 1, "m": 60, "h": 3600}
+BYTES = {"": 1, "B": 1, "kB": 1e3, "KiB": 2**10, "MB": 1e6, "MiB": 2**20, "GB": 1e9}
 
 
-@examples(100)
-@given(
-    st.integers(0, 10**6),
-    blanks,
-    st.sampled_from(
-        [("", 1), ("B", 1), ("kB", 1e3), ("KiB", 2**10), ("MB", 1e6), ("MiB", 2**20), ("GB", 1e9)]
-    ),
-)
-def test_sizes_are_in_bytes(number: int, blank: str, unit: tuple[str, float]) -> None:
-    assert parse_bytes(f"{number}{blank}{unit[0]}") == number * unit[1]
+@examples(200)
+@given(st.integers(0, 10**6), blanks, st.sampled_from([*SECONDS]), st.sampled_from([*BYTES]))
+def test_units_of_durations_and_sizes(number: int, blank: str, duration: str, size: str) -> None:
+    assert parse_duration(f"{number}{blank}{duration}") == pytest.approx(number * SECONDS[duration])
+    assert parse_bytes(f"{number}{blank}{size}") == number * BYTES[size]
 
 
-anything = (
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats()
-    | st.text(max_size=8)
-    | st.lists(st.none(), max_size=1)
+scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
+anything = scalars | st.lists(st.none(), max_size=1)
+KEYWORDS = (
+    "curves",
+    "iterations",
+    "precision",
+    "seed",
+    "target_psnr",
+    "time_budget",
+    "max_bytes",
+    "renderer",
 )
-names = st.sampled_from(
-    [
-        "curves",
-        "iterations",
-        "precision",
-        "seed",
-        "target_psnr",
-        "time_budget",
-        "max_bytes",
-        "kind",
-        "renderer",
-    ]
-)
+names = st.sampled_from(("kind", *KEYWORDS))
 
 
 @examples(150)
@@ -131,10 +114,8 @@ def assert_named(error: ImageError) -> None:
     assert one_line(error).startswith("made up: ")
 
 
-def saved(pixels: np.ndarray, form: str) -> bytes:
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, form)
-    return buffer.getvalue()
+def load(pixels: np.ndarray, form: str) -> np.ndarray:
+    return load_image(saved(Image.fromarray(pixels), form), "made up")
 
 
 shapes = st.tuples(st.integers(2, 20), st.integers(2, 20))
@@ -145,7 +126,7 @@ transparent = shapes.flatmap(lambda s: arrays.arrays(np.uint8, (*s, 4)))
 @examples(60)
 @given(colored, st.sampled_from(["PNG", "TIFF", "BMP", "PPM", "TGA"]))
 def test_pixels_come_back(pixels: np.ndarray, form: str) -> None:
-    loaded = load_image(saved(pixels, form), "made up")
+    loaded = load(pixels, form)
     assert loaded.shape == pixels.shape
     np.testing.assert_array_equal(np.round(loaded * 255), pixels)
 
@@ -155,23 +136,21 @@ def test_pixels_come_back(pixels: np.ndarray, form: str) -> None:
 def test_transparency_goes_on_white(pixels: np.ndarray, form: str) -> None:
     alpha = pixels[..., 3:] / 255
     expected = pixels[..., :3] / 255 * alpha + 1 - alpha
-    np.testing.assert_allclose(load_image(saved(pixels, form), "made up"), expected, atol=1e-6)
+    np.testing.assert_allclose(load(pixels, form), expected, atol=1e-6)
 
 
 @examples(60)
 @given(shapes.flatmap(lambda s: arrays.arrays(np.uint16, s)), st.sampled_from(["PNG", "TIFF"]))
 def test_grey_of_16_bits_comes_back(pixels: np.ndarray, form: str) -> None:
-    np.testing.assert_array_equal(
-        np.round(load_image(saved(pixels, form), "made up")[..., 1] * 65535.0), pixels
-    )
+    np.testing.assert_array_equal(np.round(load(pixels, form)[..., 1] * 65535.0), pixels)
 
 
 @examples(60)
 @given(shapes.flatmap(lambda s: arrays.arrays(np.float32, s)))
 def test_floats_are_pixels_or_refused(pixels: np.ndarray) -> None:
-    """Among them NaN, infinities and all that is out of range."""
+    """Even NaN, infinities and values out of range."""
     try:
-        loaded = load_image(saved(pixels, "TIFF"), "made up")
+        loaded = load(pixels, "TIFF")
     except ImageError as error:
         assert_named(error)
         return
@@ -282,7 +261,7 @@ def test_a_name_can_be_written_or_is_refused(name: str) -> None:
 @examples(120)
 @given(drawings)
 def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
-    """What ``refine`` starts from shows what the SVG shows, whatever features it has."""
+    """The scene that ``refine`` starts from looks as the SVG."""
     try:
         scene, background = load_scene(text, WIDTH, HEIGHT, "made up")
     except ImageError as error:
@@ -296,4 +275,4 @@ def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
 
 
 FAITHFUL = 30.0
-"""Between an SVG and what is held of it [dB]; a dash that is lost costs more than twenty."""
+"""Least PSNR of a scene read from an SVG [dB]; a lost dash costs more than twenty."""

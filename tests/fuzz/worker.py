@@ -1,8 +1,7 @@
 """A process that runs commands of warpsplat one after the other, and its owner's handle on it.
 
-Starting Python and its libraries takes a hundred times as long as most commands on small inputs do. The
-process is one of its own so that a crash, a hang or a flood of memory is seen and outlived.
-"""
+Starting Python and its libraries takes a hundred times as long as most commands on small inputs. The process
+is separate so that a crash, a hang or a flood of memory is seen and survived."""
 
 from __future__ import annotations
 
@@ -22,62 +21,53 @@ from typing import Any
 from tests import ROOT
 
 MAX_SECONDS = 10.0
-"""No run on a small input may take longer [s of processor time, which other programs do not lengthen]."""
+"""Longest run on a small input [s of processor time, which other programs do not lengthen]."""
 PATIENCE = 10.0
-"""Seconds on the clock for each of those: beyond, a command waits for something that does not come."""
+"""Ratio of wall-clock time to that: beyond, a command waits for something that does not come."""
 MAX_MEMORY = 2 << 30
-"""Nor hold more [bytes]."""
+"""Most memory of a run [bytes]."""
 DRIFT = 512 << 20
-"""A worker that has grown beyond this between commands [bytes] is replaced, so that one run's memory is not
-held against the next."""
+"""Memory beyond which a worker is replaced between commands [bytes], so that the next run starts fresh."""
+TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command did."""
+    """The outcome of a command."""
 
     code: int
-    """Exit code; minus the signal's number where a signal ended the process."""
+    """Exit code; minus the signal's number if a signal ended the process."""
     stdout: str
     stderr: str
     seconds: float
-    """Of processor time."""
+    """Processor time [s]."""
     peak: int
-    """Most memory that was held [bytes]; 0 where the system does not say."""
+    """Most memory [bytes]; 0: unknown."""
     ended: str = ""
     """Why the process had to be ended: "time" or "memory"."""
 
 
-def _status(process: int | str, key: str) -> int:
-    """A size [bytes] out of Linux' account of a process; 0 where there is none."""
+def _proc(process: int | str, name: str) -> str:
+    """Return a file of Linux's account of a process; empty if there is none."""
     try:
-        text = Path(f"/proc/{process}/status").read_text()
+        return Path(f"/proc/{process}/{name}").read_text()
     except OSError:
-        return 0
-    return next((int(line.split()[1]) * 1024 for line in text.splitlines() if line.startswith(key)), 0)
+        return ""
 
 
-TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
+def _status(process: int | str, key: str) -> int:
+    """Return a size [bytes] in a process's status; 0 if it is unknown."""
+    lines = _proc(process, "status").splitlines()
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith(key)), 0)
 
 
 def _spent(process: int) -> float:
-    """Processor time of a process and of the children that it has waited for [s]; 0 where nobody says."""
-    try:
-        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return sum(map(int, fields[11:15])) / TICKS
-
-
-def _children(process: int) -> list[int]:
-    try:
-        return [int(c) for c in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
-    except OSError:
-        return []
+    """Return the processor time of a process and its finished children [s]."""
+    return sum(map(int, _proc(process, "stat").rpartition(")")[2].split()[11:15])) / TICKS
 
 
 class Worker:
-    """Owner's side; starts the process when it is needed, and again after it has ended."""
+    """The owner's side; the process is started when it is needed, and again after it has ended."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -94,7 +84,7 @@ class Worker:
             self._process.kill()
             self._process.wait()
             for pipe in (self._process.stdin, self._process.stdout):
-                with contextlib.suppress(OSError):  # what is left in the pipe goes nowhere
+                with contextlib.suppress(OSError):  # unsent data in the pipe
                     assert pipe
                     pipe.close()
         self._process = None
@@ -102,8 +92,14 @@ class Worker:
     def run(self, arguments: list[str], folder: Path, stdin: Path | None = None) -> Outcome:
         """Run ``warpsplat ARGUMENTS`` in ``folder``."""
         if not self._process:
-            # Warm, so that the first command's time is its own; the limit there only guards against hangs.
-            self._start()
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "tests.fuzz.worker"],
+                cwd=ROOT,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+            )
+            # A first command, so that start-up does not count; the limit only guards against hangs.
             outcome = self._ask(["info"], folder, None, limit=120.0)
             if not self._process:
                 return outcome
@@ -112,26 +108,16 @@ class Worker:
             self.close()
         return outcome
 
-    def _start(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.fuzz.worker"],
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-
     def _ask(self, arguments: list[str], folder: Path, stdin: Path | None, *, limit: float) -> Outcome:
         process = self._process
         assert process and process.stdin and process.stdout
         task = {"arguments": arguments, "folder": str(folder), "stdin": str(stdin or os.devnull)}
-        with contextlib.suppress(BrokenPipeError):  # a process that has ended is seen below
+        with contextlib.suppress(BrokenPipeError):  # the process has ended, see below
             process.stdin.write(json.dumps(task).encode() + b"\n")
             process.stdin.flush()
-        started, before, peak, ended = time.monotonic(), _spent(process.pid), 0, ""
-        spent = 0.0
+        started, before, peak, ended, spent = time.monotonic(), _spent(process.pid), 0, "", 0.0
         while not ended and not select.select([process.stdout], [], [], 0.05)[0]:
-            children = _children(process.pid)
+            children = list(map(int, _proc(process.pid, f"task/{process.pid}/children").split()))
             held = sum(_status(p, "VmRSS") for p in (process.pid, *children))
             peak = max(peak, held)
             spent = _spent(process.pid) - before + sum(map(_spent, children))
@@ -151,25 +137,23 @@ class Worker:
 
 
 def _serve() -> None:
-    """Process' side: run what comes on the standard input, answer on the standard output."""
+    """Run the tasks on the standard input, and answer on the standard output."""
     tasks = os.fdopen(os.dup(0), "rb")
     answers = os.fdopen(os.dup(1), "wb")
-    main: Any = None
+    from warpsplat.cli.main import main
+
     for line in tasks:
-        task = json.loads(line)
-        if main is None:
-            from warpsplat.cli.main import main
-        answers.write(json.dumps(asdict(_run(main, task))).encode() + b"\n")
+        answers.write(json.dumps(asdict(_run(main, json.loads(line)))).encode() + b"\n")
         answers.flush()
 
 
 def _run(main: Any, task: dict[str, Any]) -> Outcome:
     with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")  # forget the highest memory so far
+        Path("/proc/self/clear_refs").write_text("5")  # reset the highest memory
     os.chdir(task["folder"])
     umask = os.umask(0o022)
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        # Files in the streams' places, and not Python's streams only: native code writes as well.
+        # Replace the file descriptors, and not Python's streams only: native code writes as well.
         source = os.open(task["stdin"], os.O_RDONLY)
         for number, handle in enumerate((source, out.fileno(), err.fileno())):
             os.dup2(handle, number)
@@ -189,8 +173,7 @@ def _run(main: Any, task: dict[str, Any]) -> Outcome:
             file.seek(0)
             texts.append(file.read(1 << 20).decode("utf-8", "replace"))
     os.umask(umask)
-    peak = _status("self", "VmHWM")
-    return Outcome(code, texts[0], texts[1], seconds, peak)
+    return Outcome(code, texts[0], texts[1], seconds, _status("self", "VmHWM"))
 
 
 def _call(main: Any, arguments: list[str]) -> int:
@@ -201,7 +184,7 @@ def _call(main: Any, arguments: list[str]) -> int:
             return end.code or 0
         print(end.code, file=sys.stderr)
         return 1
-    except BaseException:  # what Python would print before it ends
+    except BaseException:  # as Python does at the end
         traceback.print_exc()
         return 1
     return 0

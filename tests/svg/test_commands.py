@@ -1,4 +1,4 @@
-"""Lines and cubics in the fewest characters."""
+"""Outlines in the fewest characters."""
 
 from __future__ import annotations
 
@@ -10,8 +10,17 @@ import pytest
 from tests.drawing.drawings import logo, seam
 from tests.scenes import random_scene
 from warpsplat.scene import Kind
-from warpsplat.svg import commands
-from warpsplat.svg.commands import Pair, Segment, choices, row, segments_of, shortest, shortest_ring
+from warpsplat.svg.commands import (
+    Pair,
+    Segment,
+    choices,
+    minus,
+    row,
+    segments_of,
+    shortest,
+    shortest_ring,
+    shortest_smooth,
+)
 from warpsplat.svg.data import cubic_data
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
@@ -40,16 +49,12 @@ def segments(seed: int, count: int) -> list[Segment]:
 
 def every_text(pen: Pair | None, chain: list[Segment]) -> list[str]:
     """All ways to write a chain."""
-    texts = []
-    options = []
+    texts, options = [], []
     mirrored = chain[0].start
     for segment in chain:
         options.append(choices(segment, mirrored))
         mirrored = segment.mirrored()
-    moves = (
-        ("M", chain[0].start),
-        ("m", (chain[0].start[0] - (pen or (0, 0))[0], chain[0].start[1] - (pen or (0, 0))[1])),
-    )
+    moves = (("M", chain[0].start), ("m", minus(chain[0].start, pen or (0, 0))))
     for (move, numbers), ways in itertools.product(moves, itertools.product(*options)):
         text, last = move + row(numbers, False), {"M": "L", "m": "l"}[move]
         for letter, values in ways:
@@ -78,24 +83,21 @@ def test_it_is_read_as_it_is(seed: int) -> None:
     np.testing.assert_allclose(drawn.points, want, atol=1e-9)
 
 
-SAID = {
-    "level and upright lines by one number": (
-        [(0, 0), (9, 0), (9, 8), (1, 8), (1, 2), (5, 1)],
-        "M0 0h9v8H1V2l4-1",
-    ),
-    "pairs behind a move": ([(5, 5), (6, 7), (8, 6)], "M5 5l1 2 2-1"),
-    "absolute ones": ([(90, 90), (0, 7), (95, 93)], "M90 90L0 7 95 93"),
-}
-
-
-@pytest.mark.parametrize(("points", "text"), SAID.values(), ids=SAID.keys())
-def test_how_lines_are_said(points: list[Pair], text: str) -> None:
+@pytest.mark.parametrize(
+    ("points", "text"),
+    [
+        ([(0, 0), (9, 0), (9, 8), (1, 8), (1, 2), (5, 1)], "M0 0h9v8H1V2l4-1"),
+        ([(5, 5), (6, 7), (8, 6)], "M5 5l1 2 2-1"),
+        ([(90, 90), (0, 7), (95, 93)], "M90 90L0 7 95 93"),
+    ],
+    ids=["level and upright", "behind a move", "absolute"],
+)
+def test_lines(points: list[Pair], text: str) -> None:
     made = shortest(None, [Segment(a, None, b) for a, b in itertools.pairwise(points)])
     assert len(made) == len(text)
 
 
 def test_a_ring_is_the_shortest_of_its_starts() -> None:
-    """And the ways to write a segment are found once, not for each start."""
     chain = segments(3, 40)
     chain.append(Segment(chain[-1].end, None, chain[0].start))
     text, end = shortest_ring((3, 4), chain)
@@ -105,21 +107,6 @@ def test_a_ring_is_the_shortest_of_its_starts() -> None:
     assert len(text) <= sorted(map(len, texts))[len(texts) // 4]
     (drawn,) = cubics(text, keep_dots=True)
     assert tuple(drawn.points[-1]) == end
-
-
-def test_work_for_a_ring_grows_with_its_segments(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[Segment] = []
-    found = commands.choices
-
-    def noted(one: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]]]:
-        asked.append(one)
-        return found(one, mirrored)
-
-    monkeypatch.setattr(commands, "choices", noted)
-    for count in (20, 80):
-        asked.clear()
-        shortest_ring(None, segments(5, count))
-        assert len(asked) <= count + commands.STARTS
 
 
 def test_a_line_that_closes_is_left_out() -> None:
@@ -165,3 +152,42 @@ def test_lines_of_a_drawing_are_lines() -> None:
     assert text.split('<path d="')[2].count("c") >= 2
     curved = write_svg(random_scene(Kind.FILL, 3), per_pixel=10)
     assert "l" not in "".join(part.split('"')[0] for part in curved.split('<path d="')[1:])
+
+
+def outline(seed: int, count: int) -> tuple[list[Pair], Pair]:
+    """Return joints and the first control point, some of them outside the canvas."""
+    points = np.random.default_rng(seed).integers(-20, 110, (count + 1, 2)).tolist()
+    first, *joints = [(x, y) for x, y in points]
+    return joints, first
+
+
+def every_smooth_text(joints: list[Pair], control: Pair) -> list[str]:
+    """Return the outline in each choice of relative and absolute commands."""
+    texts = []
+    for relative in itertools.product((True, False), repeat=len(joints) - 1):
+        text, last = f"M{row(joints[0], False)}", ""
+        for i, is_relative in enumerate(relative):
+            before, end = joints[i : i + 2]
+            letter = ("Q" if i == 0 else "T").lower() if is_relative else ("Q" if i == 0 else "T")
+            points = [control, end] if i == 0 else [end]
+            numbers = [x for point in points for x in (minus(point, before) if is_relative else point)]
+            text += row(numbers, True) if letter == last else letter + row(numbers, False)
+            last = letter
+        texts.append(text)
+    return texts
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("count", [2, 6])
+def test_no_other_smooth_text_is_shorter(seed: int, count: int) -> None:
+    joints, control = outline(seed, count)
+    texts = every_smooth_text(joints, control)
+    data = shortest_smooth(joints, control)
+    assert data in texts
+    assert len(data) == min(map(len, texts))
+    shown, wanted = (cubics(text, keep_dots=True)[0].points for text in (data, texts[0]))
+    np.testing.assert_allclose(shown, wanted, atol=1e-9)
+
+
+def test_absolute_smooth_commands_are_used() -> None:
+    assert any("T" in shortest_smooth(*outline(seed, 6)) for seed in range(6))

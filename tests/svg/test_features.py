@@ -1,18 +1,18 @@
-"""What SVGs may say: read, drawn and written again, it looks as resvg shows the file."""
+"""SVGs of all features, read, rendered and written again, look as resvg shows the file."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from tests.svg.foreign import HEAD, ROUND
+from tests.svg.foreign import FOREIGN, HEAD, ROUND
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Scene
 from warpsplat.svg.read import load_scene
-from warpsplat.svg.viewer import on_white, render_own
+from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import write_svg
 
 LINK = 'xmlns:xlink="http://www.w3.org/1999/xlink" '
@@ -114,7 +114,6 @@ LINES = {
     '<path d="M4 18h30" stroke="red" stroke-width="4" stroke-dasharray="0 0"/>',
 }
 
-
 GROUPS = (STRUCTURE, STYLE, SHAPES, PAINTS, LINES)
 
 
@@ -125,6 +124,17 @@ def _read(body: str, more: str = "") -> tuple[str, Scene]:
 
 def _shown(text: str) -> np.ndarray:
     return on_white(render_own(text))
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_foreign_files_look_the_same(name: str) -> None:
+    text = HEAD + FOREIGN[name]
+    scene, _ = load_scene(text, 40, 30, name)
+    shown = on_white(render_svg(text, width=40, height=30))
+    # Strokes: resvg's antialiasing has 16 levels, and much of so small an image is edge.
+    least = 34 if "stroke" in name else 38
+    assert psnr(render(scene, backend=Backend.on("cpu")).astype(np.float64) * 255, shown) > least
+    assert psnr(_shown(write_svg(scene)), shown) > 38
 
 
 @pytest.mark.parametrize(

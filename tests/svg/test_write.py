@@ -6,6 +6,7 @@ import io
 import re
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import cairosvg
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.drawing.drawings import logo
 from tests.scenes import disc, mixed_scene, random_scene, started_alike, with_gradients
 from warpsplat.files.output import may_replace
 from warpsplat.metrics import psnr
@@ -24,6 +26,7 @@ from warpsplat.svg.data import PathData, integers, spline_data
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
+from warpsplat.svg.uri import data_uri
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
@@ -38,26 +41,12 @@ from warpsplat.svg.write import (
     write_svg,
 )
 
-NUMBERS = [
-    (0.0, 1, "0"),
-    (-0.04, 1, "0"),
-    (0.5, 1, ".5"),
-    (-0.5, 1, "-.5"),
-    (10.0, 1, "10"),
-    (100.0, 0, "100"),
-    (-20.26, 1, "-20.3"),
-    (1.005, 3, "1.005"),
-]
 
-
-@pytest.mark.parametrize(("value", "decimals", "text"), NUMBERS)
-def test_numbers(value: float, decimals: int, text: str) -> None:
-    assert number(value, decimals) == text
-
-
-def test_numbers_in_a_row() -> None:
-    """A sign separates itself."""
-    assert integers([(1, -2), (-13, 0), (7, 8)]) == "1-2-13 0 7 8"
+def test_numbers() -> None:
+    texts = [number(value, 1) for value in (0.0, -0.04, 0.5, -0.5, 10.0, -20.26)]
+    assert texts == ["0", "0", ".5", "-.5", "10", "-20.3"]
+    assert (number(100.0, 0), number(1.005, 3)) == ("100", "1.005")
+    assert integers([(1, -2), (-13, 0), (7, 8)]) == "1-2-13 0 7 8", "a sign separates"
 
 
 def test_colors() -> None:
@@ -98,8 +87,8 @@ def test_a_spline_is_one_quadratic_and_smooth_ones(kind: Kind) -> None:
 
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("per_pixel", GRIDS)
-def test_the_file_says_everything_in_few_numbers(kind: Kind, per_pixel: float) -> None:
-    """Whole coordinates, opacities of two decimals and widths of one, no closing of paths."""
+def test_numbers_of_a_file_are_short(kind: Kind, per_pixel: float) -> None:
+    """Coordinates are whole, opacities have two decimals and widths one, and paths are not closed."""
     scene = mixed_scene(41, 37)
     text = write_svg(scene.take(np.flatnonzero(scene.kind == kind)), per_pixel=per_pixel)
     paths = re.findall(r' d="([^"]*)"', text)
@@ -199,8 +188,8 @@ def test_decimals_of_widths(per_pixel: float, decimals: int) -> None:
     assert np.abs(held - scene.widths).max() <= 0.5 * max(0.25, 0.1 / per_pixel) + 1e-6
 
 
-@pytest.mark.parametrize("opacity", [0.9949, 0.995, 0.9981, 1.0])
-def test_what_rounds_to_opaque_is_written_so(opacity: float) -> None:
+@pytest.mark.parametrize("opacity", [0.9949, 0.995, 0.9985, 1.0])
+def test_opacities_that_round_to_1_are_left_out(opacity: float) -> None:
     scene = replace(disc(10, 30, 15), opacities=np.full(1, opacity, np.float32))
     text = write_svg(scene)
     assert ("fill-opacity" in text) == (opacity < 0.995)
@@ -223,34 +212,20 @@ def test_document() -> None:
     root = ElementTree.fromstring(text)
     assert root.attrib["viewBox"] == "0 0 4000 3600"
     assert read_metadata(text).endswith("key=abc")
-    group = root.find("{http://www.w3.org/2000/svg}g")
-    assert group is not None
+    group = root[1]
     assert group.attrib == {"fill": "none", "stroke-linecap": "round", "stroke-linejoin": "round"}
     assert len(group) == 2
     assert all(float(p.attrib["stroke-width"]) > 0 for p in group)
 
 
-def test_opaque_shapes_need_no_opacity() -> None:
-    scene = disc(10, 30, 15)
-    scene.opacities[:] = 2.0
-    assert "fill-opacity" not in write_svg(replace(scene, opacities=np.full(1, 0.9985, np.float32)))
-
-
+@pytest.mark.parametrize("basis", list(Basis))
 @pytest.mark.parametrize("kind", list(Kind))
-def test_the_file_of_splines_looks_as_the_render(device: str, kind: Kind) -> None:
-    scene = random_scene(kind, count=10, width=96, height=80, seed=3, basis=Basis.SPLINE)
-    mine = render(scene, backend=Backend.on(device)).astype(np.float64) * 255
-    assert psnr(mine, on_white(render_svg(write_svg(scene)))) > 42
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
+def test_the_file_looks_as_the_render(device: str, kind: Kind, basis: Basis) -> None:
     """Painter's order, opacity, extent."""
-    scene = random_scene(kind, count=10, width=96, height=80, seed=3)
+    scene = random_scene(kind, count=10, width=96, height=80, seed=3, basis=basis)
     backend = Backend.on(device)
-    inner = on_white(render_svg(write_svg(scene)))
     mine = render(scene, backend=backend).astype(np.float64) * 255
-    assert psnr(mine, inner) > 42
+    assert psnr(mine, on_white(render_svg(write_svg(scene)))) > 42
     swapped = replace(scene, points=scene.take(np.arange(len(scene))[::-1]).points)
     assert psnr(mine, on_white(render_svg(write_svg(swapped)))) < 20
 
@@ -276,7 +251,7 @@ def test_titles() -> None:
 
 
 def test_fills_of_one_paint_that_lie_apart_are_one_path() -> None:
-    """It shows the same and is read as a shape of two contours; those that overlap stay two."""
+    """The path looks the same and is read as a shape of two contours; overlapping shapes stay two."""
     scene = random_scene(Kind.FILL, count=2, basis=Basis.SPLINE)
     points = scene.points - scene.points.mean(axis=0)
     points *= 6 / np.abs(points).max()
@@ -301,7 +276,7 @@ def test_fills_of_one_paint_that_lie_apart_are_one_path() -> None:
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_short_files_are_marked_by_the_order_of_their_attributes(kind: Kind, tmp_path: Path) -> None:
-    """They show the same, are known again, and are no longer than without a mark."""
+    """They look the same, are recognised, and are no longer than without a mark."""
     text = write_svg(random_scene(kind, count=3), per_pixel=0.5)
     short = shortened(text)
     assert short != text
@@ -314,7 +289,7 @@ def test_short_files_are_marked_by_the_order_of_their_attributes(kind: Kind, tmp
         path.write_text(content)
         assert may_replace(path) == is_ours
     keyed = write_svg(random_scene(kind, count=3), per_pixel=0.5, metadata="key")
-    assert shortened(keyed) == keyed, "what the comment says is kept"
+    assert shortened(keyed) == keyed, "metadata stay"
     long = write_svg(random_scene(kind, count=40))
     assert len(long) > SHORT
     assert shortened(long) == long
@@ -322,7 +297,7 @@ def test_short_files_are_marked_by_the_order_of_their_attributes(kind: Kind, tmp
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_minified(kind: Kind) -> None:
-    """It looks the same, and says nothing that shows nothing."""
+    """It looks the same, without mark and line breaks."""
     text = write_svg(random_scene(kind, count=3), metadata="abcdefgh", title="t")
     small = minified(text)
     assert len(text) - len(small) == len("<!--warpsplat abcdefgh-->\n\n")
@@ -331,8 +306,7 @@ def test_minified(kind: Kind) -> None:
     assert minified(small) == small
 
 
-def test_black_need_not_be_said() -> None:
-    """Of a fill it is what holds; of a stroke it is not."""
+def test_black_is_the_default_of_fills_but_not_of_strokes() -> None:
     for kind in Kind:
         scene = random_scene(kind, count=3)
         colors = scene.colors.copy()
@@ -349,7 +323,7 @@ def test_black_need_not_be_said() -> None:
 
 
 def test_neighbours_of_one_colour_share_a_group() -> None:
-    """Of a colour and line, and of both at once."""
+    """With the same colour, the same line, or both."""
     for kind in Kind:
         scene = random_scene(kind, count=6)
         scene = replace(
@@ -394,13 +368,10 @@ def test_neighbours_of_one_colour_share_a_named_group() -> None:
     fills = replace(fills, colors=np.array([navy, navy, gold, navy, navy, gold], np.float32))
     text = write_svg(fills, per_pixel=5, ids=True)
     groups = re.findall(r'<g id="([^"]*)" fill="([^"]*)">(.*?)</g>(?=<g id|<path|</svg)', text)
-    assert [(name, fill) for name, fill, _ in groups] == [
-        ("navy-group", "#000080"),
-        ("navy-group-2", "#000080"),
-    ]
-    assert [re.findall('<path[^>]* id="([^"]*)"', inner) for _, _, inner in groups] == [
-        ["navy", "navy-2"],
-        ["navy-3", "navy-4"],
+    found = [(name, fill, re.findall('<path[^>]* id="([^"]*)"', inner)) for name, fill, inner in groups]
+    assert found == [
+        ("navy-group", "#000080", ["navy", "navy-2"]),
+        ("navy-group-2", "#000080", ["navy-3", "navy-4"]),
     ]
     assert 'fill="#000080"' not in "".join(inner for _, _, inner in groups)
     assert (np.asarray(render_svg(text)) == np.asarray(render_svg(write_svg(fills, per_pixel=5)))).all()
@@ -412,3 +383,16 @@ def test_pens_are_groups_already() -> None:
     text = write_svg(replace(strokes, layer_names=("pen-1-000000",)), per_pixel=5, ids=True)
     assert "-group" not in text
     assert '<g id="pen-1-000000">' in text
+
+
+@pytest.mark.parametrize("title", ["", 'A <b> & "c" 100% #1 ä\u2028', "it's"])
+def test_a_uri_holds_the_file(title: str) -> None:
+    text = minified(write_svg(logo().scene, title=title))
+    kind, comma, uri = data_uri(text).partition(",")
+    assert (kind, comma) == ("data:image/svg+xml", ",")
+    assert uri.isascii()
+    assert not set('"<>#\n\\{}|^`') & set(uri)
+    got, want = (ElementTree.tostring(ElementTree.fromstring(t)) for t in (unquote(uri), text))
+    assert got == want
+    if not title:
+        assert len(uri) < 1.15 * len(text)
