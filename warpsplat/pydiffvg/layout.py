@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -65,22 +66,16 @@ class Row(NamedTuple):
     is_area: bool = False
     """Whether it is a stroke that is filled as the area that it covers; it then has one shape."""
 
-    def contours(self) -> list[tuple[ShapeStructure, bool]]:
-        """Return the shapes, each with whether its contour is closed; not for areas."""
-        return [(shape, self.kind == Kind.FILL or shape.closed) for shape in self.shapes]
-
-    def sizes(self) -> list[int]:
-        """Return the number of control points of each contour."""
-        if self.is_area:
-            return contour_sizes(len(self.shapes[0].counts), self.shapes[0].closed)
-        return [
-            3 * (len(shape.counts) + (is_closed and not shape.closed)) + (not is_closed)
-            for shape, is_closed in self.contours()
-        ]
-
     def closed(self) -> list[bool]:
         """Return whether each contour is closed."""
-        return [True] * len(self.sizes()) if self.is_area else [closed for _, closed in self.contours()]
+        if self.is_area:
+            return [True] * (1 + self.shapes[0].closed)
+        return [self.kind == Kind.FILL or shape.closed for shape in self.shapes]
+
+    def outlines(self) -> list[Terms]:
+        """Return the control points of each contour, see ``_coordinates``; none of an area."""
+        each = [] if self.is_area else zip(self.shapes, self.closed(), strict=True)
+        return [_coordinates(shape, _contour(shape, is_closed)) for shape, is_closed in each]
 
 
 class Area(NamedTuple):
@@ -127,8 +122,8 @@ class Layout:
 
     scene: Scene
     """Structure and canvas; its attributes are placeholders."""
-    fixed: dict[str, Tensor]
-    """Attributes that no number changes, by name."""
+    defaults: dict[str, Tensor]
+    """Attributes by name, for those that come from no number."""
     points: Gather
     """Control points of outlines [shape units], shape (point, 2)."""
     areas: tuple[Area, ...]
@@ -173,20 +168,21 @@ def make_layout(
         threads: of the CPU that render.
     """
     rows = _rows(structure, uniform)
-    scene = _scene(rows, structure.groups, size)
-    outlines = [
-        _coordinates(shape, _contour(shape, closed))
-        for row in rows
-        if not row.is_area
-        for shape, closed in row.contours()
+    outlines = [row.outlines() for row in rows]
+    sizes = [
+        contour_sizes(len(row.shapes[0].counts), row.shapes[0].closed)
+        if row.is_area
+        else [len(terms.indices) for terms in own]
+        for row, own in zip(rows, outlines, strict=True)
     ]
+    scene = _scene(rows, sizes, structure.groups, size)
     areas, order = _areas(rows, scene, device)
     paints = [range(p.first, p.first + 4) if p.kind == "flat" else BLACK for p in (row.paint for row in rows)]
     widths = [row.shapes[0].width if row.kind == Kind.STROKE else ZERO for row in rows]
     return Layout(
         scene,
         {a.name: on(getattr(scene, a.name), device) for a in attributes_of(scene)},
-        Gather(combined([NOTHING, *outlines], np.concatenate), device),
+        Gather(combined([NOTHING, *itertools.chain(*outlines)], np.concatenate), device),
         areas,
         order,
         _transforms(rows, structure.groups, scene, device),
@@ -307,12 +303,16 @@ def _gradients(rows: list[Row], device: torch.device) -> Gradients:
     return Gradients(each[0], on(is_radial, device), *each[1:])
 
 
-def _scene(rows: list[Row], groups: tuple[GroupStructure, ...], size: tuple[int, int]) -> Scene:
-    """Return the structure of our scene; attributes that come from tensors have any values."""
+def _scene(
+    rows: list[Row], sizes: list[list[int]], groups: tuple[GroupStructure, ...], size: tuple[int, int]
+) -> Scene:
+    """Return our scene with placeholders for the attributes that come from tensors.
+
+    ``sizes``: control points of each row's contours; ``size``: width and height of the image [px].
+    """
     lines = [groups[row.group].line if row.kind == Kind.STROKE else None for row in rows]
     dashes = tuple(sorted({line.dashes for line in lines if line} - {()}))
     even_odd = [groups[row.group].even_odd and row.kind == Kind.FILL and not row.is_area for row in rows]
-    sizes = [row.sizes() for row in rows]
 
     def traits(values: Iterable[int]) -> IntArray:
         return np.array([*values], np.int32)
