@@ -13,14 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from warpsplat.pydiffvg.arguments import (
-    ONE,
-    ZERO,
-    GroupStructure,
-    PaintStructure,
-    ShapeStructure,
-    Structure,
-)
+from warpsplat.pydiffvg.arguments import ONE, ZERO, GroupStructure, PaintStructure, ShapeStructure, Structure
 from warpsplat.pydiffvg.gather import Gather, Terms, combined, on
 from warpsplat.pydiffvg.tapered import contour_sizes, contours_around
 from warpsplat.rendering.backend import Viewport
@@ -52,7 +45,6 @@ weights, shape (3, 4, 2)."""
 
 IDENTITY = (ONE, ZERO, ZERO, ZERO, ONE, ZERO, ZERO, ZERO, ONE)
 BLACK = (ZERO, ZERO, ZERO, ONE)
-PAINTS = {"flat": Paint.FLAT, "linear": Paint.LINEAR, "radial": Paint.RADIAL}
 
 
 class Row(NamedTuple):
@@ -177,7 +169,9 @@ def make_layout(
     ]
     scene = _scene(rows, sizes, structure.groups, size)
     areas, order = _areas(rows, scene, device)
-    paints = [range(p.first, p.first + 4) if p.kind == "flat" else BLACK for p in (row.paint for row in rows)]
+    paints = [
+        range(p.first, p.first + 4) if p.kind == Paint.FLAT else BLACK for p in (row.paint for row in rows)
+    ]
     widths = [row.shapes[0].width if row.kind == Kind.STROKE else ZERO for row in rows]
     return Layout(
         scene,
@@ -188,7 +182,7 @@ def make_layout(
         _transforms(rows, structure.groups, scene, device),
         indices(paints, device),
         indices([widths], device) if any(widths) else None,
-        _gradients(rows, device) if any(row.paint.kind != "flat" for row in rows) else None,
+        _gradients(rows, device) if any(row.paint.kind != Paint.FLAT for row in rows) else None,
         RenderSpec(scene, Viewport(*size), EXACT, device, threads, opaque=True, straight=True),
     )
 
@@ -295,10 +289,10 @@ def _transforms(
 
 def _gradients(rows: list[Row], device: torch.device) -> Gradients:
     paints = [row.paint for row in rows]
-    points = [4 * (ZERO,) if p.kind == "flat" else range(p.first, p.first + 4) for p in paints]
+    points = [4 * (ZERO,) if p.kind == Paint.FLAT else range(p.first, p.first + 4) for p in paints]
     offsets = [p.first + 4 + np.arange(p.stops) for p in paints]
     colors = [p.first + 4 + p.stops + np.arange(4 * p.stops) for p in paints]
-    is_radial = np.array([[p.kind == "radial"] for p in paints])
+    is_radial = np.array([[p.kind == Paint.RADIAL] for p in paints])
     each = [indices(parts, device) for parts in (points, offsets, colors)]
     return Gradients(each[0], on(is_radial, device), *each[1:])
 
@@ -330,7 +324,7 @@ def _scene(
         miter_limits=np.array([line.miter_limit if line else 4.0 for line in lines], np.float32),
         dash=traits(dashes.index(line.dashes) if line and line.dashes else NO_DASHES for line in lines),
         dashes=dashes,
-        paint=traits(PAINTS[row.paint.kind] for row in rows),
+        paint=traits(row.paint.kind for row in rows),
         stop_first=starts_of(traits(row.paint.stops for row in rows)),
         # A gradient whose axes differ has gradients of its own for both of them.
         frames=np.tile(np.array([0, 0, 1, 0, 0, 2], np.float32), (len(rows), 1)),
