@@ -22,7 +22,7 @@ def cached(shapes: list[Shape], groups: list[ShapeGroup]) -> SceneArguments:
 
 
 def are_alike(one: SceneArguments, other: SceneArguments) -> bool:
-    """Whether structures are equal, and tensors one and the same."""
+    """Return whether structures are equal, and tensors the same objects."""
     return one.structure == other.structure and list(map(id, one.tensors)) == list(map(id, other.tensors))
 
 
@@ -58,9 +58,9 @@ CHANGES: dict[str, Callable[[Scene], None]] = {
     "end of a gradient": _set(lambda s: s[1][2].fill_color, "end", tensor(9, 9)),
     "segments": _write(lambda s: s[0][4].num_control_points, [2, 1, 0]),  # type: ignore[union-attr]
     "which shape": _write(lambda s: s[1][3].shape_ids, [4]),
-    "map": _write(lambda s: s[1][3].shape_to_canvas, [[1.0, 0, 3], [0, 1, 0], [0, 0, 1]]),
+    "transform": _write(lambda s: s[1][3].shape_to_canvas, [[1.0, 0, 3], [0, 1, 0], [0, 0, 1]]),
     "stretch": _write(lambda s: s[1][5].shape_to_canvas, [[1.0, 0, 3], [0, 2, 0], [0, 0, 1]]),
-    "trained map": lambda s: setattr(s[1][3].shape_to_canvas, "requires_grad", True),
+    "trained transform": lambda s: setattr(s[1][3].shape_to_canvas, "requires_grad", True),
     "sizes": lambda s: setattr(s[0][3].points, "data", torch.ones(7, 2)),  # type: ignore[union-attr]
     "more": lambda s: s[1].append(s[1][3]),
     "order": lambda s: s[1].reverse(),

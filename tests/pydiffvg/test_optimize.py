@@ -65,13 +65,13 @@ def test_a_rotation_is_found(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mode", MODES)
 def test_every_mode_starts_at_the_transform(mode: str) -> None:
-    values = pydiffvg.SvgOptimizationSettings.default_params["transforms"] | {"transform_mode": mode}
-    for matrix in (
-        tensor([[0.6, -0.8, 3], [0.8, 0.6, -2], [0, 0, 1]]),
-        tensor([[1.2, 0.3, 3], [-0.5, 0.7, -2], [0, 0, 1]]),
-        tensor([[2, 0, 1], [0, -2, 5], [0, 0, 1]]),
-    ):
-        assert torch.allclose(OptimizableTransform(matrix, values)(), matrix, atol=1e-5)
+    settings = pydiffvg.SvgOptimizationSettings.default_params["transforms"] | {"transform_mode": mode}
+    rotated, sheared = (
+        [[0.6, -0.8, 3], [0.8, 0.6, -2], [0, 0, 1]],
+        [[1.2, 0.3, 3], [-0.5, 0.7, -2], [0, 0, 1]],
+    )
+    for matrix in map(tensor, (rotated, sheared, [[2, 0, 1], [0, -2, 5], [0, 0, 1]])):
+        assert torch.allclose(OptimizableTransform(matrix, settings)(), matrix, atol=1e-5)
 
 
 def test_settings_are_saved(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def test_area_of_a_circle() -> None:
     assert float(image[..., 3].sum()) == pytest.approx(math.pi * 100, rel=2e-3)
 
 
-def test_every_kind_looks_as_its_file_does(tmp_path: Path) -> None:
+def test_a_scene_of_every_kind_renders_as_its_file(tmp_path: Path) -> None:
     shapes, groups = scene()
     pydiffvg.save_svg(tmp_path / "scene.svg", SIZE, SIZE, shapes, groups)
     image = render(shapes, groups)
@@ -52,11 +52,11 @@ def test_colors_are_not_premultiplied() -> None:
     assert torch.allclose(image[edge][:, 2], 0.8 * 2 * image[edge][:, 3], atol=1e-3)
 
 
-def test_a_shape_that_is_not_seen_changes_nothing() -> None:
+def test_invisible_shapes_change_nothing() -> None:
     shape, fill = circle()
-    around = pydiffvg.Rect(tensor(2, 2), tensor(46, 46))
-    hidden = group(1, tensor(0.9, 0.9, 0.9, 0.0))
+    around, hidden = pydiffvg.Rect(tensor(2, 2), tensor(46, 46)), group(1, tensor(0.9, 0.9, 0.9, 0.0))
     assert torch.allclose(render([shape, around], [fill, hidden]), render([shape], [fill]), atol=1e-6)
+    assert not render([], []).any()
 
 
 def test_seams_of_shapes_that_meet_keep_their_color() -> None:
@@ -101,63 +101,55 @@ def test_scenes_of_one_structure_share_a_layout() -> None:
     assert make_layout.cache_info().misses == before
 
 
-def test_nothing_to_draw() -> None:
-    assert not render([], []).any()
+FIRST, FILL, STROKE = torch.tensor([0]), tensor(0.7, 0.3, 0.5, 0.8), tensor(0.2, 0.6, 0.1, 0.7)
+DISC = pydiffvg.Circle(tensor(12.0), tensor(24.3, 22.1), tensor(2.0))
+BOW = tensor([[8, 30], [14, 8], [30, 44], [40, 16]])
+WIDTHS = tensor(3, 1.5, 2, 4)
+ENDS, OFFSETS = tensor(12, 20, 36, 26), tensor(0.1, 0.8)
+STOPS = tensor([[0.9, 0.1, 0.2, 0.9], [0.1, 0.8, 0.6, 0.5]])
+MATRIX = tensor([[0.8, -0.5, 14.0], [0.5, 0.9, -8.0], [0, 0, 1]])
+POINTS = tensor([[9, 9], [40, 10], [46, 30], [34, 40], [20, 46], [6, 30]])
 
 
-def varied() -> dict[str, tuple[Tensor, Callable[[Tensor], Tensor]]]:
-    """Return what has gradients: values, and the image that they make."""
-
-    def one(shape: object, color: object = None, **group: object) -> Tensor:
-        fill = tensor(0.7, 0.3, 0.5, 0.8) if color is None else color
-        return render([shape], [pydiffvg.ShapeGroup(torch.tensor([0]), fill, **group)])  # type: ignore[list-item]
-
-    def stroked(shape: object, **group: object) -> Tensor:
-        stroke = tensor(0.2, 0.6, 0.1, 0.7)
-        return render([shape], [pydiffvg.ShapeGroup(torch.tensor([0]), None, stroke_color=stroke, **group)])  # type: ignore[list-item]
-
-    disc = pydiffvg.Circle(tensor(12.0), tensor(24.3, 22.1), tensor(2.0))
-    bow = tensor([[8, 30], [14, 8], [30, 44], [40, 16]])
-    cubic = torch.tensor([2])
-    stops = tensor([[0.9, 0.1, 0.2, 0.9], [0.1, 0.8, 0.6, 0.5]])
-    ends = tensor(12, 20, 36, 26)
-    turned = tensor([[0.8, -0.5, 14.0], [0.5, 0.9, -8.0], [0, 0, 1]])
-    offsets = tensor(0.1, 0.8)
-    return {
-        "circle": (tensor(11.3, 23.1, 25.2), lambda v: one(pydiffvg.Circle(v[0], v[1:]))),
-        "ellipse": (tensor(11.3, 6.2, 23.1, 25.2), lambda v: one(pydiffvg.Ellipse(v[:2], v[2:]))),
-        "rect": (tensor(8.3, 9.2, 33.1, 35.2), lambda v: one(pydiffvg.Rect(v[:2], v[2:]))),
-        "polygon": (
-            tensor([[8, 9], [40, 12], [22, 41]]),
-            lambda v: one(pydiffvg.Polygon(v, True)),
-        ),
-        "mixed path": (
-            tensor([[9, 9], [40, 10], [46, 30], [34, 40], [20, 46], [6, 30]]),
-            lambda v: one(pydiffvg.Path(torch.tensor([0, 1, 2]), v, True)),
-        ),
-        "stroke": (bow, lambda v: stroked(pydiffvg.Path(cubic, v, False, tensor(2.5)))),
-        "width": (tensor([2.5]), lambda v: stroked(pydiffvg.Path(cubic, bow, False, v))),
-        "widths": (tensor(3, 1.5, 2, 4), lambda v: stroked(pydiffvg.Path(cubic, bow, False, v))),
-        "tapered points": (bow, lambda v: stroked(pydiffvg.Path(cubic, v, False, tensor(3, 1.5, 2, 4)))),
-        "map": (turned, lambda v: one(disc, shape_to_canvas=v)),
-        "map of a stroke": (turned, lambda v: stroked(disc, shape_to_canvas=v)),
-        "color": (tensor(0.3, 0.5, 0.2, 0.6), lambda v: one(disc, v)),
-        "linear": (ends, lambda v: one(disc, pydiffvg.LinearGradient(v[:2], v[2:], offsets, stops))),
-        "radial": (ends, lambda v: one(disc, pydiffvg.RadialGradient(v[:2], v[2:] / 2, offsets, stops))),
-        "offsets": (
-            tensor(0.2, 0.7),
-            lambda v: one(disc, pydiffvg.LinearGradient(ends[:2], ends[2:], v, stops)),
-        ),
-        "stops": (stops, lambda v: one(disc, pydiffvg.LinearGradient(ends[:2], ends[2:], offsets, v))),
-    }
+def filled(shape: Shape, fill: Any = FILL, **more: Tensor) -> Tensor:
+    return render([shape], [pydiffvg.ShapeGroup(FIRST, fill, **more)])
 
 
-VARIED = varied()
+def stroked(shape: Shape, **more: Tensor) -> Tensor:
+    return filled(shape, None, stroke_color=STROKE, **more)
+
+
+def bow(points: Tensor = BOW, width: Tensor = WIDTHS) -> pydiffvg.Path:
+    return pydiffvg.Path(torch.tensor([2]), points, False, width)
+
+
+def linear(ends: Tensor = ENDS, offsets: Tensor = OFFSETS, stops: Tensor = STOPS) -> pydiffvg.LinearGradient:
+    return pydiffvg.LinearGradient(ends[:2], ends[2:], offsets, stops)
+
+
+VARIED: dict[str, tuple[Tensor, Callable[[Tensor], Tensor]]] = {
+    "circle": (tensor(11.3, 23.1, 25.2), lambda v: filled(pydiffvg.Circle(v[0], v[1:]))),
+    "ellipse": (tensor(11.3, 6.2, 23.1, 25.2), lambda v: filled(pydiffvg.Ellipse(v[:2], v[2:]))),
+    "rect": (tensor(8.3, 9.2, 33.1, 35.2), lambda v: filled(pydiffvg.Rect(v[:2], v[2:]))),
+    "polygon": (tensor([[8, 9], [40, 12], [22, 41]]), lambda v: filled(pydiffvg.Polygon(v, True))),
+    "mixed path": (POINTS, lambda v: filled(pydiffvg.Path(torch.tensor([0, 1, 2]), v, True))),
+    "stroke": (BOW, lambda v: stroked(bow(v, tensor(2.5)))),
+    "width": (tensor([2.5]), lambda v: stroked(bow(width=v))),
+    "widths": (WIDTHS, lambda v: stroked(bow(width=v))),
+    "tapered points": (BOW, lambda v: stroked(bow(v))),
+    "transform": (MATRIX, lambda v: filled(DISC, shape_to_canvas=v)),
+    "transform of a stroke": (MATRIX, lambda v: stroked(DISC, shape_to_canvas=v)),
+    "color": (tensor(0.3, 0.5, 0.2, 0.6), lambda v: filled(DISC, v)),
+    "linear": (ENDS, lambda v: filled(DISC, linear(v))),
+    "radial": (ENDS, lambda v: filled(DISC, pydiffvg.RadialGradient(v[:2], v[2:] / 2, OFFSETS, STOPS))),
+    "offsets": (tensor(0.2, 0.7), lambda v: filled(DISC, linear(offsets=v))),
+    "stops": (STOPS, lambda v: filled(DISC, linear(stops=v))),
+}
 
 
 @pytest.mark.parametrize("name", VARIED)
 def test_gradients_are_those_of_differences(name: str) -> None:
-    """Of a smooth loss in all four channels, along two directions."""
+    """Compare along two directions, for a smooth loss of all four channels."""
     values, draw = VARIED[name]
     generator = torch.Generator().manual_seed(5)
     y, x = torch.meshgrid(torch.linspace(0, 3, SIZE), torch.linspace(0, 3, SIZE), indexing="ij")
@@ -174,7 +166,7 @@ def test_gradients_are_those_of_differences(name: str) -> None:
     step = 0.03 * float(values.abs().max()) / 10
     for _ in range(2):
         direction = torch.randn(values.shape, generator=generator)
-        if "map" in name:
+        if "transform" in name:
             direction[2] = 0
             direction[:2, :2] *= 0.02
         with torch.no_grad():
@@ -184,24 +176,20 @@ def test_gradients_are_those_of_differences(name: str) -> None:
         assert found == pytest.approx(expected, rel=0.03, abs=0.03 * float(gradient.norm()))
 
 
+TENT = pydiffvg.PixelFilter(FilterType.tent, tensor(1.0))
+OPEN = pydiffvg.Path(torch.tensor([2, 2]), torch.zeros(6, 2), False)
 NO_POINT = pydiffvg.Circle(tensor(float("nan")), tensor(9, 9))
 REFUSED: dict[str, Callable[[], object]] = {
     "signed distances": lambda: serialize([blob()], output_type=pydiffvg.OutputType.sdf),
     "signed distances .*eval_positions": lambda: serialize([blob()], eval_positions=torch.zeros(3, 2)),
-    "pixel filter tent of radius 1 ": lambda: serialize(
-        [blob()], filter=pydiffvg.PixelFilter(FilterType.tent, tensor(1.0))
-    ),
+    "pixel filter tent of radius 1 ": lambda: serialize([blob()], filter=TENT),
     "group 0 names shape 0, there are 0": lambda: serialize([]),
-    "shape 0 has 6 points, its num_control_points .* ask for 7": lambda: serialize(
-        [pydiffvg.Path(torch.tensor([2, 2]), torch.zeros(6, 2), False)]
-    ),
+    "shape 0 has 6 points, its num_control_points .* ask for 7": lambda: serialize([OPEN]),
     "center of shape 0 has shape": lambda: serialize([pydiffvg.Circle(tensor(1.0), torch.zeros(3))]),
     "render_grad": pydiffvg.RenderFunction.render_grad,
     "a point of a shape is not finite": lambda: render([NO_POINT], [group()]),
     "background_image has shape": lambda: render([blob()], [group()], torch.zeros(SIZE, 9, 4)),
-    "takes what RenderFunction.serialize_scene gave": lambda: pydiffvg.RenderFunction.apply(
-        SIZE, SIZE, 2, 2, 0, None, SIZE, SIZE
-    ),
+    "takes what RenderFunction.serialize_scene gave": lambda: pydiffvg.RenderFunction.apply(*range(9)),
 }
 
 
@@ -228,7 +216,7 @@ def test_a_device_that_is_not_there() -> None:
         pydiffvg.set_device(before)
 
 
-def test_opacity_that_has_left_its_range_comes_back() -> None:
+def test_opacity_beyond_its_range_has_a_gradient() -> None:
     shape, fill = circle()
     color = fill.fill_color = tensor(0.2, 0.4, 0.8, 1.2).requires_grad_()
     image = render([shape], [fill])

@@ -24,20 +24,18 @@ circle = pydiffvg.Circle(radius=torch.tensor(12.0), center=torch.tensor([16.0, 1
 assert isinstance(circle, Circle)
 group = pydiffvg.ShapeGroup(shape_ids=torch.tensor([0]), fill_color=torch.tensor([0.3, 0.6, 0.3, 1.0]))
 box = pydiffvg.PixelFilter(type=diffvg.FilterType.box, radius=torch.tensor(0.5))
-render = pydiffvg.RenderFunction.apply
 
-def picture(seed):
+def render(seed):
     arguments = pydiffvg.RenderFunction.serialize_scene(32, 32, [circle], [group], filter=box)
-    return render(32, 32, 2, 2, seed, None, *arguments)
+    return pydiffvg.RenderFunction.apply(32, 32, 2, 2, seed, None, *arguments)
 
-target = picture(0)
+target = render(0)
 radius = torch.tensor(6.0 / 32, requires_grad=True)
-color = torch.tensor([0.5, 0.2, 0.5, 1.0], requires_grad=True)
-optimizer = torch.optim.Adam([radius, color], lr=2e-2)
+optimizer = torch.optim.Adam([radius], lr=2e-2)
 for t in range(int(sys.argv[1])):
     optimizer.zero_grad()
-    circle.radius, group.fill_color = radius * 32, color
-    image = picture(t)
+    circle.radius = radius * 32
+    image = render(t)
     loss = (image - target).pow(2).sum()
     loss.backward()
     optimizer.step()

@@ -13,12 +13,11 @@ import torch
 
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.errors import UsageError
-from warpsplat.paper.models import GaussianModel, SplatModel
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.torch import SceneTensors, over, render
+from warpsplat.torch.function import MODELS
 
 FILL = Kind.FILL
 
@@ -50,12 +49,10 @@ def test_the_image_is_the_renderers(width: int | None, scale: float) -> None:
     assert (image[..., 3] == 1).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "model"), [("exact", EXACT), ("splat", SplatModel()), ("gaussian", GaussianModel())]
-)
-def test_every_model_on_a_transparent_canvas(name: str, model: Model) -> None:
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_on_a_transparent_canvas(name: str) -> None:
     scene = replace(random_scene(FILL, seed=1), canvas=Canvas(40, 36, None))
-    native = native_render(scene, model=model, backend=Backend.on("cpu"))
+    native = native_render(scene, model=MODELS[name], backend=Backend.on("cpu"))
     np.testing.assert_allclose(render(SceneTensors.of(scene), renderer=name).numpy(), native, atol=1e-5)
 
 
@@ -121,20 +118,16 @@ def test_calls_do_not_disturb_one_another(order: tuple[int, int]) -> None:
     assert not torch.equal(*alone)
 
 
-def test_a_scene_changed_before_the_backward_pass_is_refused() -> None:
+def test_backward_passes_that_are_refused() -> None:
     scene = moved(random_scene(FILL), 0.0)
+    gradient = points_grad(loss_of(scene), scene, create_graph=True)
+    with pytest.raises(RuntimeError, match="differentiate twice"):
+        gradient.sum().backward()
     loss = loss_of(scene)
     with torch.no_grad():
         scene.values["points"].add_(1)
     with pytest.raises(RuntimeError, match="inplace operation"):
         loss.backward()
-
-
-def test_a_second_derivative_is_refused() -> None:
-    scene = moved(random_scene(FILL), 0.0)
-    gradient = points_grad(loss_of(scene), scene, create_graph=True)
-    with pytest.raises(RuntimeError, match="differentiate twice"):
-        gradient.sum().backward()
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -160,32 +153,39 @@ def test_over() -> None:
     torch.testing.assert_close(over(clear, torch.zeros(36, 40, 3)), clear[..., :3])
 
 
+SPLINES, ONES = mixed_scene(seed=1), torch.ones(4, dtype=torch.float32)
+
+
+def refused(**options: Any) -> Callable[[], object]:
+    return lambda: render(SceneTensors(SPLINES, {}), **options)
+
+
 def values(**changed: Any) -> Callable[[], object]:
-    scene = random_scene(FILL)
-    return lambda: render(SceneTensors(scene, {"points": torch.tensor(scene.points), **changed}))
+    return lambda: render(SceneTensors(random_scene(FILL), changed))
 
 
-FAST: Any = "fast"
-SPLINES = mixed_scene(seed=1)
-REFUSED: dict[str, tuple[type[Exception], str, Callable[[], object]]] = {
-    "name": (ValueError, "no attribute 'colour'", values(colour=torch.zeros(4))),
-    "shape": (ValueError, r"colors has shape \(3,\), not \(4, 3\)", values(colors=torch.zeros(3).float())),
-    "float64": (TypeError, "colors is torch.float64", values(colors=torch.zeros(4, 3).double())),
-    "array": (TypeError, "colors is a ndarray", values(colors=np.zeros((4, 3), np.float32))),
-    "device": (ValueError, "colors is on meta", values(colors=torch.zeros(4, 3, device="meta").float())),
-    "nan": (ValueError, "colors: numbers that are not finite", values(colors=torch.zeros(4, 3).float() / 0)),
-    "focus": (ValueError, "focus has no gradient", values(focus=torch.zeros(4, 3).float().requires_grad_())),
-    "width": (UsageError, "width must be a number of pixels", lambda: render(SceneTensors(SPLINES, {}), 0)),
-    "size": (UsageError, "would stretch", lambda: render(SceneTensors(SPLINES, {}), 40, 72)),
-    "model": (UsageError, "not 'fast'", lambda: render(SceneTensors(SPLINES, {}), renderer=FAST)),
-    "spline": (ValueError, "is a spline", lambda: render(SceneTensors(SPLINES, {}), renderer="splat")),
-    "none": (UsageError, "no scene", lambda: render([])),
-}  # fmt: skip
+REFUSED: dict[str, tuple[type[Exception], Callable[[], object]]] = {
+    "no attribute 'colour'": (ValueError, values(colour=torch.zeros(4))),
+    r"colors has shape \(3,\), not \(4, 3\)": (ValueError, values(colors=torch.zeros(3).float())),
+    "colors is torch.float64": (TypeError, values(colors=torch.zeros(4, 3).double())),
+    "colors is a ndarray": (TypeError, values(colors=np.zeros((4, 3), np.float32))),
+    "colors is on meta": (
+        ValueError,
+        values(opacities=ONES, colors=torch.zeros(4, 3, device="meta").float()),
+    ),
+    "colors: numbers that are not finite": (ValueError, values(colors=torch.zeros(4, 3).float() / 0)),
+    "focus has no gradient": (ValueError, values(focus=torch.zeros(4, 3).float().requires_grad_())),
+    "width must be a number of pixels": (UsageError, refused(width=0)),
+    "would stretch": (UsageError, refused(width=40, height=72)),
+    "not 'fast'": (UsageError, refused(renderer="fast")),
+    "is a spline": (ValueError, refused(renderer="splat")),
+    "no scene": (UsageError, lambda: render([])),
+}
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_is_refused_in_one_line(case: str) -> None:
-    kind, message, call = REFUSED[case]
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_is_refused_in_one_line(message: str) -> None:
+    kind, call = REFUSED[message]
     with pytest.raises(kind, match=message) as raised:
         call()
     assert "\n" not in str(raised.value)

@@ -28,7 +28,7 @@ def install() -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run a script and return the exit status; an error of ours is one line with its place in the script."""
+    """Run a script and return the exit status; a ``WarpsplatError`` is printed in one line."""
     if not arguments or arguments[0] in {"-h", "--help"}:
         print(USAGE, file=sys.stderr if not arguments else sys.stdout)
         return 0 if arguments else int(UsageError.exit_code)

@@ -13,6 +13,7 @@ import torch
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
 from warpsplat.pydiffvg.shape import Circle, Ellipse, Path, Polygon, Rect, Shape, ShapeGroup
+from warpsplat.scene import Paint
 from warpsplat.svg.shapes import Line
 
 Tensor = torch.Tensor
@@ -29,8 +30,7 @@ UNIFORM_TOLERANCE = 1e-3
 class PaintStructure(NamedTuple):
     """Structure of a colour or gradient."""
 
-    kind: str
-    """``flat``, ``linear`` or ``radial``."""
+    kind: Paint
     stops: int
     first: int
     """Index of its first number: four of a colour, or of a gradient's two points (or centre and radii); then
@@ -219,11 +219,11 @@ def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
     if color is None:
         return None
     if isinstance(color, Tensor):
-        return PaintStructure("flat", 0, tensors.add(color, (4,), name))
+        return PaintStructure(Paint.FLAT, 0, tensors.add(color, (4,), name))
     if isinstance(color, LinearGradient):
-        kind, points = "linear", {"begin": color.begin, "end": color.end}
+        kind, points = Paint.LINEAR, {"begin": color.begin, "end": color.end}
     elif isinstance(color, RadialGradient):
-        kind, points = "radial", {"center": color.center, "radius": color.radius}
+        kind, points = Paint.RADIAL, {"center": color.center, "radius": color.radius}
     else:
         raise UsageError(f"{name} is a {type(color).__name__}, neither a tensor nor a gradient")
     first, _ = (tensors.add(point, (2,), f"{what} of {name}") for what, point in points.items())

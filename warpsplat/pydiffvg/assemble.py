@@ -25,7 +25,7 @@ def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     if layout.transforms is not None:
         matrices = numbers.index_select(0, layout.transforms.entries).view(-1, 3, 3)
     paints = numbers.index_select(0, layout.paints).view(-1, 4)
-    values = layout.fixed | {
+    values = layout.defaults | {
         "points": _points(numbers, layout, matrices, scale),
         "colors": paints[:, :3],
         "opacities": paints[:, 3],

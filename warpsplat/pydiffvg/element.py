@@ -32,7 +32,7 @@ GROUPS = {"svg", "g", "a"}
 
 
 class Context(NamedTuple):
-    """What the elements of a document share."""
+    """Data that the elements of a document share."""
 
     document: Document
     viewport: Viewport
@@ -55,22 +55,26 @@ class OptimizableElement:
         if text not in {"", "none"}:
             matrix = torch.tensor(parse_transform(text)).float()
             self.transform = OptimizableTransform(matrix, self._settings["transforms"]).to(context.device)
-            self._optimize(self.transform.is_optimized, self.transform.parameter_groups(), None)
-        self.opacity = self._fraction("opacity")
+            if self.transform.is_optimized:
+                groups = self.transform.parameter_groups()
+                self.optimizers.append(make_optimizer(self._settings, groups, None))
+        self.opacity = self._opacity("opacity")
         self.paths: list[Path] = []
         if name_of(element) in DRAWN:
             self._read_shape()
 
-    def _optimize(self, wanted: bool, groups: list[dict[str, Any]], bounds: Bounds | None) -> None:
+    def _optimize(self, tensors: list[Tensor], rate: float, wanted: bool, bounds: Bounds | None) -> None:
+        for tensor in tensors:
+            tensor.requires_grad_(wanted)
         if wanted:
+            groups = [{"params": tensors, "lr": rate}]
             self.optimizers.append(make_optimizer(self._settings, groups, bounds))
 
-    def _fraction(self, name: str) -> Tensor:
+    def _opacity(self, name: str) -> Tensor:
         """Return an opacity, shape (1,), optimised where the element sets it."""
         value = torch.tensor([fraction(self._style[name])], device=self._context.device)
-        if name in self._element.attrib and self._settings["optimize_alpha"]:
-            groups = [{"params": [value.requires_grad_()], "lr": self._settings["alpha_lr"]}]
-            self._optimize(True, groups, COLORS)
+        wanted = name in self._element.attrib and self._settings["optimize_alpha"]
+        self._optimize([value], self._settings["alpha_lr"], wanted, COLORS)
         return value
 
     def _read_shape(self) -> None:
@@ -80,13 +84,12 @@ class OptimizableElement:
         width = length(self._style["stroke-width"], viewport.diagonal, "stroke-width") or 0.0
         half = torch.tensor(width / 2, device=device)
         self.paths = [path_of(subpath) for subpath in subpaths]
-        chosen = self._settings["paths"]
         for path in self.paths:
             path.points, path.stroke_width = path.points.to(device), half
-            path.points.requires_grad_(chosen["optimize_points"])
+        chosen = self._settings["paths"]
         points = [path.points for path in self.paths]
-        self._optimize(chosen["optimize_points"], [{"params": points, "lr": chosen["shape_lr"]}], None)
-        self._opacities = [self._fraction(f"{name}-opacity") for name in ("fill", "stroke")]
+        self._optimize(points, chosen["shape_lr"], chosen["optimize_points"], None)
+        self._opacities = [self._opacity(f"{name}-opacity") for name in ("fill", "stroke")]
         self._paints = [self._paint(name, subpaths) for name in ("fill", "stroke")]
 
     def _paint(self, name: str, subpaths: list[Subpath]) -> Tensor | OptimizableGradient | None:
@@ -95,9 +98,7 @@ class OptimizableElement:
         paint = resolve_paint(text, self._style, document, viewport, subpaths, torch.eye(3).numpy())
         if isinstance(paint, Flat):
             color = torch.tensor(paint.color, device=device)
-            wanted = self._settings["optimize_color"]
-            groups = [{"params": [color.requires_grad_(wanted)], "lr": self._settings["color_lr"]}]
-            self._optimize(wanted, groups, COLORS)
+            self._optimize([color], self._settings["color_lr"], self._settings["optimize_color"], COLORS)
             return color
         if isinstance(paint, Gradient):
             link = parse_link(text.strip())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -12,14 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from warpsplat.pydiffvg.arguments import (
-    ONE,
-    ZERO,
-    GroupStructure,
-    PaintStructure,
-    ShapeStructure,
-    Structure,
-)
+from warpsplat.pydiffvg.arguments import ONE, ZERO, GroupStructure, PaintStructure, ShapeStructure, Structure
 from warpsplat.pydiffvg.gather import Gather, Terms, combined, on
 from warpsplat.pydiffvg.tapered import contour_sizes, contours_around
 from warpsplat.rendering.backend import Viewport
@@ -51,7 +45,6 @@ weights, shape (3, 4, 2)."""
 
 IDENTITY = (ONE, ZERO, ZERO, ZERO, ONE, ZERO, ZERO, ZERO, ONE)
 BLACK = (ZERO, ZERO, ZERO, ONE)
-PAINTS = {"flat": Paint.FLAT, "linear": Paint.LINEAR, "radial": Paint.RADIAL}
 
 
 class Row(NamedTuple):
@@ -65,22 +58,16 @@ class Row(NamedTuple):
     is_area: bool = False
     """Whether it is a stroke that is filled as the area that it covers; it then has one shape."""
 
-    def contours(self) -> list[tuple[ShapeStructure, bool]]:
-        """Return the shapes, each with whether its contour is closed; not for areas."""
-        return [(shape, self.kind == Kind.FILL or shape.closed) for shape in self.shapes]
-
-    def sizes(self) -> list[int]:
-        """Return the number of control points of each contour."""
-        if self.is_area:
-            return contour_sizes(len(self.shapes[0].counts), self.shapes[0].closed)
-        return [
-            3 * (len(shape.counts) + (is_closed and not shape.closed)) + (not is_closed)
-            for shape, is_closed in self.contours()
-        ]
-
     def closed(self) -> list[bool]:
         """Return whether each contour is closed."""
-        return [True] * len(self.sizes()) if self.is_area else [closed for _, closed in self.contours()]
+        if self.is_area:
+            return [True] * (1 + self.shapes[0].closed)
+        return [self.kind == Kind.FILL or shape.closed for shape in self.shapes]
+
+    def outlines(self) -> list[Terms]:
+        """Return the control points of each contour, see ``_coordinates``; none of an area."""
+        each = [] if self.is_area else zip(self.shapes, self.closed(), strict=True)
+        return [_coordinates(shape, _contour(shape, is_closed)) for shape, is_closed in each]
 
 
 class Area(NamedTuple):
@@ -127,8 +114,8 @@ class Layout:
 
     scene: Scene
     """Structure and canvas; its attributes are placeholders."""
-    fixed: dict[str, Tensor]
-    """Attributes that no number changes, by name."""
+    defaults: dict[str, Tensor]
+    """Attributes by name, for those that come from no number."""
     points: Gather
     """Control points of outlines [shape units], shape (point, 2)."""
     areas: tuple[Area, ...]
@@ -173,26 +160,29 @@ def make_layout(
         threads: of the CPU that render.
     """
     rows = _rows(structure, uniform)
-    scene = _scene(rows, structure.groups, size)
-    outlines = [
-        _coordinates(shape, _contour(shape, closed))
-        for row in rows
-        if not row.is_area
-        for shape, closed in row.contours()
+    outlines = [row.outlines() for row in rows]
+    sizes = [
+        contour_sizes(len(row.shapes[0].counts), row.shapes[0].closed)
+        if row.is_area
+        else [len(terms.indices) for terms in own]
+        for row, own in zip(rows, outlines, strict=True)
     ]
+    scene = _scene(rows, sizes, structure.groups, size)
     areas, order = _areas(rows, scene, device)
-    paints = [range(p.first, p.first + 4) if p.kind == "flat" else BLACK for p in (row.paint for row in rows)]
+    paints = [
+        range(p.first, p.first + 4) if p.kind == Paint.FLAT else BLACK for p in (row.paint for row in rows)
+    ]
     widths = [row.shapes[0].width if row.kind == Kind.STROKE else ZERO for row in rows]
     return Layout(
         scene,
         {a.name: on(getattr(scene, a.name), device) for a in attributes_of(scene)},
-        Gather(combined([NOTHING, *outlines], np.concatenate), device),
+        Gather(combined([NOTHING, *itertools.chain(*outlines)], np.concatenate), device),
         areas,
         order,
         _transforms(rows, structure.groups, scene, device),
         indices(paints, device),
         indices([widths], device) if any(widths) else None,
-        _gradients(rows, device) if any(row.paint.kind != "flat" for row in rows) else None,
+        _gradients(rows, device) if any(row.paint.kind != Paint.FLAT for row in rows) else None,
         RenderSpec(scene, Viewport(*size), EXACT, device, threads, opaque=True, straight=True),
     )
 
@@ -299,20 +289,24 @@ def _transforms(
 
 def _gradients(rows: list[Row], device: torch.device) -> Gradients:
     paints = [row.paint for row in rows]
-    points = [4 * (ZERO,) if p.kind == "flat" else range(p.first, p.first + 4) for p in paints]
+    points = [4 * (ZERO,) if p.kind == Paint.FLAT else range(p.first, p.first + 4) for p in paints]
     offsets = [p.first + 4 + np.arange(p.stops) for p in paints]
     colors = [p.first + 4 + p.stops + np.arange(4 * p.stops) for p in paints]
-    is_radial = np.array([[p.kind == "radial"] for p in paints])
+    is_radial = np.array([[p.kind == Paint.RADIAL] for p in paints])
     each = [indices(parts, device) for parts in (points, offsets, colors)]
     return Gradients(each[0], on(is_radial, device), *each[1:])
 
 
-def _scene(rows: list[Row], groups: tuple[GroupStructure, ...], size: tuple[int, int]) -> Scene:
-    """Return the structure of our scene; attributes that come from tensors have any values."""
+def _scene(
+    rows: list[Row], sizes: list[list[int]], groups: tuple[GroupStructure, ...], size: tuple[int, int]
+) -> Scene:
+    """Return our scene with placeholders for the attributes that come from tensors.
+
+    ``sizes``: control points of each row's contours; ``size``: width and height of the image [px].
+    """
     lines = [groups[row.group].line if row.kind == Kind.STROKE else None for row in rows]
     dashes = tuple(sorted({line.dashes for line in lines if line} - {()}))
     even_odd = [groups[row.group].even_odd and row.kind == Kind.FILL and not row.is_area for row in rows]
-    sizes = [row.sizes() for row in rows]
 
     def traits(values: Iterable[int]) -> IntArray:
         return np.array([*values], np.int32)
@@ -330,7 +324,7 @@ def _scene(rows: list[Row], groups: tuple[GroupStructure, ...], size: tuple[int,
         miter_limits=np.array([line.miter_limit if line else 4.0 for line in lines], np.float32),
         dash=traits(dashes.index(line.dashes) if line and line.dashes else NO_DASHES for line in lines),
         dashes=dashes,
-        paint=traits(PAINTS[row.paint.kind] for row in rows),
+        paint=traits(row.paint.kind for row in rows),
         stop_first=starts_of(traits(row.paint.stops for row in rows)),
         # A gradient whose axes differ has gradients of its own for both of them.
         frames=np.tile(np.array([0, 0, 1, 0, 0, 2], np.float32), (len(rows), 1)),

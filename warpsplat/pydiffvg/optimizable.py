@@ -67,7 +67,7 @@ TOLERANCE = 1e-3
 
 
 class OptimizableTransform(torch.nn.Module):
-    """``fixed @ rotation @ scale @ shear @ translation``.
+    """A transform, optimised as ``fixed @ rotation @ scale @ shear @ translation``.
 
     A mode optimises some of the four; a transform that it cannot represent stays in front as ``fixed``.
     """

@@ -29,7 +29,7 @@ Store = dict[str, Any]
 
 
 class SvgOptimizationSettings:
-    """What to optimise, and at which learning rates: for all elements, or for the one of an id."""
+    """Choice of what is optimised, and learning rates: for all elements, or for the one of an id."""
 
     default_params: Store = {  # noqa: RUF012 - DiffVG's interface
         "optimize_color": True,

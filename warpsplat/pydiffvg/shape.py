@@ -145,9 +145,7 @@ def path_of(subpath: Subpath, *, is_closed: bool | None = None) -> Path:
     elif is_closed:
         counts.append(0)
     return Path(
-        torch.tensor(counts, dtype=torch.int32),
-        torch.tensor(np.array(chain), dtype=torch.float32),
-        is_closed,
+        torch.tensor(counts, dtype=torch.int32), torch.tensor(np.array(chain), dtype=torch.float32), is_closed
     )
 
 
