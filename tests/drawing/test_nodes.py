@@ -26,13 +26,14 @@ from warpsplat.drawing.costs import Costs, RoundsWatch
 from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.drawing.nodes import Edit, Outlines, applied, turned
 from warpsplat.drawing.tidy import Judge, apart, finish_drawing, rounds_for, tidied
-from warpsplat.fit.constraints import Drawing, Joint
+from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.work import Meter
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.renderer import Capacity, Renderer, render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
+from warpsplat.scene.joints import Joint
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
 

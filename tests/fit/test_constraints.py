@@ -9,11 +9,12 @@ import pytest
 
 from tests.drawing.drawings import drawing, logo, polygon, seam
 from tests.helpers import relative_error
-from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Joint, Keeper
+from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Keeper
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.scene import Canvas
+from warpsplat.scene.joints import Joint
 
 DRAWINGS: dict[str, Callable[[], Drawing]] = {"logo": logo, "seam": seam}
 

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined
 from warpsplat.drawing.merge import handles_through, points_at
-from warpsplat.fit.constraints import EQUAL, Drawing, Joint
+from warpsplat.fit.constraints import EQUAL, Drawing
+from warpsplat.scene.joints import Joint
 
 Floats = npt.NDArray[np.float64]
 

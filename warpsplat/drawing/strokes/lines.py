@@ -10,8 +10,9 @@ from warpsplat.drawing.strokes.areas import Areas
 from warpsplat.drawing.strokes.centerlines import Line, find_lines
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.pens import width_steps
-from warpsplat.drawing.trace.curves import Pieces, Run, fit_runs
+from warpsplat.drawing.trace.curves import Pieces, fit_runs
 from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.runs import Run
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
