@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from warpsplat.drawing.trace.corners import find_corners
-from warpsplat.drawing.trace.curves import Pieces, fit_runs
+from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.ellipses import fit_ellipse
 from warpsplat.drawing.trace.grids import Floats
-from warpsplat.drawing.trace.runs import Run
+from warpsplat.drawing.trace.spans import Polyline
 
 
 def noise(*shape: int) -> Floats:
@@ -40,7 +40,7 @@ def sampled(cubics: Floats, count: int = 40) -> Floats:
 
 
 def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:
-    (pieces,) = fit_runs([Run(points, closed=True)], tolerance)
+    (pieces,) = fit_polylines([Polyline(points, closed=True)], tolerance)
     assert np.allclose(pieces.cubics[:, 3], np.roll(pieces.cubics[:, 0], -1, axis=0), atol=1e-6), "no gaps"
     return pieces
 
@@ -118,7 +118,7 @@ def test_open_runs_end_where_they_are_told_to() -> None:
     x = np.arange(1.0, 40)
     points = np.stack([x, 10 * np.sin(x / 12)], axis=1)
     start, end = np.array([0.0, 0.0]), np.array([40.0, 10 * np.sin(40 / 12)])
-    (pieces,) = fit_runs([Run(points, False, start, end)], 0.2)
+    (pieces,) = fit_polylines([Polyline(points, False, start, end)], 0.2)
     assert np.allclose(pieces.cubics[0, 0], start) and np.allclose(pieces.cubics[-1, 3], end)
     assert len(pieces.cubics) <= 3
     shown = sampled(pieces.cubics, 200)

@@ -87,7 +87,7 @@ def joints_of(contour: Pieces) -> Ints:
 
 
 @dataclass
-class Shape:
+class Fill:
     """Contours of one colouring."""
 
     coloring: Coloring
@@ -102,11 +102,11 @@ class Shape:
 MOST_MERGED = 1500  # shapes among which those of one colour are merged, in quadratic time
 
 
-def merged(shapes: list[Shape]) -> list[Shape]:
+def merged(shapes: list[Fill]) -> list[Fill]:
     """Make one shape of those of one colour, where nothing lies between them."""
     if not 1 < len(shapes) <= MOST_MERGED:
         return shapes
-    result: list[Shape] = []
+    result: list[Fill] = []
     boxes: list[Floats] = []
     for shape in shapes:
         box, target = shape.box(), None
@@ -118,7 +118,7 @@ def merged(shapes: list[Shape]) -> list[Shape]:
             if (box[:2] < other[2:]).all() and (other[:2] < box[2:]).all():
                 break
         if target is None:
-            result.append(Shape(shape.coloring, list(shape.contours)))
+            result.append(Fill(shape.coloring, list(shape.contours)))
             boxes.append(box)
             continue
         result[target].contours.extend(shape.contours)

@@ -14,7 +14,7 @@ import numpy as np
 from warpsplat.drawing.trace.beziers import distance_derivatives, points_at
 from warpsplat.drawing.trace.ellipses import fit_ellipse
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
-from warpsplat.drawing.trace.runs import Run, Span, cut_at_corners
+from warpsplat.drawing.trace.spans import Polyline, Span, cut_at_corners
 from warpsplat.portable.elementary import hypot
 
 
@@ -28,7 +28,7 @@ class Pieces:
     """Which are straight, shape (piece,)."""
 
 
-def fit_runs(runs: list[Run], tolerance: float) -> list[Pieces]:
+def fit_polylines(runs: list[Polyline], tolerance: float) -> list[Pieces]:
     """Return lines and cubics for each run.
 
     Args:
@@ -51,7 +51,7 @@ def straight(start: Floats, end: Floats) -> Floats:
     return start[..., None, :] + (end - start)[..., None, :] * (np.arange(4)[:, None] / 3)
 
 
-def _polygon_or_ellipse(run: Run, tolerance: float) -> Pieces | None:
+def _polygon_or_ellipse(run: Polyline, tolerance: float) -> Pieces | None:
     if run.is_polygon:
         cubics = straight(run.points[:-1], run.points[1:])
         return Pieces(cubics, np.ones(len(cubics), np.bool_))

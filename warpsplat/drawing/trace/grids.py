@@ -24,6 +24,11 @@ def channel_max(values: Floats) -> Floats:
     return functools.reduce(np.maximum, np.moveaxis(values, -1, 0))
 
 
+def depth(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    """Return the distance of each pixel from those outside the mask, or the image [px], (height, width)."""
+    return filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
+
+
 class Sets:
     """Disjoint sets of 0 .. count - 1 (union-find)."""
 

@@ -14,7 +14,7 @@ from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
 from warpsplat.drawing.trace.hidden import Cover, shortest_way
 from warpsplat.drawing.trace.outlines import Boundary
 from warpsplat.drawing.trace.planar import STEPS, Loops
-from warpsplat.drawing.trace.runs import Run
+from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.portable.elementary import cos, hypot, sin
 from warpsplat.portable.linear import principal_direction
 
@@ -28,7 +28,7 @@ _ANGLES = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 CIRCLE = np.stack([cos(_ANGLES), sin(_ANGLES)], axis=1)
 """Points on the unit circle, shape (12, 2)."""
 
-Outline = list[Run | Floats]
+Outline = list[Polyline | Floats]
 """A contour before its curves are fitted: runs, and corners (point, 2) between one run and the next."""
 
 Stretch = tuple[int, Ints]
@@ -36,7 +36,7 @@ Stretch = tuple[int, Ints]
 
 
 @dataclass(frozen=True)
-class Tracer:
+class OutlineTracer:
     """What outlines are made of."""
 
     loops: Loops
@@ -61,7 +61,7 @@ class Tracer:
                 return []
             if self.loops.is_hole[loop]:  # left open, a little smaller than what lies over it
                 between = 0.5 * (self.boundary.points[cracks] + self._middles(rank, cracks))
-                return [[Run(self._points(cracks, closed=True, places=between), closed=True)]]
+                return [[Polyline(self._points(cracks, closed=True, places=between), closed=True)]]
             kinds[:] = SEEN
         if (kinds == kinds[0]).all():
             return [[self._ring(cracks) if kinds[0] == SEEN else self._vertices_at_turns(cracks)]]
@@ -71,15 +71,15 @@ class Tracer:
         stretches: list[Stretch] = [(int(kinds[a]), cracks[a:b]) for a, b in itertools.pairwise(bounds)]
         return [self._chain(rank, stretches)]
 
-    def _ring(self, cracks: Ints) -> Run | Floats:
+    def _ring(self, cracks: Ints) -> Polyline | Floats:
         """Return a loop that is seen all around."""
         if len(cracks) <= DOT and np.abs(self.boundary.offsets[cracks]).max() > STILL:
             return self._dot(cracks)
         if self._is_pixel_exact(cracks):
             return self._vertices_at_turns(cracks)
-        return Run(self._points(cracks, closed=True), closed=True)
+        return Polyline(self._points(cracks, closed=True), closed=True)
 
-    def _dot(self, cracks: Ints) -> Run:
+    def _dot(self, cracks: Ints) -> Polyline:
         """Return a circle of the loop's area about its middle."""
         vertices = self.loops.vertices[cracks].astype(np.float64)
         following = np.roll(vertices, -1, axis=0)
@@ -87,7 +87,7 @@ class Tracer:
         full = area + float(self.boundary.offsets[cracks].sum())
         radius = np.sqrt(max(abs(full), 0.1) / np.pi)
         middle = self.boundary.points[cracks].mean(axis=0)
-        return Run(middle + radius * CIRCLE * (1, np.sign(area)), closed=True)
+        return Polyline(middle + radius * CIRCLE * (1, np.sign(area)), closed=True)
 
     def _is_pixel_exact(self, cracks: Ints) -> bool:
         """Return whether a stretch lies where the pixels meet and has few corners."""
@@ -146,9 +146,9 @@ class Tracer:
             start, end = ends[number]
             if kind == SEEN and self._is_pixel_exact(cracks):
                 corners = np.concatenate([start[None], self._vertices_between(cracks), end[None]])
-                parts.append(Run(corners, False, is_polygon=True))
+                parts.append(Polyline(corners, False, is_polygon=True))
             elif kind == SEEN:
-                parts.append(Run(self._points(cracks, closed=False), False, start, end))
+                parts.append(Polyline(self._points(cracks, closed=False), False, start, end))
             elif kind == EDGE:  # the image's corners, and where a hidden stretch ends or begins
                 corners = np.concatenate([start[None], self._vertices_between(cracks), end[None]])
                 begin = 0 if stretches[number - 1][0] == HIDDEN else 1

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight as straight_color
-from warpsplat.drawing.trace.contours import Shape, assembled, joints_of, merged
-from warpsplat.drawing.trace.curves import Pieces, fit_runs
+from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
+from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
 from warpsplat.drawing.trace.grids import Bools, Floats
 from warpsplat.drawing.trace.hidden import Cover
@@ -18,8 +18,8 @@ from warpsplat.drawing.trace.outlines import find_boundary
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
-from warpsplat.drawing.trace.runs import Run
-from warpsplat.drawing.trace.stack import Tracer
+from warpsplat.drawing.trace.spans import Polyline
+from warpsplat.drawing.trace.stack import OutlineTracer
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import IntArray, starts_of
 
@@ -76,18 +76,18 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
     hiding = np.where(is_opaque, ranks, -1)
     cover = Cover(hiding[regions.labels])
-    tracer = Tracer(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque))
+    tracer = OutlineTracer(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque))
     painted = np.flatnonzero((loops.region >= 0) & (ranks[loops.region] >= 0)).tolist()
     outlines = [(int(loops.region[loop]), outline) for loop in painted for outline in tracer.outlines(loop)]
-    runs = [part for _, outline in outlines for part in outline if isinstance(part, Run)]
-    fitted = iter(fit_runs(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
+    runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
+    fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
     contours: dict[int, list[Pieces]] = {}
     for region, outline in outlines:
-        contour = assembled([next(fitted) if isinstance(part, Run) else part for part in outline])
+        contour = assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline])
         if contour is not None and len(contour.cubics) > 1:
             contours.setdefault(region, []).append(contour)
     shapes = [
-        Shape(regions.colorings[regions.paint[region]], contours[region])
+        Fill(regions.colorings[regions.paint[region]], contours[region])
         for region in sorted(contours, key=lambda region: ranks[region])
     ]
     height, width = regions.labels.shape
@@ -124,7 +124,7 @@ def _ground(regions: Regions, tree: Tree, *, may_have_ground: bool) -> tuple[Boo
     return bare_ground(tree, regions.paint == paint), regions.colorings[paint]
 
 
-def _scene(canvas: Canvas, shapes: list[Shape]) -> Traced:
+def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
     contours = [contour for shape in shapes for contour in shape.contours]
     counts = np.array([3 * len(contour.cubics) for contour in contours], np.int64)
     by_shape = np.array([sum(3 * len(c.cubics) for c in shape.contours) for shape in shapes], np.int64)
@@ -148,7 +148,7 @@ def _scene(canvas: Canvas, shapes: list[Shape]) -> Traced:
     return Traced(scene, joints.astype(np.int32), np.full(len(joints), -1, np.int32))
 
 
-def _paints(shapes: list[Shape]) -> dict[str, IntArray | FloatArray]:
+def _paints(shapes: list[Fill]) -> dict[str, IntArray | FloatArray]:
     """Return the gradients as fields of a ``Scene``."""
     ramps = [shape.coloring.ramp for shape in shapes]
     known = [ramp for ramp in ramps if ramp is not None]

@@ -14,7 +14,7 @@ from warpsplat.portable.elementary import hypot
 
 
 @dataclass(frozen=True)
-class Run:
+class Polyline:
     """A part of an outline, to be fitted."""
 
     points: Floats
@@ -45,7 +45,7 @@ FINE_TOLERANCE = 0.3  # [px] up to which corners are looked for at their finest 
 BENT = 1.0  # [px] of outline beside a corner that its antialiasing bends
 
 
-def cut_at_corners(run: Run, tolerance: float) -> list[Span]:
+def cut_at_corners(run: Polyline, tolerance: float) -> list[Span]:
     """Return the spans of a run.
 
     Args:
