@@ -42,7 +42,7 @@ EXCEPTIONS = {
     ("warpsplat/portable/elementary.py", "**"): "powers of -1, which are whole numbers",
     ("warpsplat/portable/filters.py", "cv2.distanceTransformWithLabels"): "counts in whole numbers",
     ("warpsplat/motion/terminal/blocks.py", "@"): "a preview",
-    ("warpsplat/drawing/trace/regions.py", "cv2.distanceTransformWithLabels"): "counts in whole numbers",
+    ("warpsplat/drawing/trace/assign.py", "cv2.distanceTransformWithLabels"): "counts in whole numbers",
     ("warpsplat/motion/terminal/blocks.py", "cv2.cvtColor"): "a preview",
     ("warpsplat/motion/terminal/layout.py", "cv2.resize"): "a preview",
 }
@@ -80,7 +80,7 @@ METHODS = words("""
 EXACT = words("""
     connectedComponents connectedComponentsWithStats findContours drawContours dilate erode morphologyEx
     getStructuringElement medianBlur fillPoly line circle ellipse polylines rectangle copyMakeBorder imdecode
-    applyColorMap ximgproc thinning
+    applyColorMap ximgproc thinning boundingRect
 """)
 """What OpenCV does in whole numbers, or by comparing only."""
 

@@ -11,12 +11,13 @@ from tests.drawing.drawings import BLUE, RED, WHITE, disc, drawing, logo, seam
 from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.drawing.fit_outlines import Refinement, own_colors, refine_drawing, start
-from warpsplat.fit.constraints import Constraints, Drawing, Joint
+from warpsplat.fit.constraints import Constraints, Drawing
 from warpsplat.fit.step import Step
 from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.scene.joints import Joint
 
 QUICK = Refinement(steps=60, point_rate=0.4)
 

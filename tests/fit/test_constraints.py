@@ -7,11 +7,12 @@ import pytest
 
 from tests.drawing.drawings import drawing, logo, polygon, seam
 from tests.helpers import relative_error
-from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Joint, Projection
+from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Projection
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.scene import Canvas
+from warpsplat.scene.joints import Joint
 
 DRAWINGS = pytest.mark.parametrize("made", [logo(), seam()], ids=["logo", "seam"])
 

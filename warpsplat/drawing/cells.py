@@ -1,6 +1,6 @@
-"""Small squares of the canvas, by which is told what a change of an outline may change in the picture.
+"""Small squares of the canvas: what a change of an outline may change in the image.
 
-A set of them is an array of whole numbers, ascending, one for each.
+A set of them is an array of ascending integers.
 """
 
 from __future__ import annotations
@@ -12,35 +12,34 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.merge import points_at
+from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.tiles import TILE
 
 Cells = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
-CELL = 2
-"""Side of a cell [canvas units]; a tile has whole ones."""
+CELL = 2  # [canvas units] side of a cell, which divides that of a tile
 
 ZERO, SPAN = 1 << 20, 1 << 21
 """A cell's number is (column + ZERO) SPAN + row + ZERO: outlines stay within ten canvases."""
 
 AROUND = np.array([i * SPAN + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
-"""Steps from a cell to those that an outline in it may change as well."""
+"""Offsets of a cell and its neighbours, which an outline in it may change as well."""
 
 
 def columns_and_rows(cells: Cells) -> tuple[Cells, Cells]:
-    """Where cells are."""
+    """Return the columns and rows of cells."""
     return cells // SPAN - ZERO, cells % SPAN - ZERO
 
 
 def joined(sets: Sequence[Cells]) -> Cells:
-    """The cells of all of them."""
+    """Return the union of sets of cells."""
     return sets[0] if len(sets) == 1 else np.unique(np.concatenate(sets))
 
 
 def cells_around(cubics: Floats) -> list[Cells]:
-    """The cells around each of some cubics, shape (cubic, 4, 2)."""
+    """Return the cells around each of some cubics, shape (cubic, 4, 2)."""
     if not len(cubics):
         return []
     reach = np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1)
@@ -48,7 +47,7 @@ def cells_around(cubics: Floats) -> list[Cells]:
     which = np.repeat(np.arange(len(cubics)), counts)
     number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
     t = np.minimum(number * (1 / (counts - 1))[which], 1)
-    points = points_at(cubics[which], t[:, None, None])[:, 0]
+    points = points_at(cubics[which], t[:, None])[:, 0]
     places = np.floor(points / CELL).astype(np.int64) + ZERO
     every = SPAN * SPAN
     passed = np.unique(which * every + places[:, 0] * SPAN + places[:, 1])
@@ -57,7 +56,7 @@ def cells_around(cubics: Floats) -> list[Cells]:
 
 
 def first_apart(sets: Iterable[Cells]) -> list[int]:
-    """Which of some sets have no cell in common with another one that was chosen before."""
+    """Choose sets in their order that have no cell in common with one chosen before; return their indices."""
     known = list(sets)
     if not known:
         return []
@@ -72,14 +71,11 @@ def first_apart(sets: Iterable[Cells]) -> list[int]:
 
 
 def by_cell(tiles: npt.NDArray[np.floating[Any]], viewport: Viewport) -> Floats:
-    """Sums over the cells, with one more beyond each border that is empty.
+    """Return sums over the cells, with an empty one beyond each border, shape (rows + 2, columns + 2).
 
     Args:
-        tiles: pixels, 0 beyond the picture, shape (tile, column, row).
-        viewport: the picture.
-
-    Returns:
-        shape (rows + 2, columns + 2).
+        tiles: Pixels, 0 beyond the image, shape (tile, column, row).
+        viewport: Of the image.
     """
     side = TILE // CELL
     tall = functools.reduce(np.add, [tiles[..., i::CELL].astype(np.float64) for i in range(CELL)])
@@ -90,7 +86,7 @@ def by_cell(tiles: npt.NDArray[np.floating[Any]], viewport: Viewport) -> Floats:
 
 
 def sum_within(sums: Floats, cells: Cells) -> float:
-    """Of ``by_cell``, over some cells; what lies beyond the border is empty."""
+    """Return the total of ``by_cell`` over some cells; those beyond the border are empty."""
     columns, rows = columns_and_rows(cells)
     height, width = sums.shape
     return float(sums[np.clip(rows + 1, 0, height - 1), np.clip(columns + 1, 0, width - 1)].sum())

@@ -1,13 +1,14 @@
-"""What a drawing's outlines may do without: candidates for fewer, straighter or more upright pieces.
+"""Candidates for simpler outlines: fewer, straighter or more upright pieces.
 
-Each is an ``Edit`` of the arrays, with the part of the canvas that it changes and the bytes that it spares.
-What it costs is for the renderer to say (``drawing.tidy``).
+Each is an ``Edit`` of the arrays, with the part of the canvas that it changes and the bytes that it saves.
+How much it costs is measured by rendering (``drawing.tidy``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -15,29 +16,24 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined
-from warpsplat.drawing.merge import handles_through, points_at
-from warpsplat.fit.constraints import SAME_COORDINATE, Drawing, Joint
+from warpsplat.drawing.merge import handles_through
+from warpsplat.drawing.trace.beziers import points_at
+from warpsplat.fit.constraints import SAME_COORDINATE, Drawing
+from warpsplat.scene.joints import Joint
 
 Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
 
-MOST_OFF = 0.6
-"""How far a candidate may move an outline [canvas units], where bytes have their usual price."""
-
-STEEP = 0.06
-"""Slope below which a line may be level, or upright, and a tangent likewise."""
-
-AT_ONCE = 512
-"""Candidates that are measured in one go: bounds their memory to some megabytes."""
-
+MOST_OFF = 0.6  # [canvas units] that a candidate may move an outline, where bytes have their usual price
+STEEP = 0.06  # slope below which a line, or a tangent, may be made level or upright
 CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
 """What a cubic, a line, the handles of a cubic and a number take in a file."""
-
 
 Key = tuple[str, int, int]
 
 
 def key_of(kind: str, at: tuple[float, float]) -> Key:
-    """Of an ``Edit``."""
+    """Return the key of an ``Edit``."""
     return kind, round(at[0] / 2), round(at[1] / 2)
 
 
@@ -61,12 +57,12 @@ class Edit:
 
     @property
     def key(self) -> Key:
-        """What names it from round to round, whatever the numbers of its points are."""
+        """Its name from round to round, in which the numbers of its points change."""
         return key_of(self.kind, self.at)
 
 
 def applied(drawing: Drawing, edits: Sequence[Edit]) -> Drawing:
-    """The drawing with ``edits`` that have no points in common."""
+    """Return the drawing after ``edits`` that have no points in common."""
     points, joints = drawing.scene.points.copy(), drawing.joints.copy()
     keep = np.ones(len(points), np.bool_)
     for edit in edits:
@@ -80,7 +76,7 @@ def applied(drawing: Drawing, edits: Sequence[Edit]) -> Drawing:
 
 
 def turned(drawing: Drawing) -> Drawing:
-    """The same outlines, each from another of its points on: the first one is never removed."""
+    """Return the same outlines, each begun at another point: the first point is never removed."""
     starts = drawing.scene.starts
     order = np.concatenate(
         [np.roll(np.arange(a, b), -3 * max(1, (b - a) // 6)) for a, b in pairwise(starts.tolist())]
@@ -90,252 +86,232 @@ def turned(drawing: Drawing) -> Drawing:
 
 
 class Outlines:
-    """A drawing's outlines, place by place."""
+    """A drawing's outlines by the numbers of their points; the points of several shapes share places."""
 
     def __init__(self, drawing: Drawing, reach: float = MOST_OFF) -> None:
         """``reach``: how far a candidate may move an outline [canvas units]."""
-        self.drawing, self._reach = drawing, reach
-        self.points = drawing.scene.points.astype(np.float64)
+        self._reach = reach
+        self._size = (drawing.scene.canvas.width, drawing.scene.canvas.height)
+        self._points = drawing.scene.points.astype(np.float64)
         on, following = drawing.links()
-        self.on = on.tolist()
-        self.next = dict(zip(self.on, following.tolist(), strict=True))
-        self.previous = {b: a for a, b in self.next.items()}
-        self.is_line = dict(zip(self.on, drawing.lines().tolist(), strict=True))
-        count = len(self.points)
-        self.place = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(count)).tolist()
-        self._cells: dict[int, Cells] = {}
-        """Around the cubic that begins at each point, once they are asked for."""
-        self._members: dict[int, list[int]] = {}
-        for i, place in enumerate(self.place):
-            self._members.setdefault(place, []).append(i)
+        self._on = on.tolist()
+        self._next = dict(zip(self._on, following.tolist(), strict=True))
+        self._previous = {b: a for a, b in self._next.items()}
+        self._is_line = dict(zip(self._on, drawing.lines().tolist(), strict=True))
+        self._place = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(len(self._points))).tolist()
+        self._members_at: dict[int, list[int]] = {}
+        for i, place in enumerate(self._place):
+            self._members_at.setdefault(place, []).append(i)
         starts = drawing.scene.starts
         self._firsts = set(starts[:-1].tolist())
-        sizes = np.repeat(np.diff(starts), np.diff(starts))
-        self._sizes = sizes.tolist()
+        self._sizes = np.repeat(np.diff(starts), np.diff(starts)).tolist()
         self._is_smooth: list[bool] = (drawing.joints == Joint.SMOOTH).tolist()
-        self._refused: Set[Key] = frozenset()
 
-    def members(self, point: int) -> list[int]:
-        """All points at the place of ``point``."""
-        return self._members[self.place[point]]
+    def edits(self, refused: Set[Key] = frozenset()) -> list[Edit]:
+        """Return all candidates but the ``refused`` ones, which become more with every round."""
 
-    def corners(self, a: int) -> Floats:
-        """The cubic that begins at ``a``, shape (4, 2)."""
-        return self.points[[a, a + 1, a + 2, self.next[a]]]
+        def is_open(kind: str, point: int) -> bool:
+            return key_of(kind, self._at(point)) not in refused
 
-    def cells(self, *starts: int) -> Cells:
-        """Around the cubics that begin at ``starts``, and those that turn with them."""
+        found: list[Edit | None] = []
+        # Each place once for all shapes.
+        done: set[int] = set()
+        places = []
+        for p in self._on:
+            if self._place[p] not in done:
+                done.add(self._place[p])
+                places.append(p)
+        merged = self._merged([p for p in places if self._is_spare(p) and is_open("without", p)])
+        leaning, sloping = self._leaning(), self._sloping()
+        for p in places:
+            if p in merged:
+                found.append(self._without(p, *merged[p]))
+            if p in leaning and is_open("tangent", p):
+                found.append(self._level_tangent(p, *leaning[p]))
+        firsts = [a for a in self._on if min(self._members(a + 1) + self._members(a + 2)) >= a]
+        thirds = self._thirds([a for a in firsts if not self._is_line[a] and is_open("straight", a + 1)])
+        for a in firsts:
+            if a in sloping and is_open("level", a + 1):
+                found.append(self._level_line(a, *sloping[a]))
+            elif a in thirds:
+                found.append(self._straight(a, *thirds[a]))
+        return [edit for edit in found if edit]
+
+    def _members(self, point: int) -> list[int]:
+        """Return all points at the place of ``point``."""
+        return self._members_at[self._place[point]]
+
+    def _corners(self, a: int) -> Floats:
+        """Return the cubic that begins at ``a``, shape (4, 2)."""
+        return self._points[[a, a + 1, a + 2, self._next[a]]]
+
+    def _at(self, p: int) -> tuple[float, float]:
+        x, y = self._points[p].tolist()
+        return x, y
+
+    @cached_property
+    def _cubic_cells(self) -> dict[int, Cells]:
+        """The cells around the cubic that begins at each point."""
+        on = np.array(self._on)
+        following = [self._next[a] for a in self._on]
+        cubics = self._points[np.stack([on, on + 1, on + 2, following], axis=1)]
+        return dict(zip(self._on, cells_around(cubics), strict=True))
+
+    def _cells(self, *starts: int) -> Cells:
+        """Return the cells around the cubics that begin at ``starts``, and those that turn with them."""
         wide = set(starts)
         for a in starts:
             if self._is_smooth[a]:
-                wide.add(self.previous[a])
-            if self._is_smooth[self.next[a]]:
-                wide.add(self.next[a])
-        if not self._cells:
-            on = np.array(self.on)
-            following = [self.next[a] for a in self.on]
-            cubics = self.points[np.stack([on, on + 1, on + 2, following], axis=1)]
-            self._cells = dict(zip(self.on, cells_around(cubics), strict=True))
-        return joined([self._cells[a] for a in wide])
-
-    def _at(self, p: int) -> tuple[float, float]:
-        x, y = self.points[p].tolist()
-        return x, y
-
-    def edits(self, refused: Set[Key] = frozenset()) -> list[Edit]:
-        """All candidates but the ``refused`` ones: of those there are more with every round."""
-        self._refused = refused
-        found: list[Edit] = []
-        merged = self._merged()
-        leaning, sloping = self._leaning(), self._sloping()
-        done: set[int] = set()
-        for p in self.on:
-            if self.place[p] in done:
-                continue
-            done.add(self.place[p])
-            if p in merged:
-                found.append(self._without(p, *merged[p]))
-            if p in leaning:
-                found += self._level_tangent(p, *leaning[p])
-        # Once for all shapes.
-        firsts = [a for a in self.on if min(self.members(a + 1) + self.members(a + 2)) >= a]
-        thirds = self._thirds([a for a in firsts if not self.is_line[a] and self._is_open("straight", a + 1)])
-        for a in firsts:
-            if a in sloping:
-                found += self._level_line(a, *sloping[a])
-            elif a in thirds:
-                found.append(self._straight(a, *thirds[a]))
-        return found
-
-    def _is_open(self, kind: str, point: int) -> bool:
-        """Whether an edit of this kind at ``point`` was not refused."""
-        return key_of(kind, self._at(point)) not in self._refused
+                wide.add(self._previous[a])
+            if self._is_smooth[self._next[a]]:
+                wide.add(self._next[a])
+        return joined([self._cubic_cells[a] for a in wide])
 
     def _is_spare(self, p: int) -> bool:
-        """Whether the pieces that meet in ``p`` meet nothing else there."""
-        ends = {self.place[self.previous[p]], self.place[self.next[p]]}
-        if len(ends) < 2:
-            return False
-        return all(
+        """Return whether the pieces that meet in ``p`` meet nothing else there."""
+        ends = {self._place[self._previous[p]], self._place[self._next[p]]}
+        return len(ends) == 2 and all(
             m not in self._firsts
             and self._sizes[m] > 6
-            and {self.place[self.previous[m]], self.place[self.next[m]]} == ends
-            for m in self.members(p)
+            and {self._place[self._previous[m]], self._place[self._next[m]]} == ends
+            for m in self._members(p)
         )
 
-    def _merged(self) -> dict[int, tuple[Floats, float]]:
-        """Points that need not be: the handles of one piece in place of the two that meet there, and how far
-        it moves the outline.
+    def _merged(self, spare: list[int]) -> dict[int, tuple[Floats, float]]:
+        """Find the points that can go: handles of one piece for the two there, and how far it is off.
 
         All at once: there are hundreds, and each alone takes a millisecond.
         """
-        done: set[int] = set()
-        spare = []
-        for p in self.on:
-            if self.place[p] not in done and self._is_spare(p) and self._is_open("without", p):
-                spare.append(p)
-            done.add(self.place[p])
         if not spare:
             return {}
-        first = np.stack([self.corners(self.previous[p]) for p in spare])
-        second = np.stack([self.corners(p) for p in spare])
-        straight = np.array([self.is_line[self.previous[p]] and self.is_line[p] for p in spare])
+        first = np.stack([self._corners(self._previous[p]) for p in spare])
+        second = np.stack([self._corners(p) for p in spare])
+        straight = np.array([self._is_line[self._previous[p]] and self._is_line[p] for p in spare])
         whole = np.stack([first[:, 0], second[:, 3]], axis=1)
         handles = np.where(straight[:, None, None], thirds_between(whole), handles_through(first, second))
         off = _apart(np.concatenate([whole[:, :1], handles, whole[:, 1:]], axis=1), first, second)
         return {spare[i]: (handles[i], float(off[i])) for i in np.flatnonzero(off <= self._reach).tolist()}
 
     def _without(self, p: int, handles: Floats, off: float) -> Edit:
-        """The two pieces that meet in ``p`` as one."""
-        members = self.members(p)
-        a = self.previous[p]
-        lines = self.is_line[a] + self.is_line[p]
+        """Return the edit that makes one piece of the two that meet in ``p``."""
+        members = self._members(p)
+        a = self._previous[p]
+        lines = self._is_line[a] + self._is_line[p]
         points, joints, removed = {}, {}, []
         kind = Joint.LINE_HANDLE if lines == 2 else Joint.FREE
         for m in members:
-            before = self.previous[m]
-            forward = self.place[before] == self.place[a]
+            before = self._previous[m]
+            forward = self._place[before] == self._place[a]
             points[before + 1], points[m + 2] = handles if forward else handles[::-1]
             joints[before + 1] = joints[m + 2] = kind
             removed += [before + 2, m, m + 1]
         saved = (LINE_BYTES if lines else CUBIC_BYTES) * len(members)
-        return Edit("without", self._at(p), self.cells(a, p), off, saved, points, joints, tuple(removed))
+        return Edit("without", self._at(p), self._cells(a, p), off, saved, points, joints, tuple(removed))
 
     def _thirds(self, starts: Sequence[int]) -> dict[int, tuple[Floats, float]]:
-        """Of the cubics that begin at ``starts`` those that are about lines: their thirds, and how far off
-        the line is.
-        """
+        """Find the cubics at ``starts`` that are nearly lines: their thirds, and how far the line is off."""
         if not starts:
             return {}
-        corners = np.stack([self.corners(a) for a in starts])
+        corners = np.stack([self._corners(a) for a in starts])
         thirds = thirds_between(corners[:, [0, 3]])
         off = _apart(np.concatenate([corners[:, :1], thirds, corners[:, 3:]], axis=1), corners)
         return {starts[i]: (thirds[i], float(off[i])) for i in np.flatnonzero(off <= self._reach).tolist()}
 
     def _straight(self, a: int, thirds: Floats, off: float) -> Edit:
-        """A cubic as a line."""
-        saved = HANDLES_BYTES * len(self.members(a + 1))
+        """Return the edit that makes a line of a cubic."""
+        saved = HANDLES_BYTES * len(self._members(a + 1))
         points, joints = {}, {}
         for handle, third in zip((a + 1, a + 2), thirds, strict=True):
-            for m in self.members(handle):
+            for m in self._members(handle):
                 points[m], joints[m] = third, Joint.LINE_HANDLE
-        b = self.next[a]
-        for end, beyond in ((a, self.previous[a]), (b, b)):
-            if self.is_line[beyond]:
-                joints |= dict.fromkeys(self.members(end), Joint.CORNER)
-        return Edit("straight", self._at(a + 1), self.cells(a), off, saved, points, joints)
+        b = self._next[a]
+        for end, beyond in ((a, self._previous[a]), (b, b)):
+            if self._is_line[beyond]:
+                joints |= dict.fromkeys(self._members(end), Joint.CORNER)
+        return Edit("straight", self._at(a + 1), self._cells(a), off, saved, points, joints)
 
     def _sloping(self) -> dict[int, tuple[int, float]]:
-        """The lines that are almost level or upright: the axis in which their ends differ little, and by how
-        much.
-        """
-        starts = np.array([a for a in self.on if self.is_line[a]], np.intp)
-        ways = np.abs(self.points[[self.next[a] for a in starts.tolist()]] - self.points[starts])
-        axes = ways.argmin(axis=1)
+        """Find the lines that are nearly level or upright: in which axis their ends differ, and how much."""
+        starts = np.array([a for a in self._on if self._is_line[a]], np.intp)
+        ways = np.abs(self._points[[self._next[a] for a in starts.tolist()]] - self._points[starts])
         off, along = ways.min(axis=1), ways.max(axis=1)
         near = (off >= SAME_COORDINATE) & (off <= np.minimum(STEEP * along, self._reach))
-        return _picked(near, starts, axes, off)
+        return _by_point(near, starts, ways.argmin(axis=1), off)
 
-    def _level_line(self, a: int, axis: int, off: float) -> Iterator[Edit]:
-        """A line that is almost level or upright, so."""
-        if not self._is_open("level", a + 1):
-            return
-        b = self.next[a]
-        bound = [self._is_bound(end, axis) for end in (a, b)]
-        if all(bound):
-            return
-        ends = self.points[[a, b], axis]
-        level = ends[bound.index(True)] if any(bound) else ends.mean()
-        points = {}
-        for end in (a, b):
-            for m in self.members(end):
-                points[m] = self.points[m].copy()
-                points[m][axis] = level
-        cells = self.cells(a, self.previous[a], b)
-        saved = NUMBER_BYTES * len(self.members(a))
-        yield Edit("level", self._at(a + 1), cells, off, saved, points)
+    def _level_line(self, a: int, axis: int, off: float) -> Edit | None:
+        """Return the edit that makes a line level or upright; None if both of its ends are held."""
+        b = self._next[a]
+        is_held = [self._is_held(end, axis) for end in (a, b)]
+        if all(is_held):
+            return None
+        ends = self._points[[a, b], axis]
+        points = self._moved((a, b), axis, ends[is_held.index(True)] if any(is_held) else ends.mean())
+        cells = self._cells(a, self._previous[a], b)
+        return Edit("level", self._at(a + 1), cells, off, NUMBER_BYTES * len(self._members(a)), points)
 
-    def _is_bound(self, p: int, axis: int) -> bool:
-        """Whether a level or upright line, or the border, holds a coordinate of ``p``."""
-        size = (self.drawing.scene.canvas.width, self.drawing.scene.canvas.height)[axis]
-        if min(abs(self.points[p, axis]), abs(self.points[p, axis] - size)) < SAME_COORDINATE:
+    def _moved(self, points: Sequence[int], axis: int, value: Any) -> dict[int, Floats]:
+        """Return points, and all at their places, with a coordinate set to ``value``."""
+        moved = {}
+        for m in (m for p in points for m in self._members(p)):
+            moved[m] = self._points[m].copy()
+            moved[m][axis] = value
+        return moved
+
+    def _is_held(self, p: int, axis: int) -> bool:
+        """Return whether a level or upright line, or the border, holds a coordinate of ``p``."""
+        if min(abs(self._points[p, axis]), abs(self._points[p, axis] - self._size[axis])) < SAME_COORDINATE:
             return True
-        for m in self.members(p):
-            for a, end in ((m, self.next[m]), (self.previous[m], self.previous[m])):
-                if self.is_line[a] and abs(self.points[end, axis] - self.points[m, axis]) < SAME_COORDINATE:
-                    return True
-        return False
+        return any(
+            self._is_line[a] and abs(self._points[end, axis] - self._points[m, axis]) < SAME_COORDINATE
+            for m in self._members(p)
+            for a, end in ((m, self._next[m]), (self._previous[m], self._previous[m]))
+        )
 
     def _leaning(self) -> dict[int, tuple[int, float]]:
-        """The smooth joints whose tangents are almost level or upright: the axis in which their handles
-        differ little from them, and by how much.
+        """Find the smooth joints whose tangents are nearly level or upright.
+
+        Returns:
+            The axis in which their handles differ little from them, and by how much.
         """
-        smooth = [p for p in self.on if self._is_smooth[p] and not self.is_line[p]]
-        joints = np.array([p for p in smooth if not self.is_line[self.previous[p]]], np.intp)
-        before = np.array([self.previous[p] for p in joints.tolist()], np.intp)
-        ways = np.abs(self.points[np.stack([before + 2, joints + 1], axis=1)] - self.points[joints][:, None])
+        smooth = [p for p in self._on if self._is_smooth[p] and not self._is_line[p]]
+        joints = np.array([p for p in smooth if not self._is_line[self._previous[p]]], np.intp)
+        before = np.array([self._previous[p] for p in joints.tolist()], np.intp)
+        handles = self._points[np.stack([before + 2, joints + 1], axis=1)]
+        ways = np.abs(handles - self._points[joints][:, None])
         axes = ways.sum(axis=1).argmin(axis=1)
         across = np.take_along_axis(ways, axes[:, None, None], axis=2)[..., 0]
         along = np.take_along_axis(ways, 1 - axes[:, None, None], axis=2)[..., 0]
         off = across.max(axis=1)
         near = (off >= SAME_COORDINATE) & (across <= STEEP * along).all(axis=1)
-        return _picked(near, joints, axes, off)
+        return _by_point(near, joints, axes, off)
 
-    def _level_tangent(self, p: int, axis: int, off: float) -> Iterator[Edit]:
-        """A smooth joint whose tangent is almost level or upright, so."""
-        if not self._is_open("tangent", p):
-            return
-        a = self.previous[p]
-        handles = (a + 2, p + 1)
-        points = {}
-        for handle in handles:
-            for m in self.members(handle):
-                points[m] = self.points[m].copy()
-                points[m][axis] = self.points[p, axis]
-        yield Edit(
-            "tangent", self._at(p), self.cells(a, p), 0.4 * off, NUMBER_BYTES * len(self.members(p)), points
-        )
+    def _level_tangent(self, p: int, axis: int, off: float) -> Edit:
+        """Return the edit that makes the tangent of a smooth joint level or upright."""
+        a = self._previous[p]
+        points = self._moved((a + 2, p + 1), axis, self._points[p, axis])
+        saved = NUMBER_BYTES * len(self._members(p))
+        return Edit("tangent", self._at(p), self._cells(a, p), 0.4 * off, saved, points)
 
 
-def _picked(
-    near: npt.NDArray[np.bool_],
-    points: npt.NDArray[np.intp],
-    axes: npt.NDArray[np.intp],
-    off: Floats,
+def _by_point(
+    chosen: npt.NDArray[np.bool_], points: Indices, axes: Indices, off: Floats
 ) -> dict[int, tuple[int, float]]:
-    """Axis and distance by point, of those that are near."""
-    kept = zip(points[near].tolist(), axes[near].tolist(), off[near].tolist(), strict=True)
+    """Return axis and distance by point, for the chosen ones."""
+    kept = zip(points[chosen].tolist(), axes[chosen].tolist(), off[chosen].tolist(), strict=True)
     return {point: (axis, distance) for point, axis, distance in kept}
 
 
 def thirds_between(ends: Floats) -> Floats:
-    """Points at the thirds of lines, shape (line, 2, 2), between their ``ends``, in the same shape."""
+    """Return the points at the thirds of lines, shape (line, 2, 2), between ``ends`` of the same shape."""
     return (2 * ends + ends[:, ::-1]) / 3
 
 
+AT_ONCE = 512  # candidates that are measured at once, which bounds their memory to some megabytes
+
+
 def _apart(made: Floats, *pieces: Floats) -> Floats:
-    """Largest distance of points of ``pieces`` from the cubics ``made``, about; all (cubic, 4, 2)."""
-    t = np.linspace(0, 1, 17)[:, None]
+    """Return about the largest distance of ``pieces`` from the cubics ``made``, all (cubic, 4, 2)."""
+    t = np.linspace(0, 1, 17)
     samples = np.concatenate([points_at(piece, t[1:-1:2]) for piece in pieces], axis=1)
     found = []
     for first in range(0, len(made), AT_ONCE):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import IntEnum
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +14,7 @@ from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.scene import Basis, Canvas, FloatArray, IndexArray, Scene
+from warpsplat.scene.joints import Joint
 from warpsplat.scene.scene import ranges
 
 Ints = npt.NDArray[np.int32]
@@ -28,19 +28,6 @@ MAX_LEVERAGE = 8.0
 
 BEFORE, AFTER = 1, 2
 """Flags of the neighbours of a smooth joint that are free handles; another one is the far end of a line."""
-
-
-class Joint(IntEnum):
-    """Kind of a control point of a drawing's outline."""
-
-    FREE = 0
-    """A handle, or a point without constraints."""
-    CORNER = 1
-    """On the outline, which may turn there."""
-    SMOOTH = 2
-    """On the outline, collinear with both handles."""
-    LINE_HANDLE = 3
-    """At a third of a straight line."""
 
 
 @dataclass(frozen=True)

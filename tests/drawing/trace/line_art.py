@@ -5,6 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from warpsplat.drawing.strokes.ink import find_ink
+from warpsplat.drawing.strokes.lines import trace_ink
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 
 
@@ -16,6 +19,11 @@ def drawn(paths: str, width: int = 96, height: int = 72, ground: str = "#fff") -
         f'<g fill="none" stroke="#000" stroke-width="3" stroke-linecap="round">{paths}</g></svg>'
     )
     return np.asarray(on_white(render_svg(text)), np.float32) / np.float32(255)
+
+
+def traced(image: FloatArray) -> Scene:
+    """The strokes of line art."""
+    return trace_ink(find_ink(image)).scene
 
 
 CROSS = '<path d="M20 12L76 60"/><path d="M22 58L78 16"/>'

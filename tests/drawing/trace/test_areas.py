@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.drawing.trace.line_art import drawn
-from warpsplat.drawing.strokes.areas import is_beside, parted, reaching
+from warpsplat.drawing.strokes.areas import is_beside, split_areas, with_ends_in_areas
 from warpsplat.drawing.strokes.centerlines import find_lines
 from warpsplat.drawing.strokes.ink import find_ink
 
@@ -15,13 +15,13 @@ STAR = '<path d="M30 8l7 21h22l-18 13 7 21-18-13-18 13 7-21L1 29h22z" fill="#000
 
 def test_lines_alone_have_no_areas() -> None:
     ink = find_ink(drawn('<path d="M10 20H86"/><path d="M48 20V62"/>'))
-    thin, areas = parted(ink)
+    thin, areas = split_areas(ink)
     assert areas is None
     assert (thin.mask == ink.mask).all()
 
 
 def test_an_area_and_the_line_that_leaves_it() -> None:
-    thin, areas = parted(find_ink(drawn(BLOB)))
+    thin, areas = split_areas(find_ink(drawn(BLOB)))
     assert areas is not None
     assert len(areas) == 1
     assert not (thin.mask & (areas.labels > 0)).any()
@@ -34,13 +34,13 @@ def test_an_area_and_the_line_that_leaves_it() -> None:
 
 def test_a_partly_covered_edge_is_measured_although_ink_is_broad() -> None:
     image = drawn('<path d="M20.25 12H60V60H20.25z" fill="#000" stroke="none"/><path d="M70 5V60"/>')
-    _, areas = parted(find_ink(image))
+    _, areas = split_areas(find_ink(image))
     assert areas is not None
     assert np.allclose(areas.cover[20:50, 20], 0.75, atol=0.02)
 
 
 def test_tips_belong_to_their_area() -> None:
-    thin, areas = parted(find_ink(drawn(STAR + '<path d="M66 10V60M66 30H90"/>')))
+    thin, areas = split_areas(find_ink(drawn(STAR + '<path d="M66 10V60M66 30H90"/>')))
     assert areas is not None
     assert len(areas) == 1
     assert np.nonzero(thin.mask)[1].min() > 60
@@ -73,7 +73,7 @@ def test_what_is_beside_an_area_is_no_line() -> None:
 def test_ends_far_from_areas_stay() -> None:
     away = np.arange(40.0)[None].repeat(10, axis=0)
     points = np.stack([np.arange(20.0, 0.0, -1.0) + 0.5, np.full(20, 4.5)], axis=1)
-    longer, widths = reaching(points, np.full(20, 3.0), away)
+    longer, widths = with_ends_in_areas(points, np.full(20, 3.0), away)
     assert len(longer) == len(widths) == 21
     assert np.allclose(longer[0], points[0])
     assert np.allclose(longer[-1], [1.5 - 4, 4.5])

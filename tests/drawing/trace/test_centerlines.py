@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.drawing.trace.line_art import CROSS, TEE, drawn, shown
+from tests.drawing.trace.line_art import CROSS, TEE, drawn, shown, traced
 from warpsplat.drawing.strokes.centerlines import Line, find_lines
 from warpsplat.drawing.strokes.ink import find_ink
-from warpsplat.drawing.strokes.lines import rejoined, trace_lines
+from warpsplat.drawing.strokes.lines import rejoined
 from warpsplat.drawing.strokes.pens import find_pens, width_steps
 from warpsplat.drawing.strokes.skeleton import find_graph
 from warpsplat.scene import Canvas, Kind, Scene
@@ -88,7 +88,7 @@ def test_pens_are_told_apart_by_colour() -> None:
 
 
 def test_each_pen_is_a_layer_of_opaque_strokes() -> None:
-    scene = trace_lines(drawn('<path d="M10 20H86"/><path d="M10 50H60" stroke="#c00"/>'))
+    scene = traced(drawn('<path d="M10 20H86"/><path d="M10 50H60" stroke="#c00"/>'))
     assert (scene.kind == Kind.STROKE).all()
     assert (scene.opacities == 1).all()
     assert scene.layer.tolist() == [0, 1]
@@ -97,7 +97,7 @@ def test_each_pen_is_a_layer_of_opaque_strokes() -> None:
 
 def test_corners_are_kept() -> None:
     """A square of four lines: four cubics."""
-    scene = trace_lines(drawn('<rect x="20" y="12" width="50" height="44" stroke-linejoin="round"/>'))
+    scene = traced(drawn('<rect x="20" y="12" width="50" height="44" stroke-linejoin="round"/>'))
     assert scene.closed.tolist() == [1]
     corners = scene.points[::3]
     for place in ((20, 12), (70, 12), (70, 56), (20, 56)):
@@ -108,7 +108,7 @@ def test_corners_are_kept() -> None:
 def test_an_area_is_filled_by_rings_of_the_pen() -> None:
     lines = '<path d="M4 5H92"/><path d="M4 67H92"/><path d="M60 12V62"/>'
     image = drawn(lines + '<circle cx="28" cy="36" r="20" fill="#000" stroke="none"/>')
-    scene = trace_lines(image)
+    scene = traced(image)
     assert scene.widths.max() < 5
     painted = shown(write_svg(replace(scene, canvas=replace(scene.canvas, background=None)))) > 0.5
     assert painted[image[..., 0] < 0.5].mean() > 0.95
@@ -127,4 +127,4 @@ def test_ends_that_met_stay_where_they_met() -> None:
 
 
 def test_no_ink_no_strokes() -> None:
-    assert len(trace_lines(np.ones((40, 50, 3), np.float32))) == 0
+    assert len(traced(np.ones((40, 50, 3), np.float32))) == 0

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from warpsplat.drawing.trace.corners import find_corners
-from warpsplat.drawing.trace.curves import Pieces, Run, fit_ellipse, fit_runs
+from warpsplat.drawing.trace.curves import Pieces, fit_polylines
+from warpsplat.drawing.trace.ellipses import fit_ellipse
 from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.trace.spans import Polyline
 
 
 def noise(*shape: int) -> Floats:
@@ -31,14 +33,14 @@ def polygon(corners: Floats, step: float = 1.0) -> Floats:
     return np.concatenate(parts)
 
 
-def sampled(pieces: Pieces, count: int = 40) -> Floats:
+def sampled(cubics: Floats, count: int = 40) -> Floats:
     t = np.linspace(0, 1, count)[:, None]
     weights = np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
-    return np.concatenate([weights @ cubic for cubic in pieces.cubics])
+    return np.concatenate([weights @ cubic for cubic in cubics])
 
 
 def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:
-    (pieces,) = fit_runs([Run(points, closed=True)], tolerance)
+    (pieces,) = fit_polylines([Polyline(points, closed=True)], tolerance)
     assert np.allclose(pieces.cubics[:, 3], np.roll(pieces.cubics[:, 0], -1, axis=0), atol=1e-6), "no gaps"
     return pieces
 
@@ -48,7 +50,7 @@ def test_a_circle_is_four_cubics(radius: float) -> None:
     points = ring(radius) + noise(200, 2)
     pieces = fitted(points)
     assert len(pieces.cubics) == 4 and not pieces.lines.any()
-    assert np.abs(np.hypot(*(sampled(pieces) - 50).T) - radius).max() < 0.03
+    assert np.abs(np.hypot(*(sampled(pieces.cubics) - 50).T) - radius).max() < 0.03
     ends = pieces.cubics[:, 0] - pieces.cubics[:, 0].mean(axis=0)
     assert (np.abs(ends) < 1e-6).any(axis=1).all(), "its nodes are where it is upright or level"
 
@@ -56,9 +58,9 @@ def test_a_circle_is_four_cubics(radius: float) -> None:
 def test_an_ellipse_is_four_cubics_the_way_round_that_it_was() -> None:
     points = ring(30, squeeze=0.5, turn=0.4)
     for way in (points, points[::-1]):
-        pieces = fit_ellipse(way, 0.2)
-        assert pieces is not None
-        shown = sampled(pieces)
+        cubics = fit_ellipse(way, 0.2)
+        assert cubics is not None
+        shown = sampled(cubics)
         nearest = np.hypot(*(shown[:, None] - points[None]).transpose(2, 0, 1)).min(axis=1)
         assert nearest.max() < 0.5  # half of the points' distance
         area = np.sum(shown[:-1, 0] * shown[1:, 1] - shown[1:, 0] * shown[:-1, 1])
@@ -116,8 +118,8 @@ def test_open_runs_end_where_they_are_told_to() -> None:
     x = np.arange(1.0, 40)
     points = np.stack([x, 10 * np.sin(x / 12)], axis=1)
     start, end = np.array([0.0, 0.0]), np.array([40.0, 10 * np.sin(40 / 12)])
-    (pieces,) = fit_runs([Run(points, False, start, end)], 0.2)
+    (pieces,) = fit_polylines([Polyline(points, False, start, end)], 0.2)
     assert np.allclose(pieces.cubics[0, 0], start) and np.allclose(pieces.cubics[-1, 3], end)
     assert len(pieces.cubics) <= 3
-    shown = sampled(pieces, 200)
+    shown = sampled(pieces.cubics, 200)
     assert np.hypot(*(points[:, None] - shown[None]).transpose(2, 0, 1)).min(axis=1).max() < 0.25

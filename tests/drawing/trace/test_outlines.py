@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import draw, draw_exactly, ground, levels
-from warpsplat.drawing.trace.grids import NOBODY
+from warpsplat.drawing.trace.grids import NO_REGION, components
 from warpsplat.drawing.trace.order import find_tree
-from warpsplat.drawing.trace.outlines import crack_offsets, places
+from warpsplat.drawing.trace.outlines import find_boundary
 from warpsplat.drawing.trace.planar import STEPS, find_loops
-from warpsplat.drawing.trace.regions import components, find_regions
+from warpsplat.drawing.trace.regions import find_regions
 
 
 def grey(labels: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def test_loops_go_round_their_regions() -> None:
         for i in range(len(loops))
     }
     assert found == {
-        (NOBODY, True, 30),
+        (NO_REGION, True, 30),
         (0, False, 30),
         (0, True, 22),
         (1, False, 22),
@@ -35,7 +35,7 @@ def test_loops_go_round_their_regions() -> None:
         (2, False, 6),
     }
     tree = find_tree(loops, 3)
-    assert tree.parent.tolist() == [NOBODY, 0, 1]
+    assert tree.parent.tolist() == [NO_REGION, 0, 1]
     assert tree.touches.all()
 
 
@@ -46,7 +46,7 @@ def test_each_crack_ends_where_the_next_begins() -> None:
     loops = find_loops(labels, np.zeros((20, 20, 4), np.float32))
     for i in range(len(loops)):
         part = slice(loops.first[i], loops.first[i + 1])
-        ends = loops.vertices[part] + STEPS[loops.ways[part]]
+        ends = loops.vertices[part] + STEPS[loops.directions[part]]
         assert (ends == np.roll(loops.vertices[part], -1, axis=0)).all()
     outer = loops.region[~loops.is_hole]
     assert sorted(outer.tolist()) == list(range(labels.max() + 1)), "each region has one loop around it"
@@ -75,9 +75,9 @@ def test_straight_edges_are_exact(slope: float) -> None:
     found = find_regions(image)
     assert len(found.paint) == 2
     loops = find_loops(found.labels, image)
-    points, good = places(loops, crack_offsets(loops, image, found.labels, found.pure))
-    inner = good & (loops.others != NOBODY) & (np.abs(loops.vertices - 48) < 40).all(axis=1)
-    x, y = points[inner].T
+    boundary = find_boundary(loops, found)
+    inner = boundary.is_good & (loops.others != NO_REGION) & (np.abs(loops.vertices - 48) < 40).all(axis=1)
+    x, y = boundary.points[inner].T
     off = (y - 48.3 - slope * (x - 48)) / np.hypot(1, slope)
     assert len(off) > 50
     assert np.abs(off).max() < 0.06
@@ -90,4 +90,4 @@ def test_cracks_without_antialiasing_stay() -> None:
     )
     found = find_regions(image)
     loops = find_loops(found.labels, image)
-    assert not crack_offsets(loops, image, found.labels, found.pure).any()
+    assert not find_boundary(loops, found).offsets.any()

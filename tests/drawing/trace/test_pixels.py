@@ -90,10 +90,11 @@ def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("most", [4, 12, 60])
-def test_a_colour_of_many_corners_has_several_shapes(most: int) -> None:
+def test_a_colour_of_many_corners_has_several_shapes(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     image = np.random.default_rng(4).integers(0, 2, (12, 15, 1)).repeat(3, axis=2).astype(np.float32)
     whole, _ = trace_pixels(image)
-    scene, per_pixel = trace_pixels(image, most=most)
+    monkeypatch.setattr(pixels, "MOST_CORNERS", most)
+    scene, per_pixel = trace_pixels(image)
     assert len(whole) == 1
     assert len(scene) > 1
     assert (scene.point_counts() <= 3 * most).all()
@@ -101,9 +102,10 @@ def test_a_colour_of_many_corners_has_several_shapes(most: int) -> None:
     assert (shown == np.round(255 * image)).all()
 
 
-def test_ever_smaller_parts_end_with_cells() -> None:
+def test_ever_smaller_parts_end_with_cells(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pixels, "MOST_CORNERS", 1)
     inside = np.ones((3, 2), np.bool_)
-    assert sorted(polygons(inside, 1)) == sorted(
+    assert sorted(polygons(inside)) == sorted(
         [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]] for x in range(2) for y in range(3)
     )
 

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 from warpsplat.drawing.strokes.ink import find_ink
-from warpsplat.drawing.strokes.lines import trace_ink, trace_lines
+from warpsplat.drawing.strokes.lines import trace_ink
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.scene import FloatArray
@@ -73,7 +73,7 @@ def digest() -> str:
     scenes = [trace(image(levels)).scene for levels in (drawing(), drawing() + noise)]
     scenes.append(trace_ink(find_ink(image(line_art())), mixed=True).scene)
     for levels in (line_art(), line_art() + noise):
-        scenes.append(trace_lines(image(levels)))
+        scenes.append(trace_ink(find_ink(image(levels))).scene)
         scenes.append(toured(scenes[-1]))
     found = hashlib.sha256()
     for scene in scenes:

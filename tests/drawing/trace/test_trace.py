@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
-from warpsplat.drawing.trace import joints
-from warpsplat.drawing.trace.regions import Coloring, Regions, components
+from warpsplat.drawing.trace.grids import components
+from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.trace import Traced, trace, trace_regions
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray, Paint
+from warpsplat.scene.joints import Joint
 from warpsplat.svg.write import write_svg
 
 
@@ -23,7 +25,7 @@ def hex_colors(traced: Traced) -> list[str]:
 
 
 def on_outline(traced: Traced) -> np.ndarray:
-    return np.isin(traced.joints, (joints.CORNER, joints.SMOOTH))
+    return np.isin(traced.joints, (Joint.CORNER, Joint.SMOOTH))
 
 
 def test_a_logo() -> None:
@@ -35,8 +37,8 @@ def test_a_logo() -> None:
     assert decibels(traced, image) > 39
     star = hex_colors(traced).index("ffd23f")
     kinds = traced.joints[traced.scene.first[star] : traced.scene.first[star + 1]]
-    assert (kinds == joints.CORNER).sum() == 10
-    assert (kinds == joints.LINE_HANDLE).sum() == 20
+    assert (kinds == Joint.CORNER).sum() == 10
+    assert (kinds == Joint.LINE_HANDLE).sum() == 20
     disc = hex_colors(traced).index("ee4266")
     assert traced.scene.point_counts()[disc] == 12
     assert on_outline(traced).sum() * 3 == len(traced.scene.points)
@@ -93,7 +95,7 @@ def test_pixels_that_are_exact_stay_exact() -> None:
     assert decibels(traced, image) == np.inf
     assert len(traced.scene) == 3
     assert on_outline(traced).sum() <= 20
-    assert (traced.joints != joints.SMOOTH).all() and (traced.joints != joints.FREE).all()
+    assert (traced.joints != Joint.SMOOTH).all() and (traced.joints != Joint.FREE).all()
 
 
 def test_what_lies_below_goes_on_below() -> None:
@@ -170,9 +172,9 @@ def test_regions_of_single_pixels_are_traced() -> None:
     labels = components(painted, image)
     paint = np.zeros(labels.max() + 1, np.int32)
     paint[labels] = painted
-    regions = Regions(labels, image, paint, [Coloring(color) for color in palette], 0.0)
+    regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
     with np.errstate(all="raise"):
-        traced = trace_regions(image, regions)
+        traced = trace_regions(regions)
     assert np.isfinite(traced.scene.points).all()
 
 
@@ -182,7 +184,9 @@ def test_a_ground_is_the_canvas_although_a_seed_was_given_up() -> None:
     painted[3:9, 3:9] = 1
     palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 0, 0]], np.float32)
     image = palette[painted]
-    regions = Regions(painted, image, np.arange(2, dtype=np.int32), [Coloring(c) for c in palette], 0.0)
-    scene = trace_regions(image, regions).scene
+    regions = Regions(
+        image, painted, image, np.arange(2, dtype=np.int32), [Coloring(c) for c in palette], 0.0
+    )
+    scene = trace_regions(regions).scene
     assert scene.canvas.background is not None
     assert len(scene) == 1

@@ -8,24 +8,21 @@ import numpy as np
 
 from warpsplat.drawing.strokes.areas import Areas
 from warpsplat.drawing.strokes.centerlines import Line, find_lines
-from warpsplat.drawing.strokes.ink import Ink, find_ink
+from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.strokes.pens import width_steps
-from warpsplat.drawing.trace.curves import Pieces, Run, fit_runs
+from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
-TOLERANCE = 0.45
-"""Largest distance of a centre line from its curve [px]."""
-
-LEAST_WIDTH, LONG = 0.3, 6.0
-"""Of a stroke, if it is so long [px]; else one pixel."""
+TOLERANCE = 0.45  # [px] largest distance of a centre line from its curve
 
 
 @dataclass(frozen=True)
 class TracedLines:
-    """What line art was traced to."""
+    """Traced line art."""
 
     scene: Scene
     """Strokes; ``layer`` is the pen of each."""
@@ -39,40 +36,43 @@ class TracedLines:
 
 @dataclass(frozen=True)
 class _Stroke:
+    """A line, or a part of one, of one width."""
+
     points: Floats
     closed: bool
     width: float
     pen: int
 
-
-def trace_lines(image: FloatArray) -> Scene:
-    """The centre lines of line art as opaque strokes, a layer for each pen.
-
-    Args:
-        image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
-    """
-    return trace_ink(find_ink(image)).scene
+    def polyline(self) -> Polyline:
+        if self.closed:
+            return Polyline(self.points, True)
+        return Polyline(self.points[1:-1], False, self.points[0], self.points[-1])
 
 
 def trace_ink(ink: Ink, *, mixed: bool = False) -> TracedLines:
-    """The same, of ink that is known; if ``mixed``, of what is no filled area."""
-    drawing = find_lines(ink, mixed=mixed)
-    strokes = [stroke for line in drawing.lines for stroke in _strokes(line, thin=not ink.textured)]
+    """Trace the centre lines of ink as opaque strokes, with a layer for each pen.
+
+    Args:
+        ink: Of the image.
+        mixed: Whether its broad parts stay areas, which are not traced.
+    """
+    found = find_lines(ink, mixed=mixed)
+    strokes = [stroke for line in found.lines for stroke in _strokes(line, thin=not ink.textured)]
     strokes.sort(key=lambda stroke: stroke.pen)
-    fitted = fit_runs([_run(stroke) for stroke in strokes], TOLERANCE)
+    fitted = fit_polylines([stroke.polyline() for stroke in strokes], TOLERANCE)
     height, width = ink.mask.shape
-    scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, drawing.pens)
-    return TracedLines(scene, drawing.pens, drawing.areas, drawing.area_pens)
+    scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, found.pens)
+    return TracedLines(scene, found.pens, found.areas, found.area_pens)
 
 
 def rejoined(before: Scene, after: Scene) -> Scene:
-    """``after``, with the ends where strokes met ``before`` as they were then, handles included.
+    """Return ``after``, with the ends where strokes met in ``before`` as they were then, handles included.
 
     Where a line's width changes, the caps of the broader part pull its end back and bend it.
 
     Args:
-        before: strokes.
-        after: the same with other points.
+        before: Strokes.
+        after: The same with other points.
     """
     ends = np.stack([before.first[:-1], before.first[1:] - 1], axis=1)
     handles = np.stack([ends[:, 0] + 1, ends[:, 1] - 1], axis=1)
@@ -83,16 +83,20 @@ def rejoined(before: Scene, after: Scene) -> Scene:
     _, names, count = np.unique(before.points[ends], axis=0, return_inverse=True, return_counts=True)
     shared = count[names.reshape(-1)] > 1
     points = after.points.copy()
-    still = np.concatenate([ends[shared], handles[shared]])
-    points[still] = before.points[still]
+    held = np.concatenate([ends[shared], handles[shared]])
+    points[held] = before.points[held]
     return replace(after, points=points)
 
 
+THINNEST, LONG = 0.3, 6.0
+"""Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
+
+
 def _strokes(line: Line, *, thin: bool) -> list[_Stroke]:
-    """A line, in parts of one width; ``thin``: or less than a pixel."""
+    """Return a line in parts of one width, which may be less than a pixel if ``thin``."""
     length = float(hypot(*np.diff(line.points, axis=0).T).sum())
     steps = width_steps(line.widths, length / max(1, len(line.points) - 1))
-    least = LEAST_WIDTH if thin and length >= LONG else 1.0
+    least = THINNEST if thin and length >= LONG else 1.0
     if len(steps) == 1:
         return [_Stroke(line.points, line.closed, max(least, steps[0][2]), line.pen)]
     points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
@@ -103,26 +107,17 @@ def _strokes(line: Line, *, thin: bool) -> list[_Stroke]:
     ]
 
 
-def _run(stroke: _Stroke) -> Run:
-    if stroke.closed:
-        return Run(stroke.points, True)
-    return Run(stroke.points[1:-1], False, stroke.points[0], stroke.points[-1])
-
-
 def _scene(canvas: Canvas, strokes: list[_Stroke], fitted: list[Pieces], pens: FloatArray) -> Scene:
-    """Strokes as ``Scene`` has them: closed chains end where they begin without saying so."""
+    """Return strokes as a ``Scene``, in which closed chains do not repeat their first point."""
     chains = [
-        pieces.cubics[:, :3].reshape(-1, 2)
-        if stroke.closed
-        else np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3]])
+        np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3][stroke.closed :]])
         for stroke, pieces in zip(strokes, fitted, strict=True)
     ]
     owner = np.array([stroke.pen for stroke in strokes], np.int32)
-    first = starts_of(np.array([len(chain) for chain in chains], np.int64))
     return Scene.of(
         canvas,
         np.full(len(strokes), Kind.STROKE, np.int32),
-        first,
+        starts_of(np.array([len(points) for points in chains], np.int64)),
         np.full(len(strokes), Basis.CUBIC, np.int32),
         points=np.concatenate([*chains, np.zeros((0, 2))]).astype(np.float32),
         closed=np.array([stroke.closed for stroke in strokes], np.int32),

@@ -1,4 +1,4 @@
-"""Fewer regions: those that are seen least become part of the neighbour most like them."""
+"""Fewer regions: the least visible ones are merged into the most similar neighbour."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def fewer_regions(regions: Regions, most: int) -> Regions:
     count = len(regions.paint)
     if count <= most:
         return regions
-    sizes = np.bincount(regions.labels.reshape(-1), minlength=count).astype(np.float64)
+    sizes = np.bincount(regions.labels.reshape(-1), minlength=count).tolist()
     colors = np.array([coloring.color for coloring in regions.colorings])[regions.paint]
     merged = _merge(_neighbours(regions.labels), sizes, colors, most)
     numbers = np.unique(merged, return_inverse=True)[1]
@@ -24,20 +24,16 @@ def fewer_regions(regions: Regions, most: int) -> Regions:
     paint = np.zeros(int(numbers.max()) + 1, np.int32)
     paint[numbers[merged]] = regions.paint[merged]
     changed = (merged != np.arange(count))[regions.labels]
-    pure = regions.pure.copy()
-    pure[changed] = colors[merged][regions.labels[changed]]
-    return replace(regions, labels=labels, paint=paint, pure=pure)
+    fills = regions.fills.copy()
+    fills[changed] = colors[merged][regions.labels[changed]]
+    return replace(regions, labels=labels, paint=paint, fills=fills)
 
 
 def _neighbours(labels: Ints) -> list[set[int]]:
     count = int(labels.max()) + 1
-    pairs = np.concatenate(
-        [
-            np.stack([labels[:, 1:].reshape(-1), labels[:, :-1].reshape(-1)], axis=1),
-            np.stack([labels[1:].reshape(-1), labels[:-1].reshape(-1)], axis=1),
-        ]
-    ).astype(np.int64)
-    keys = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    first = np.concatenate([labels[:, 1:].reshape(-1), labels[1:].reshape(-1)]).astype(np.int64)
+    second = np.concatenate([labels[:, :-1].reshape(-1), labels[:-1].reshape(-1)])
+    keys = np.unique(first * count + second)
     beside: list[set[int]] = [set() for _ in range(count)]
     for a, b in zip((keys // count).tolist(), (keys % count).tolist(), strict=True):
         if a != b:
@@ -46,38 +42,40 @@ def _neighbours(labels: Ints) -> list[set[int]]:
     return beside
 
 
-def _merge(beside: list[set[int]], sizes: Floats, colors: Floats, most: int) -> Ints:
-    """The region whose colour each region has in the end."""
+def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int) -> Ints:
+    """Return for each region the one that it is merged into, or itself.
+
+    Args:
+        beside: The neighbours of each region; changed in place.
+        sizes: Pixels of each region; changed in place.
+        colors: Shape (region, 4).
+        most: Regions that are to be left.
+    """
     count = len(beside)
-    sets, size = Sets(count), sizes.tolist()
+    sets = Sets(count)
+    heap: list[tuple[float, int, int, int]] = []  # cost, region, neighbour, size of the region at the time
 
-    def cheapest(region: int) -> tuple[float, int] | None:
-        near = list(beside[region])
-        if not near:
-            return None
-        costs = size[region] * ((colors[near] - colors[region]) ** 2).sum(axis=1)
-        best = int(costs.argmin())
-        return float(costs[best]), near[best]
+    def push(region: int) -> None:
+        """Queue the merge of a region into the neighbour that it costs least."""
+        if beside[region]:
+            near = list(beside[region])
+            costs = sizes[region] * ((colors[near] - colors[region]) ** 2).sum(axis=1)
+            best = int(costs.argmin())
+            heapq.heappush(heap, (float(costs[best]), region, near[best], sizes[region]))
 
-    heap = []
     for region in range(count):
-        found = cheapest(region)
-        if found:
-            heap.append((found[0], region, found[1], size[region]))
-    heapq.heapify(heap)
+        push(region)
     left, gone = count, [False] * count
     while left > most and heap:
-        _, region, into, known = heapq.heappop(heap)
+        _, region, into, size = heapq.heappop(heap)
         if gone[region]:
             continue
-        if gone[into] or known != size[region]:
-            found = cheapest(region)
-            if found:
-                heapq.heappush(heap, (found[0], region, found[1], size[region]))
+        if gone[into] or size != sizes[region]:
+            push(region)
             continue
         gone[region] = True
         left -= 1
-        size[into] += size[region]
+        sizes[into] += sizes[region]
         for other in beside[region]:
             beside[other].discard(region)
             if other != into:

@@ -1,4 +1,4 @@
-"""Arrays of an image's pixels: types, connected parts, union of sets."""
+"""Arrays of an image's pixels: their types, disjoint sets, connected components."""
 
 from __future__ import annotations
 
@@ -9,38 +9,24 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable import filters
+
 Floats = npt.NDArray[np.floating[Any]]
 Ints = npt.NDArray[np.integer[Any]]
 Bools = npt.NDArray[np.bool_]
 
-NOBODY = -1
-"""Label of a pixel that no region has."""
+NO_REGION = -1
+"""Label of a pixel that is in no region, and of everything outside the image."""
 
 
-def largest(values: Floats) -> Floats:
-    """Over the last axis, the few channels of pixels: NumPy's own maximum takes ten times as long."""
+def channel_max(values: Floats) -> Floats:
+    """Return the maximum over the last axis, ten times as fast as NumPy where that axis is short."""
     return functools.reduce(np.maximum, np.moveaxis(values, -1, 0))
 
 
-def linked_parts(across: Bools, down: Bools, inside: Bools) -> tuple[int, Ints]:
-    """Connected parts of the pixels ``inside``.
-
-    Args:
-        across: whether a pixel is linked to the one on its right, shape (height, width - 1).
-        down: to the one below, shape (height - 1, width).
-        inside: shape (height, width).
-
-    Returns:
-        How many, and each pixel's, NOBODY outside; shape (height, width).
-    """
-    height, width = inside.shape
-    # Pixels with their links between them: an image whose parts OpenCV finds.
-    woven = np.zeros((2 * height - 1, 2 * width - 1), np.uint8)
-    woven[::2, ::2] = inside
-    woven[::2, 1::2] = across & inside[:, 1:] & inside[:, :-1]
-    woven[1::2, ::2] = down & inside[1:] & inside[:-1]
-    count, parts = cv2.connectedComponents(woven, connectivity=4, ltype=cv2.CV_32S)
-    return count - 1, np.asarray(parts[::2, ::2] - 1, np.int32)
+def depth(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    """Return the distance of each pixel from those outside the mask, or the image [px], (height, width)."""
+    return filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
 
 
 class Sets:
@@ -50,7 +36,7 @@ class Sets:
         self._parent = list(range(count))
 
     def find(self, item: int) -> int:
-        """The representative of the set that ``item`` is in."""
+        """Return the representative of the set that contains ``item``."""
         parent = self._parent
         while parent[item] != item:
             parent[item] = parent[parent[item]]
@@ -58,11 +44,77 @@ class Sets:
         return item
 
     def join(self, a: int, b: int) -> None:
-        """Make one set of two."""
+        """Merge two sets."""
         a, b = self.find(a), self.find(b)
         self._parent[max(a, b)] = min(a, b)
 
     def numbers(self) -> Ints:
-        """The set of each item, counted from 0 in the order of their first items."""
+        """Return the number of each item's set, counted from 0 in the order of their first items."""
         roots = [self.find(item) for item in range(len(self._parent))]
         return np.asarray(np.unique(roots, return_inverse=True)[1], np.int32)
+
+
+def linked_components(across: Bools, down: Bools, inside: Bools) -> tuple[int, Ints]:
+    """Label the connected components of the pixels ``inside``.
+
+    Args:
+        across: Whether a pixel is linked to the one on its right, shape (height, width - 1).
+        down: Whether it is linked to the one below, shape (height - 1, width).
+        inside: Shape (height, width).
+
+    Returns:
+        Their number, and the label of each pixel, NO_REGION outside; shape (height, width).
+    """
+    height, width = inside.shape
+    # Pixels with their links between them form an image whose components OpenCV finds.
+    woven = np.zeros((2 * height - 1, 2 * width - 1), np.uint8)
+    woven[::2, ::2] = inside
+    woven[::2, 1::2] = across & inside[:, 1:] & inside[:, :-1]
+    woven[1::2, ::2] = down & inside[1:] & inside[:-1]
+    count, parts = cv2.connectedComponents(woven, connectivity=4, ltype=cv2.CV_32S)
+    return count - 1, np.asarray(parts[::2, ::2] - 1, np.int32)
+
+
+def components(values: Ints, image: Floats) -> Ints:
+    """Label the connected components of equal ``values``, shape (height, width).
+
+    Where two values meet as on a chessboard, ``prefers_main_diagonal`` decides which pair is connected.
+    """
+    everywhere = np.ones(values.shape, np.bool_)
+    count, parts = linked_components(values[:, 1:] == values[:, :-1], values[1:] == values[:-1], everywhere)
+    sets = Sets(count)
+    rows, columns = np.nonzero(crossings(values))
+    preferred = prefers_main_diagonal(image, rows, columns)
+    for y, x, main in zip(rows.tolist(), columns.tolist(), preferred.tolist(), strict=True):
+        if main:
+            sets.join(int(parts[y, x]), int(parts[y + 1, x + 1]))
+        else:
+            sets.join(int(parts[y, x + 1]), int(parts[y + 1, x]))
+    return sets.numbers()[parts]
+
+
+def crossings(labels: Ints) -> Bools:
+    """Find the corners where two labels meet as on a chessboard, shape (height - 1, width - 1)."""
+    a, b, c, d = labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]
+    return np.asarray((a == d) & (b == c) & (a != b))
+
+
+SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
+
+
+def prefers_main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
+    """Return whether upper left and lower right, not the other two, are the connected pixels of crossings.
+
+    The pair whose colour is rarer nearby is connected: it is a thin line.
+
+    Args:
+        image: Shape (height, width, channel).
+        rows: Row of the upper left pixel of each crossing.
+        columns: Its column.
+    """
+    a, b = image[rows, columns], image[rows, columns + 1]
+    c, d = image[rows + 1, columns], image[rows + 1, columns + 1]
+    soft = filters.box_blur(np.asarray(image, np.float32), SURROUNDINGS)
+    mean = sum(soft[rows + down, columns + right] for down in (0, 1) for right in (0, 1)) / 4
+    main, other = np.abs((a + d) / 2 - mean).max(axis=1), np.abs((b + c) / 2 - mean).max(axis=1)
+    return np.asarray(main >= other)

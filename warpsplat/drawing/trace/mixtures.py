@@ -1,125 +1,118 @@
-"""Pixels that are mixtures of the regions beside them, as antialiasing makes them."""
+"""Pixels as mixtures of two regions beside them, which antialiasing produces."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NOBODY, Floats, Ints
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints
 
-WAYS = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
-"""Where the neighbours are looked for: rows and columns of a step."""
+DIRECTIONS = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+"""Steps (row, column) along which neighbouring regions are looked for."""
 
-REACH = 3
-"""How far [px]."""
-
-CHUNK = 1 << 16
-"""Pixels that are looked at together."""
-
-FAR = 0.5
-"""What a pixel of distance counts against an explanation [levels]."""
+REACH = 3  # [px] how far
+CHUNK = 1 << 16  # pixels handled at once, which bounds the memory
+DISTANCE_COST = 0.5  # [levels] what a pixel of distance to a region counts against it
+RESIDUAL_WEIGHT = 0.01  # keeps an order among mixtures whose residual is within the slack
+SLACK = 0.2  # how far a mixture may be off for free in a noisy image, over the difference of its colours:
+# JPEG blurs hues more than lightness
+MIXED = 7.0  # [levels] up to this residual, besides noise, a pixel is a mixture
 
 
 @dataclass(frozen=True)
-class Explained:
-    """What each of some pixels is made of."""
+class Mixtures:
+    """The best mixture for each of some pixels."""
 
     label: Ints
-    """The region that has most of it; NOBODY where none is near. Shape (pixel,)."""
+    """The region with the larger share; NO_REGION where none is near. Shape (pixel,)."""
     color: Floats
     """The colour of that region there, shape (pixel, channel)."""
-    residual: Floats
-    """How far the pixel is from any mixture of two neighbours [levels]; infinite where there are none."""
     share: Floats
-    """Of that region in the pixel, shape (pixel,)."""
+    """Its share, shape (pixel,)."""
+    residual: Floats
+    """Distance of the pixel's colour from the mixture [levels]; infinite where no region is near."""
     base: Floats
-    """Colour of the nearest neighbour of all, shape (pixel, channel)."""
-    kinds: Ints
-    """How many different regions are near, shape (pixel,)."""
+    """The colour of the nearest region of all, shape (pixel, channel)."""
 
 
-def explain(
+def unmix(
     image: Floats,
     labels: Ints,
-    pure: Floats,
+    fills: Floats,
     rows: Ints,
     columns: Ints,
-    slack: float = 0.0,
+    noise: float = 0.0,
     reach: int = REACH,
-) -> Explained:
-    """Find for each pixel the two neighbouring regions that it is nearest to a mixture of.
+) -> Mixtures:
+    """Find for each pixel the two regions beside it whose mixture is nearest to its colour.
 
     Args:
-        image: shape (height, width, channel).
-        labels: the region of each pixel that is sure, else NOBODY; shape (height, width).
-        pure: colours of the sure pixels' regions there, shape (height, width, channel).
-        rows: of the pixels, shape (pixel,).
-        columns: shape (pixel,).
-        slack: how far a mixture may be off for the difference of its two colours: JPEG blurs hues more than
-            lightness.
-        reach: how far neighbours are looked for [px].
+        image: Shape (height, width, channel).
+        labels: The region of each pixel, or NO_REGION where it is not known; shape (height, width).
+        fills: The colour of that region there, shape (height, width, channel).
+        rows: Of the pixels, shape (pixel,).
+        columns: Of the pixels, shape (pixel,).
+        noise: Where it is not 0, mixtures have some slack.
+        reach: How far away regions are looked for [px].
     """
     parts = [
-        _explain(image, labels, pure, rows[i : i + CHUNK], columns[i : i + CHUNK], slack, reach)
+        _unmix(image, labels, fills, rows[i : i + CHUNK], columns[i : i + CHUNK], noise, reach)
         for i in range(0, max(len(rows), 1), CHUNK)
     ]
-    return Explained(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in Explained.__dataclass_fields__)
-    )
+    return Mixtures(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Mixtures)))
 
 
 def _neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Ints, Ints, Floats]:
-    """The nearest sure pixel each way: its region, its index, its distance; shape (way, pixel)."""
+    """Return region, index and distance of the nearest labelled pixel by direction, (direction, pixel)."""
     height, width = labels.shape
-    found = np.full((len(WAYS), len(rows)), NOBODY, np.int32)
-    index = np.zeros((len(WAYS), len(rows)), np.int64)
-    distance = np.full((len(WAYS), len(rows)), np.inf, np.float32)
-    for way, (down, right) in enumerate(WAYS):
+    shape = (len(DIRECTIONS), len(rows))
+    found = np.full(shape, NO_REGION, np.int32)
+    index = np.zeros(shape, np.int64)
+    distance = np.full(shape, np.inf, np.float32)
+    for direction, (down, right) in enumerate(DIRECTIONS):
         length = math.sqrt(down * down + right * right)
         for reach in range(1, most + 1):
             y, x = rows + reach * down, columns + reach * right
-            near = (y >= 0) & (y < height) & (x >= 0) & (x < width) & (found[way] == NOBODY)
+            near = (y >= 0) & (y < height) & (x >= 0) & (x < width) & (found[direction] == NO_REGION)
             y, x = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
-            near &= labels[y, x] != NOBODY
-            found[way][near] = labels[y, x][near]
-            index[way][near] = (y * width + x)[near]
-            distance[way][near] = reach * length
+            near &= labels[y, x] != NO_REGION
+            found[direction][near] = labels[y, x][near]
+            index[direction][near] = (y * width + x)[near]
+            distance[direction][near] = reach * length
     return found, index, distance
 
 
-def _explain(
-    image: Floats, labels: Ints, pure: Floats, rows: Ints, columns: Ints, slack: float, reach: int
-) -> Explained:
+def _unmix(
+    image: Floats, labels: Ints, fills: Floats, rows: Ints, columns: Ints, noise: float, reach: int
+) -> Mixtures:
     found, index, distance = _neighbours(labels, rows, columns, reach)
     # Channel by channel: sums along an axis of four take ten times as long.
-    colors = np.ascontiguousarray(np.moveaxis(pure.reshape(-1, pure.shape[2])[index], 2, 1))
+    colors = np.ascontiguousarray(np.moveaxis(fills.reshape(-1, fills.shape[2])[index], 2, 1))
     pixel = np.ascontiguousarray(image[rows, columns].T)
-    count, each = np.arange(len(rows)), len(WAYS)
-    best = np.full(len(rows), np.inf, np.float32)
-    residual = np.full(len(rows), np.inf, np.float32)
-    winner, share = np.zeros(len(rows), np.int64), np.ones(len(rows), np.float32)
-    for a, b in itertools.combinations_with_replacement(range(each), 2):
-        known = (found[a] != NOBODY) & (found[b] != NOBODY)
+    count, slack = len(rows), SLACK if noise else 0.0
+    best = np.full(count, np.inf, np.float32)
+    residual = np.full(count, np.inf, np.float32)
+    winner, share = np.zeros(count, np.int64), np.ones(count, np.float32)
+    for a, b in itertools.combinations_with_replacement(range(len(DIRECTIONS)), 2):
+        known = (found[a] != NO_REGION) & (found[b] != NO_REGION)
         between = colors[a] - colors[b]
         square = np.maximum((between**2).sum(axis=0), 1e-6)
         t = np.clip(((pixel - colors[b]) * between).sum(axis=0) / square, 0, 1)
         off = np.abs(pixel - colors[b] - t * between).max(axis=0)
-        off = np.maximum(off - slack * np.abs(between).max(axis=0), 0) + 0.01 * off
-        cost = np.where(known, off + FAR * (distance[a] + distance[b]), np.inf)
+        off = np.maximum(off - slack * np.abs(between).max(axis=0), 0) + RESIDUAL_WEIGHT * off
+        cost = np.where(known, off + DISTANCE_COST * (distance[a] + distance[b]), np.inf)
         better = cost < best
         best[better], residual[better] = cost[better], off[better]
         winner[better] = np.where(t >= 0.5, a, b)[better]
         share[better] = np.maximum(t, 1 - t)[better]
-    kinds = np.sort(found, axis=0)
-    different = (np.diff(kinds, axis=0) != 0).sum(axis=0) + (kinds[0] != NOBODY)
-    return Explained(
-        label=found[winner, count],
-        color=colors[winner, :, count],
-        residual=residual,
+    each = np.arange(count)
+    return Mixtures(
+        label=found[winner, each],
+        color=colors[winner, :, each],
         share=share,
-        base=colors[np.argmin(distance, axis=0), :, count],
-        kinds=different.astype(np.int32),
+        residual=residual,
+        base=colors[np.argmin(distance, axis=0), :, each],
     )

@@ -6,86 +6,96 @@ mean height in the column: for a straight one, its height in the middle of the c
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NOBODY, Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
 from warpsplat.drawing.trace.planar import INSIDE, LEFT, OUTSIDE, RIGHT, STEPS, Loops
-
-REACH = 3
-"""Pixels on each side that are looked at."""
-
-PURE = 0.02
-"""Share of the other region in a pixel from which on it is mixed."""
-
-STRANGE = 20.0
-"""How far a pixel may be from a mixture of the two [levels]; beyond, a third region has part in it."""
-
-TREND = 3
-"""Cracks ahead and behind that tell the direction of an outline."""
+from warpsplat.drawing.trace.regions import Regions
 
 
-def crack_offsets(loops: Loops, image: Floats, labels: Ints, pure: Floats) -> Floats:
+@dataclass(frozen=True)
+class Boundary:
+    """The boundary of regions at each crack."""
+
+    points: Floats
+    """The sub-pixel place, shape (crack, 2)."""
+    is_good: Bools
+    """Which of them to use: horizontal cracks of flat parts of an outline, vertical ones of steep parts."""
+    offsets: Floats
     """How far the boundary lies to the left of each crack [px], shape (crack,)."""
-    inner = loops.vertices + INSIDE[loops.ways]
-    outer = loops.vertices + OUTSIDE[loops.ways]
-    step = outer - inner
-    real = loops.others != NOBODY
-    height, width = labels.shape
-    real &= ((inner >= 0) & (inner < [width, height])).all(axis=1)
+    trends: Floats
+    """Direction of the outline, not normalised, shape (crack, 2)."""
+
+
+def find_boundary(loops: Loops, regions: Regions) -> Boundary:
+    """Measure where the boundary lies at each crack."""
+    steps, trends = STEPS[loops.directions], _trends(loops)
+    normal = np.stack([steps[:, 1], -steps[:, 0]], axis=1)  # to the left, as y points down
+    offsets = _offsets(loops, regions)
+    points = loops.vertices + 0.5 * steps + offsets[:, None] * normal
+    x, y = np.abs(trends).T
+    is_level = (loops.directions == RIGHT) | (loops.directions == LEFT)
+    return Boundary(points, np.where(is_level, x >= y, y > x), offsets, trends)
+
+
+def _offsets(loops: Loops, regions: Regions) -> Floats:
+    """Return how far the boundary lies to the left of each crack [px], shape (crack,)."""
+    inner, outer = loops.vertices + INSIDE[loops.directions], loops.vertices + OUTSIDE[loops.directions]
+    height, width = regions.labels.shape
+    real = (loops.others != NO_REGION) & ((inner >= 0) & (inner < [width, height])).all(axis=1)
     offsets = np.zeros(len(inner))
-    inner, outer, step = inner[real], outer[real], step[real]
-    mine, theirs = pure[inner[:, 1], inner[:, 0]], pure[outer[:, 1], outer[:, 0]]
-    found = _intrusion(image, labels, outer, step, mine, theirs)
-    found -= _intrusion(image, labels, inner, -step, theirs, mine)
+    inner, outer = inner[real], outer[real]
+    mine, theirs = regions.fills[inner[:, 1], inner[:, 0]], regions.fills[outer[:, 1], outer[:, 0]]
+    found = _intrusion(regions, outer, outer - inner, mine, theirs)
+    found -= _intrusion(regions, inner, inner - outer, theirs, mine)
     offsets[real] = found
     return offsets
 
 
-def _intrusion(image: Floats, labels: Ints, start: Ints, step: Ints, mine: Floats, theirs: Floats) -> Floats:
-    """How much of ``mine`` is in the pixels of the other region, from ``start`` on [px]."""
-    height, width = labels.shape
+REACH = 3  # [px] how far from a crack mixed pixels count
+PURE = 0.02  # share of the other region up to which a pixel is not mixed
+FOREIGN = (
+    20.0  # [levels] distance of a pixel from any mixture of the two, from which on it has a third colour
+)
+
+
+def _intrusion(regions: Regions, start: Ints, step: Ints, mine: Floats, theirs: Floats) -> Floats:
+    """Return how far the colours ``mine`` reach into the other region, from ``start`` on [px]."""
+    height, width = regions.labels.shape
     between = mine - theirs
     square = np.maximum((between.astype(np.float64) ** 2).sum(axis=1), 1e-6)
     total = np.zeros(len(start))
-    label = labels[start[:, 1], start[:, 0]]
+    label = regions.labels[start[:, 1], start[:, 0]]
     active = np.ones(len(start), np.bool_)
     before = np.full(len(start), 1.0)
     for reach in range(REACH):
         at = start + reach * step
         active &= ((at >= 0) & (at < [width, height])).all(axis=1)
         x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
-        active &= labels[y, x] == label
-        away = image[y, x] - theirs
+        active &= regions.labels[y, x] == label
+        away = regions.image[y, x] - theirs
         share = np.clip((away * between).sum(axis=1) / square, 0, 1)
         off = np.abs(away - share[:, None] * between).max(axis=1)
-        active &= (share <= before + PURE) & (share > PURE) & (off < STRANGE)
+        active &= (share <= before + PURE) & (share > PURE) & (off < FOREIGN)
         total += np.where(active, share, 0)
         before = share
     return total
 
 
-def trends(loops: Loops) -> Floats:
-    """Direction of the outline at each crack, from those near it; shape (crack, 2)."""
-    steps = STEPS[loops.ways].astype(np.float64)
+TREND = 3  # cracks ahead and behind that tell the direction of an outline
+
+
+def _trends(loops: Loops) -> Floats:
+    """Return the direction of the outline at each crack, from those near it; shape (crack, 2)."""
+    steps = STEPS[loops.directions].astype(np.float64)
     sizes = np.diff(loops.first)
-    position = np.arange(len(steps)) - np.repeat(loops.first[:-1], sizes)
     size, base = np.repeat(sizes, sizes), np.repeat(loops.first[:-1], sizes)
+    position = np.arange(len(steps)) - base
     total = steps.copy()
     for away in range(1, TREND + 1):
         # The outermost count half: on a diagonal, horizontal and vertical ones are then as many.
         share = 0.5 if away == TREND else 1.0
         total += share * (steps[base + (position + away) % size] + steps[base + (position - away) % size])
     return np.asarray(total)
-
-
-def places(loops: Loops, offsets: Floats) -> tuple[Floats, Bools]:
-    """Points of the outlines: one for each crack, and which of them to use: of a flat part of an outline
-    those on its horizontal cracks, of a steep one those on the others. Shapes (crack, 2), (crack,).
-    """
-    steps = STEPS[loops.ways]
-    normal = np.stack([steps[:, 1], -steps[:, 0]], axis=1)  # to the left, as y points down
-    points = loops.vertices + 0.5 * steps + offsets[:, None] * normal
-    trend = np.abs(trends(loops))
-    horizontal = (loops.ways == RIGHT) | (loops.ways == LEFT)
-    good = np.where(horizontal, trend[:, 0] >= trend[:, 1], trend[:, 1] > trend[:, 0])
-    return points, good

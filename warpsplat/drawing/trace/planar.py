@@ -1,6 +1,6 @@
 """The planar map of a label map: regions bounded by loops of cracks, the sides of pixels between two labels.
 
-Cracks are directed: the region that a loop bounds lies on the right (the y axis points down).
+Cracks are directed: the region that a loop bounds lies on their right (the y axis points down).
 """
 
 from __future__ import annotations
@@ -9,8 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NOBODY, Bools, Floats, Ints, Sets
-from warpsplat.drawing.trace.regions import crossings, main_diagonal
+from warpsplat.drawing.trace.grids import (
+    NO_REGION,
+    Bools,
+    Floats,
+    Ints,
+    Sets,
+    crossings,
+    prefers_main_diagonal,
+)
 
 RIGHT, DOWN, LEFT, UP = range(4)
 
@@ -18,7 +25,7 @@ STEPS = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
 """x and y of a crack by its direction."""
 
 INSIDE = np.array([(0, 0), (-1, 0), (-1, -1), (0, -1)])
-"""x and y of the pixel on the right of a crack, from the vertex where it begins."""
+"""x and y of the pixel on the right of a crack by its direction, from the vertex where it begins."""
 
 OUTSIDE = np.array([(0, -1), (0, 0), (-1, 0), (-1, -1)])
 """The same on its left."""
@@ -31,17 +38,17 @@ class Loops:
     first: Ints
     """First crack of each loop and, last, the number of cracks, shape (loop + 1,)."""
     region: Ints
-    """What each loop bounds; NOBODY for what is outside of the picture. Shape (loop,)."""
+    """The region that each loop bounds; NO_REGION for the outside of the image. Shape (loop,)."""
     is_hole: Bools
-    """Whether the loop bounds it from inside, shape (loop,)."""
+    """Whether the loop bounds a hole of its region, shape (loop,)."""
     network: Ints
     """Number of the connected set of cracks that each loop is in, shape (loop,)."""
     vertices: Ints
     """Where each crack begins: x, y; shape (crack, 2)."""
-    ways: Ints
-    """Direction of each crack, shape (crack,)."""
+    directions: Ints
+    """Shape (crack,)."""
     others: Ints
-    """The region on the left of each crack; NOBODY outside of the picture. Shape (crack,)."""
+    """The region on the left of each crack; NO_REGION outside the image. Shape (crack,)."""
 
     def __len__(self) -> int:
         return len(self.region)
@@ -51,46 +58,42 @@ def find_loops(labels: Ints, image: Floats) -> Loops:
     """Trace the boundaries of all regions.
 
     Args:
-        labels: shape (height, width).
-        image: what the labels are of; says which of two regions is connected where they cross.
+        labels: Shape (height, width).
+        image: What the labels are of; it decides which of two regions is connected where they cross.
     """
-    padded = np.pad(labels, 1, constant_values=NOBODY)
+    padded = np.pad(labels, 1, constant_values=NO_REGION)
     height, width = labels.shape
-    main, other = _passes(labels, image)
+    main, other = _passages(labels, image)
     keys, following, regions, others = [], [], [], []
-    for way in range(4):
-        (in_x, in_y), (out_x, out_y), (step_x, step_y) = INSIDE[way], OUTSIDE[way], STEPS[way]
+    for direction in range(4):
+        (in_x, in_y), (out_x, out_y) = INSIDE[direction], OUTSIDE[direction]
+        step_x, step_y = STEPS[direction]
+        is_level = direction in (RIGHT, LEFT)
         ys, xs = np.mgrid[0 : height + 1, 0 : width + 1]
-        if way in (RIGHT, LEFT):
-            ys, xs = (ys[:, 1:], xs[:, 1:]) if way == LEFT else (ys[:, :-1], xs[:, :-1])
-        else:
-            ys, xs = (ys[1:], xs[1:]) if way == UP else (ys[:-1], xs[:-1])
+        begins = slice(1, None) if direction in (LEFT, UP) else slice(None, -1)
+        ys, xs = (ys[:, begins], xs[:, begins]) if is_level else (ys[begins], xs[begins])
         mine, theirs = padded[ys + in_y + 1, xs + in_x + 1], padded[ys + out_y + 1, xs + out_x + 1]
         real = mine != theirs
         ys, xs, mine, theirs = ys[real], xs[real], mine[real], theirs[real]
         end_y, end_x = ys + step_y, xs + step_x
         ahead = padded[end_y + in_y + 1, end_x + in_x + 1]
         ahead_left = padded[end_y + out_y + 1, end_x + out_x + 1]
-        # At the end of RIGHT and LEFT, ours and the one across are upper right to lower left.
-        passes = (other if way in (RIGHT, LEFT) else main)[end_y, end_x]
+        # At the end of a level crack, ours and the pixel across are on the other diagonal.
+        passes = (other if is_level else main)[end_y, end_x]
         turn = np.where(ahead != mine, 1, np.where(ahead_left != mine, 0, 3))
         turn = np.where((ahead != mine) & (ahead_left == mine) & passes, 3, turn)
-        keys.append((ys * (width + 1) + xs) * 4 + way)
-        following.append((end_y * (width + 1) + end_x) * 4 + (way + turn) % 4)
+        keys.append((ys * (width + 1) + xs) * 4 + direction)
+        following.append((end_y * (width + 1) + end_x) * 4 + (direction + turn) % 4)
         regions.append(mine)
         others.append(theirs)
-    return _assembled(
-        np.concatenate(keys),
-        np.concatenate(following),
-        np.concatenate(regions),
-        np.concatenate(others),
-        width,
-    )
+    return _assembled(width, *(np.concatenate(part) for part in (keys, following, regions, others)))
 
 
-def _passes(labels: Ints, image: Floats) -> tuple[Bools, Bools]:
-    """Vertices where the main diagonal's, or the other's, two pixels are connected though only a point
-    joins them; shape (height + 1, width + 1).
+def _passages(labels: Ints, image: Floats) -> tuple[Bools, Bools]:
+    """Find the vertices where two diagonal pixels are connected though they share a point only.
+
+    Returns:
+        For the main diagonal, and for the other one, shape (height + 1, width + 1).
     """
     height, width = labels.shape
     main = np.zeros((height + 1, width + 1), np.bool_)
@@ -99,17 +102,24 @@ def _passes(labels: Ints, image: Floats) -> tuple[Bools, Bools]:
     main[1:-1, 1:-1] = (a == d) & (b != a) & (c != a)
     other[1:-1, 1:-1] = (b == c) & (a != b) & (d != b)
     rows, columns = np.nonzero(crossings(labels))
-    wins = main_diagonal(image, rows, columns)
-    main[rows + 1, columns + 1] = wins
-    other[rows + 1, columns + 1] = ~wins
+    preferred = prefers_main_diagonal(image, rows, columns)
+    main[rows + 1, columns + 1] = preferred
+    other[rows + 1, columns + 1] = ~preferred
     return main, other
 
 
-def _assembled(keys: Ints, following: Ints, regions: Ints, others: Ints, width: int) -> Loops:
+def _assembled(width: int, keys: Ints, following: Ints, regions: Ints, others: Ints) -> Loops:
+    """Put the cracks in the order of their loops.
+
+    Args:
+        width: Of the image; a row has one vertex more.
+        keys: A number for each crack: 4 x its vertex + its direction.
+        following: The key of the crack after it.
+        regions: On its right.
+        others: On its left.
+    """
     order = np.argsort(keys, kind="stable")
-    keys, following = keys[order], following[order]
-    regions, others = regions[order], others[order]
-    after = np.searchsorted(keys, following).tolist()
+    after = np.searchsorted(keys[order], following[order]).tolist()
     seen = bytearray(len(after))
     walk: list[int] = []
     first = [0]
@@ -121,37 +131,35 @@ def _assembled(keys: Ints, following: Ints, regions: Ints, others: Ints, width: 
             crack = after[crack]
         if len(walk) > first[-1]:
             first.append(len(walk))
-    index = np.asarray(walk, np.intp)
-    vertex, way = keys[index] // 4, keys[index] % 4
+    index, starts = order[walk], np.asarray(first, np.intp)
+    vertex, direction = keys[index] // 4, keys[index] % 4
     vertices = np.stack([vertex % (width + 1), vertex // (width + 1)], axis=1)
-    starts = np.asarray(first, np.intp)
     return Loops(
         first=starts,
         region=regions[index][starts[:-1]],
-        is_hole=_areas(vertices, starts) < 0,
-        network=_networks(vertices, way, starts, width),
+        is_hole=_signed_areas(vertices, starts) < 0,
+        network=_networks(vertices, direction, starts, width),
         vertices=vertices,
-        ways=way,
+        directions=direction,
         others=others[index],
     )
 
 
-def _areas(vertices: Ints, first: Ints) -> Floats:
-    """Signed area of each loop: positive where what is on the right is inside."""
+def _signed_areas(vertices: Ints, first: Ints) -> Floats:
+    """Return the area of each loop, positive where what is on its right is inside."""
     following = np.roll(vertices, -1, axis=0)
     following[first[1:] - 1] = vertices[first[:-1]]
     doubled = vertices[:, 0] * following[:, 1] - following[:, 0] * vertices[:, 1]
     return np.asarray(np.add.reduceat(doubled, first[:-1]) / 2)
 
 
-def _networks(vertices: Ints, ways: Ints, first: Ints, width: int) -> Ints:
-    """Loops that share a crack are of one network."""
+def _networks(vertices: Ints, directions: Ints, first: Ints, width: int) -> Ints:
+    """Number the sets of loops that are connected by the cracks that they share."""
     loop = np.repeat(np.arange(len(first) - 1), np.diff(first))
     # Both directions of a crack have the same upper left end.
-    start = np.minimum(vertices, vertices + STEPS[ways])
-    crack = (start[:, 1] * (width + 1) + start[:, 0]) * 2 + ways % 2
-    order = np.argsort(crack, kind="stable")
-    pairs = np.unique(loop[order].reshape(-1, 2), axis=0)
+    start = np.minimum(vertices, vertices + STEPS[directions])
+    crack = (start[:, 1] * (width + 1) + start[:, 0]) * 2 + directions % 2
+    pairs = np.unique(loop[np.argsort(crack, kind="stable")].reshape(-1, 2), axis=0)
     sets = Sets(len(first) - 1)
     for a, b in pairs.tolist():
         sets.join(a, b)

@@ -1,38 +1,27 @@
-"""Colours that change smoothly over a region, as one gradient."""
+"""Colours that change smoothly over a region, as one linear or radial gradient."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import eigh, product, solve, solve_banded
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import Paint
 
-SAMPLES = 4000
-"""Pixels of a region that a ramp is fitted to."""
-
-BINS = 48
-"""Places along a ramp where its colour is taken."""
-
-STOP = 1.0
-"""How far the colours between two stops may be from the straight way [levels]."""
-
-STOPS = 8
-"""The most stops of a ramp."""
-
-SPAN = 3
-"""Distance over which the picture's slope is taken, each way [px]."""
+SAMPLES = 4000  # pixels of a region that a ramp is fitted to, at the most
+LEAST_SLOPES = 8  # pixels where the slope is known, at the least
+RADIAL_HANDICAP = 0.1  # by which the residual of a radial gradient must be smaller, over that of a linear one
 
 
 @dataclass(frozen=True)
 class Ramp:
-    """A gradient as ``Scene`` has it, and how well it fits."""
+    """A gradient, in the terms of ``Scene``."""
 
     paint: Paint
     frame: Floats
@@ -46,62 +35,70 @@ class Ramp:
 
 
 def fit_ramp(image: Floats, mask: Bools, left: int, top: int) -> Ramp | None:
-    """The better of a linear and a radial gradient; None where there is no slope at all.
+    """Fit a linear and a radial gradient, and return the better one; None where there is no slope at all.
 
     Args:
-        image: the box of a region, 0..255, shape (height, width, channel).
-        mask: its sure pixels, shape (height, width).
-        left: column of the box in the picture.
-        top: row.
+        image: The bounding box of a region, 0..255, shape (height, width, channel).
+        mask: Its sure pixels, shape (height, width).
+        left: Column of the box in the whole image.
+        top: Its row.
     """
     places, slopes = _slopes(image, mask)
-    rows, columns = np.nonzero(mask)
-    pick = np.linspace(0, len(rows) - 1, min(SAMPLES, len(rows))).astype(np.intp)
-    at = np.stack([columns[pick], rows[pick]], axis=1) + 0.5
-    colors = image[rows[pick], columns[pick]].astype(np.float64)
-    if len(places) < 8 or not np.abs(slopes).max():
+    if len(places) < LEAST_SLOPES or not np.abs(slopes).max():
         return None
-    found = [_linear(at, colors, slopes)]
+    rows, columns = _sampled(mask)
+    points = np.stack([columns, rows], axis=1) + 0.5
+    colors = image[rows, columns].astype(np.float64)
+    best = _linear(points, colors, slopes)
     center = _center(places, slopes)
     if center is not None:
-        found.append(_radial(at, colors, center))
-    best = min(found, key=lambda ramp: ramp.residual * (1 + 0.1 * (ramp.paint == Paint.RADIAL)))
-    frame = best.frame + np.array([left, top, 0, 0, 0, 0], np.float64)
-    return Ramp(best.paint, frame, best.offsets, best.colors, best.residual)
+        radial = _radial(points, colors, center)
+        if radial.residual * (1 + RADIAL_HANDICAP) < best.residual:
+            best = radial
+    return replace(best, frame=best.frame + np.array([left, top, 0, 0, 0, 0], np.float64))
+
+
+def _sampled(mask: Bools) -> tuple[Ints, Ints]:
+    """Return rows and columns of the pixels of a mask, or of evenly chosen ones where there are many."""
+    rows, columns = np.nonzero(mask)
+    pick = np.linspace(0, len(rows) - 1, min(SAMPLES, len(rows))).astype(np.intp)
+    return rows[pick], columns[pick]
+
+
+SPAN = 3  # [px] over which the slope is taken, each way
+BLUR = 1.5  # [px] standard deviation of the filter before that
 
 
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
-    """Where the slope of the picture is known, and it in each channel: (n, 2), (n, 2, channel)."""
-    weight = filters.gaussian_blur(mask, 1.5)
-    soft = filters.gaussian_blur(image.astype(np.float32) * mask[..., None], 1.5)
+    """Return where the slope of the image is known, shape (n, 2), and it by channel, (n, 2, channel)."""
+    weight = filters.gaussian_blur(mask, BLUR)
+    soft = filters.gaussian_blur(image.astype(np.float32) * mask[..., None], BLUR)
     soft = soft / np.maximum(weight, 1e-3)[..., None]
     sure = cv2.erode(mask.astype(np.uint8), np.ones((2 * SPAN + 1,) * 2, np.uint8), borderValue=0) > 0
     sure[:SPAN], sure[-SPAN:], sure[:, :SPAN], sure[:, -SPAN:] = False, False, False, False
-    rows, columns = np.nonzero(sure)
-    pick = np.linspace(0, len(rows) - 1, min(SAMPLES, len(rows))).astype(np.intp)
-    y, x = rows[pick], columns[pick]
+    y, x = _sampled(sure)
     slope_x = (soft[y, x + SPAN] - soft[y, x - SPAN]) / (2 * SPAN) if len(y) else np.zeros((0, 1))
     slope_y = (soft[y + SPAN, x] - soft[y - SPAN, x]) / (2 * SPAN) if len(y) else np.zeros((0, 1))
     return np.stack([x, y], axis=1) + 0.5, np.stack([slope_x, slope_y], axis=1)
 
 
-def _linear(at: Floats, colors: Floats, slopes: Floats) -> Ramp:
+def _linear(points: Floats, colors: Floats, slopes: Floats) -> Ramp:
+    """Return a gradient along the principal direction of the slopes."""
     x, y = slopes[:, 0], slopes[:, 1]
     mixed = (x * y).sum()
     way = eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]
-    along = product(at, way)
+    along = product(points, way)
     low, high = float(along.min()), float(along.max())
     length = max(high - low, 1e-3)
-    offsets, stops, residual = _profile((along - low) / length, colors)
-    middle = at.mean(axis=0)
+    middle = points.mean(axis=0)
     origin = middle + (low - float((middle * way).sum())) * way
     axis = way * length
     frame = np.concatenate([origin, axis, [-axis[1], axis[0]]])
-    return Ramp(Paint.LINEAR, frame, offsets, stops, residual)
+    return Ramp(Paint.LINEAR, frame, *_profile((along - low) / length, colors))
 
 
 def _center(places: Floats, slopes: Floats) -> Floats | None:
-    """The point that all slopes point to or away from."""
+    """Return the point that all slopes point to or away from; None where they are parallel."""
     normals = np.stack([slopes[:, 1], -slopes[:, 0]], axis=-1)  # (n, channel, 2)
     away = (normals * places[:, None]).sum(axis=-1)
     x, y = normals[..., 0], normals[..., 1]
@@ -113,29 +110,37 @@ def _center(places: Floats, slopes: Floats) -> Floats | None:
     return solve(matrix, np.array([(x * away).sum(), (y * away).sum()]))
 
 
-def _radial(at: Floats, colors: Floats, center: Floats) -> Ramp:
-    distance = hypot(*(at - center).T)
+def _radial(points: Floats, colors: Floats, center: Floats) -> Ramp:
+    distance = hypot(*(points - center).T)
     reach = max(float(distance.max()), 1e-3)
-    offsets, stops, residual = _profile(distance / reach, colors)
-    return Ramp(
-        Paint.RADIAL, np.array([*center, reach, 0.0, 0.0, reach], np.float64), offsets, stops, residual
-    )
+    frame = np.array([*center, reach, 0.0, 0.0, reach], np.float64)
+    return Ramp(Paint.RADIAL, frame, *_profile(distance / reach, colors))
+
+
+BINS = 48  # places along a ramp where its colour is measured
 
 
 def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
-    """Stops of the colours along ``t`` in 0..1 by least squares, and what is left."""
+    """Fit stops to the colours along ``t`` in 0..1: their offsets, their colours, and the residual."""
     knots = np.linspace(0, 1, BINS + 1)
     fine = _least_squares(t, colors, knots)
     seen = np.histogram(t, knots)[0]
     known = np.concatenate([[True], (seen[1:] + seen[:-1]) > 0, [True]])
-    chosen = _fewest(knots[known], fine[known])
-    stops = _least_squares(t, colors, chosen)
-    shown = np.stack([interp(t, chosen, stops[:, c]) for c in range(colors.shape[1])], axis=1)
-    return chosen, np.clip(stops, 0, 255), float(np.sqrt(np.mean((shown - colors) ** 2)))
+    offsets = _fewest(knots[known], fine[known])
+    stops = _least_squares(t, colors, offsets)
+    residual = float(np.sqrt(np.mean((_interpolated(t, offsets, stops) - colors) ** 2)))
+    return offsets, np.clip(stops, 0, 255), residual
+
+
+def _interpolated(t: Floats, offsets: Floats, colors: Floats) -> Floats:
+    return np.stack([interp(t, offsets, channel) for channel in colors.T], axis=1)
+
+
+STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
 
 
 def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
-    """Values at ``knots`` of the broken line nearest to the colours, a little stiff where nothing is."""
+    """Return values at ``knots`` of the broken line nearest to the colours, a little stiff where none are."""
     low = np.clip(np.searchsorted(knots, t, "right") - 1, 0, len(knots) - 2)
     share = (t - knots[low]) / (knots[low + 1] - knots[low])
     count = len(knots)
@@ -143,13 +148,13 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     def sums(weights: Floats) -> Floats:
         return np.asarray(np.bincount(low, weights, count), np.float64)
 
-    # What is at t is a share of two knots that are neighbours: the sums of products are three diagonals.
+    # A colour is a mixture of two neighbouring knots, so that the normal equations have three diagonals, and
+    # five with the second differences.
     beside = sums(share * (1 - share))[:-1]
     here = sums((1 - share) ** 2) + np.roll(sums(share**2), 1)
     right = np.stack([sums((1 - share) * c) + np.roll(sums(share * c), 1) for c in colors.T], axis=1)
     here += 1e-9
-    # The squares of second differences.
-    stiff = 1e-6 * len(t)
+    stiff = STIFFNESS * len(t)
     for first, times in enumerate((1, 4, 1)):
         here[first : count - 2 + first] += times * stiff
     beside[:-1] -= 2 * stiff
@@ -157,17 +162,18 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     return solve_banded([here, beside, np.full(count - 2, stiff)], right)
 
 
+OFF = 1.0  # [levels] of the colours between two stops from the straight way, at the most
+MOST_STOPS = 8
+
+
 def _fewest(knots: Floats, values: Floats) -> Floats:
-    """The knots that a broken line within STOP of the values needs (Douglas and Peucker)."""
+    """Return the knots that a broken line near the values needs (Douglas and Peucker)."""
     chosen = {0, len(knots) - 1}
-    while len(chosen) < STOPS:
+    while len(chosen) < MOST_STOPS:
         order = sorted(chosen)
-        shown = np.stack(
-            [interp(knots, knots[order], values[order, c]) for c in range(values.shape[1])], axis=1
-        )
-        off = np.abs(shown - values).max(axis=1)
+        off = np.abs(_interpolated(knots, knots[order], values[order]) - values).max(axis=1)
         worst = int(off.argmax())
-        if off[worst] <= STOP:
+        if off[worst] <= OFF:
             break
         chosen.add(worst)
     return np.asarray(knots[sorted(chosen)])

@@ -1,98 +1,75 @@
-"""Where the picture is flat or a smooth ramp: the pixels that are sure to be of one region."""
+"""Seeds of regions: connected pixels where the image is flat or changes evenly."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NOBODY, Bools, Floats, Ints, largest, linked_parts
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, linked_components
 
-FLAT = 1.0
-"""Largest step between neighbours of a flat region [levels of 255], besides noise."""
+EDGE = 24  # [levels] step between neighbours that is an edge, whatever the noise
+NOISE_QUANTILE = 70  # [%] of the steps beside edges, that measures the noise
 
-STEEP = 12.0
-"""Largest step between neighbours on a ramp [levels]; what is steeper is an edge."""
-
-BEND = 2.0
-"""Largest change of that step from one pixel to the next [levels], besides noise."""
-
-LEAST = 4
-"""Pixels of a region: a block of two by two."""
-
-LEAST_RAMP = 9
-"""The same of a ramp, which antialiasing may feign."""
+FLAT_STEP = 1.0  # [levels] largest step between neighbours of a flat region, besides noise
+RAMP_STEP = 12.0  # [levels] largest step between neighbours on a ramp, besides noise; more is an edge
+RAMP_BEND = 2.0  # [levels] largest change of that step from one pixel to the next, besides noise
+LEAST_FLAT = 4  # [px] in a flat seed: a block of two by two
+LEAST_RAMP = 9  # [px] in a seed on a ramp: antialiasing looks like smaller ones
 
 
 def noise_of(image: Floats) -> float:
-    """How much flat regions vary beside their edges [levels of 255], which is where JPEG leaves its traces;
-    0 for a picture that was drawn.
+    """Return how much flat regions vary beside their edges, where JPEG leaves its traces [levels of 255].
+
+    0 for a drawing without noise.
     """
     grey = image.max(axis=2) if image.shape[2] == 1 else image[..., :3].mean(axis=2)
     step = np.zeros(grey.shape, np.float32)
     step[:, 1:] = np.abs(np.diff(grey, axis=1))
     step[1:] = np.maximum(step[1:], np.abs(np.diff(grey, axis=0)))
-    edge = (step > 24).astype(np.uint8)
+    edge = (step > EDGE).astype(np.uint8)
     near = cv2.dilate(edge, np.ones((13, 13), np.uint8)) > 0
     apart = cv2.dilate(edge, np.ones((5, 5), np.uint8)) == 0
     ring = step[near & apart]
-    if len(ring) < 64:
-        ring = step.reshape(-1)
-    return float(np.percentile(ring, 70))
+    return float(np.percentile(ring if len(ring) >= 64 else step, NOISE_QUANTILE))
 
 
-def _steps(image: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Largest step over the channels to the right and below, and how it bends at each pixel both ways."""
-    right, below = np.diff(image, axis=1), np.diff(image, axis=0)
-    bend_x = np.zeros(image.shape[:2], np.float32)
-    bend_y = np.zeros(image.shape[:2], np.float32)
-    bend_x[:, 1:-1] = largest(np.abs(np.diff(right, axis=1)))
-    bend_y[1:-1] = largest(np.abs(np.diff(below, axis=0)))
-    return largest(np.abs(right)), largest(np.abs(below)), bend_x, bend_y
-
-
-def find_seeds(image: Floats, noise: float) -> tuple[int, Ints]:
-    """Parts that are flat or smooth.
+def find_seeds(image: Floats, noise: float) -> Ints:
+    """Label the connected components of flat or evenly changing pixels.
 
     Args:
-        image: premultiplied, 0..255, shape (height, width, channel).
-        noise: of flat regions [levels].
+        image: Premultiplied, 0..255, shape (height, width, channel).
+        noise: Of flat regions [levels].
 
     Returns:
-        How many, and each pixel's, NOBODY where it is neither; shape (height, width).
+        Labels, NO_REGION for pixels in no seed; shape (height, width).
     """
-    right, below, bend_x, bend_y = _steps(image)
-    flat = FLAT + noise
-    flat_right, flat_below = right <= flat, below <= flat
+    right, below = np.diff(image, axis=1), np.diff(image, axis=0)
+    step_right, step_below = channel_max(np.abs(right)), channel_max(np.abs(below))
+    flat_right, flat_below = step_right <= FLAT_STEP + noise, step_below <= FLAT_STEP + noise
     block = flat_right[1:] & flat_right[:-1] & flat_below[:, 1:] & flat_below[:, :-1]
-    even = np.zeros(image.shape[:2], np.bool_)
+    flat = np.zeros(image.shape[:2], np.bool_)
     for rows in (slice(None, -1), slice(1, None)):
         for columns in (slice(None, -1), slice(1, None)):
-            even[rows, columns] |= block
-    smooth = _smooth(right, below, bend_x, bend_y, noise)
-    across = (flat_right & even[:, 1:] & even[:, :-1]) | (smooth[:, 1:] & smooth[:, :-1])
-    down = (flat_below & even[1:] & even[:-1]) | (smooth[1:] & smooth[:-1])
-    _, parts = linked_parts(across, down, even | smooth)
-    return _large_enough(parts, even)
+            flat[rows, columns] |= block
+    even = np.ones(image.shape[:2], np.bool_)
+    even[:, 1:-1] &= channel_max(np.abs(np.diff(right, axis=1))) <= RAMP_BEND + noise
+    even[1:-1] &= channel_max(np.abs(np.diff(below, axis=0))) <= RAMP_BEND + noise
+    for part in (slice(1, None), slice(None, -1)):
+        even[:, part] &= step_right <= RAMP_STEP + noise
+        even[part] &= step_below <= RAMP_STEP + noise
+    across = (flat_right & flat[:, 1:] & flat[:, :-1]) | (even[:, 1:] & even[:, :-1])
+    down = (flat_below & flat[1:] & flat[:-1]) | (even[1:] & even[:-1])
+    count, parts = linked_components(across, down, flat | even)
+    return _without_tiny(parts, count, flat)
 
 
-def _smooth(right: Floats, below: Floats, bend_x: Floats, bend_y: Floats, noise: float) -> Bools:
-    """Pixels from which the picture goes on evenly to all four sides."""
-    bend, steep = BEND + noise, STEEP + noise
-    smooth = (bend_x <= bend) & (bend_y <= bend)
-    smooth[:, 1:] &= right <= steep
-    smooth[:, :-1] &= right <= steep
-    smooth[1:] &= below <= steep
-    smooth[:-1] &= below <= steep
-    return np.asarray(smooth)
-
-
-def _large_enough(parts: Ints, even: Bools) -> tuple[int, Ints]:
-    count = int(parts.max()) + 1
+def _without_tiny(parts: Ints, count: int, flat: Bools) -> Ints:
+    """Return the labels without parts that are too small, numbered again without gaps."""
     if count == 0:
-        return 0, parts
+        return parts
     inside = parts >= 0
     sizes = np.bincount(parts[inside], minlength=count)
-    flats = np.bincount(parts[inside & even], minlength=count)
-    keep = (sizes >= LEAST_RAMP) | (flats >= LEAST)
-    number = np.where(keep, np.cumsum(keep) - 1, NOBODY).astype(np.int32)
-    return int(keep.sum()), np.where(inside, number[parts], NOBODY)
+    flat_sizes = np.bincount(parts[inside & flat], minlength=count)
+    keep = (sizes >= LEAST_RAMP) | (flat_sizes >= LEAST_FLAT)
+    number = np.where(keep, np.cumsum(keep) - 1, NO_REGION).astype(np.int32)
+    return np.where(inside, number[parts], NO_REGION)

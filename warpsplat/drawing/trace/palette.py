@@ -1,0 +1,128 @@
+"""The colours and gradients that the parts of an image are painted with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, channel_max
+from warpsplat.drawing.trace.ramps import Ramp, fit_ramp
+
+CLEAR = 2.5  # [levels] opacity below which nothing is painted
+
+
+@dataclass(frozen=True)
+class Coloring:
+    """What a region is painted with: premultiplied, 0..255."""
+
+    color: Floats
+    """Mean colour, shape (4,)."""
+    ramp: Ramp | None = None
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether nothing is painted."""
+        return float(self.color[3]) < CLEAR
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Labelled pixels of an image, and what they are painted with."""
+
+    labels: Ints
+    """The part of each pixel, NO_REGION where it is not known; shape (height, width)."""
+    fills: Floats
+    """The colour of each labelled pixel if its part covered it, shape (height, width, 4)."""
+    paint: Ints
+    """The colouring of each part, shape (part,)."""
+    colorings: list[Coloring]
+
+
+LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without and with noise
+UNEVEN = 1.6  # [levels] residual of a flat colour from which on a ramp is tried, besides noise
+UNEVEN_NOISE = 3.0  # what a level of noise adds to that
+GAIN = 0.6  # a ramp must leave less than this share of a flat colour's residual
+
+
+def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
+    """Find the colour or the ramp of each part; parts of nearly one colour share it."""
+    count = int(labels.max()) + 1
+    if count <= 0:
+        count, labels = 1, np.zeros(labels.shape, np.int32)
+    inside = labels >= 0
+    owners, pixels = labels[inside], image[inside]
+    sizes = np.maximum(np.bincount(owners, minlength=count), 1)
+    sums = np.stack([np.bincount(owners, channel, count) for channel in pixels.T], axis=1)
+    means = sums.astype(np.float64) / sizes[:, None]
+    modes = _modes(pixels, owners, count)
+    off = channel_max(np.abs(pixels - modes[owners])).astype(np.float32)
+    residual = np.sqrt(np.bincount(owners, off.astype(np.float64) ** 2, count) / sizes)
+    is_large = sizes >= (LEAST_RAMP if noise == 0 else LEAST_NOISY_RAMP)
+    paint = np.full(count, NO_REGION, np.int32)
+    colorings: list[Coloring] = []
+    for part in np.flatnonzero((residual > UNEVEN + UNEVEN_NOISE * noise) & is_large).tolist():
+        mask = labels == part
+        left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+        box = slice(top, top + height), slice(left, left + width)
+        ramp = fit_ramp(image[box], mask[box], left, top)
+        if ramp is not None and ramp.residual < GAIN * float(residual[part]):
+            paint[part] = len(colorings)
+            colorings.append(Coloring(means[part], ramp))
+    flat = np.flatnonzero(paint == NO_REGION)
+    shared, flat_colorings = _shared_colors((modes if noise == 0 else means)[flat], sizes[flat], noise)
+    paint[flat] = len(colorings) + shared
+    fills = image.copy()
+    is_flat = np.isin(owners, flat)
+    colors = np.array([coloring.color for coloring in flat_colorings]).reshape(-1, image.shape[2])
+    every = np.zeros((count, image.shape[2]))
+    every[flat] = colors[shared]
+    fills[inside] = np.where(is_flat[:, None], every[owners], pixels)
+    return Parts(labels, fills, paint, colorings + flat_colorings)
+
+
+def _modes(pixels: Floats, owners: Ints, count: int) -> Floats:
+    """Return the most frequent colour of each part, shape (count, channel).
+
+    Args:
+        pixels: Colours, shape (pixel, channel).
+        owners: The part of each pixel, shape (pixel,).
+        count: Of the parts.
+    """
+    levels = np.round(pixels).astype(np.int64)
+    packed = owners.astype(np.int64)
+    for channel in levels.T:
+        packed = packed * 256 + channel
+    keys, times = np.unique(packed, return_counts=True)
+    owner = keys >> 8 * levels.shape[1]
+    order = np.lexsort((times, owner))
+    last = order[np.flatnonzero(np.diff(np.append(owner[order], count)) != 0)]
+    shifts = 8 * np.arange(levels.shape[1])[::-1]
+    colors = np.zeros((count, levels.shape[1]))
+    colors[owner[last]] = (keys[last][:, None] >> shifts) & 255
+    return colors
+
+
+SAME = 1.5  # [levels] colours that differ by less are one
+SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, and what it adds at the most
+
+
+def _shared_colors(colors: Floats, sizes: Ints, noise: float) -> tuple[Ints, list[Coloring]]:
+    """Return the number of the colour that each flat part has, and these: those of the largest parts."""
+    known = np.zeros((0, colors.shape[1]))
+    tolerance = SAME + min(SAME_NOISE * noise, SAME_NOISE_MOST)
+    numbers = np.zeros(len(colors), np.intp)
+    for part in np.argsort(-sizes, kind="stable").tolist():
+        color = colors[part]
+        if color[3] < CLEAR:
+            color = np.zeros_like(color)
+        elif color[3] > 255 - CLEAR:
+            color = np.append(color[:3], 255.0)
+        off = np.abs(known - color).max(axis=1) if len(known) else np.array([np.inf])
+        nearest = int(off.argmin())
+        if off[nearest] > tolerance:
+            nearest = len(known)
+            known = np.concatenate([known, color[None]])
+        numbers[part] = nearest
+    return numbers, [Coloring(np.round(color)) for color in known]
