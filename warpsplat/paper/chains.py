@@ -12,10 +12,10 @@ from warpsplat.scene.scene import FloatArray, Scene, starts_of
 
 
 def as_chains(scene: Scene) -> Scene:
-    """The same shapes as single contours of cubics, closed ones of an even number; none is a twin any more.
+    """Return the shapes as single contours of cubics, closed ones of an even number, without twins.
 
     Raises:
-        ValueError: a shape is none of these; the message says what it has.
+        ValueError: a shape cannot be shown so; the message says why.
     """
     _check(scene)
     rings = [_chain(scene, shape) for shape in range(len(scene))]
@@ -48,7 +48,7 @@ def _check(scene: Scene) -> None:
 
 
 def _chain(scene: Scene, shape: int) -> FloatArray:
-    """Control points of one shape as cubics."""
+    """Return the control points of one shape as cubics."""
     ((points, closed),) = scene.contours_of(shape)
     cubics = beziers(points[None], closed, Basis(int(scene.basis[shape])))[0]
     if scene.kind[shape] == Kind.STROKE:
@@ -63,7 +63,7 @@ def _chain(scene: Scene, shape: int) -> FloatArray:
 
 
 def _halves(cubic: FloatArray) -> FloatArray:
-    """Both halves of a cubic, shape (2, 4, 2)."""
+    """Return both halves of a cubic, shape (2, 4, 2)."""
     rows: list[FloatArray] = [cubic]
     while len(rows[-1]) > 1:
         rows.append(np.float32(0.5) * (rows[-1][:-1] + rows[-1][1:]))

@@ -8,28 +8,26 @@ import numpy.typing as npt
 from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Scene
 
 FADED = 0.5
-"""How much fainter than both ends a middle is that gives a stroke up."""
+"""How much fainter than both ends the middle of a stroke is that is split."""
 
 POINTS = 10
 """Control points of the strokes that are split: of three cubics, each with an opacity of its own."""
 
 
 def opacities_by_third(scene: Scene) -> FloatArray:
-    """Opacity of each third of each shape, shape (shape, 3)."""
+    """Return the opacity of each third of each shape, shape (shape, 3)."""
     return np.clip(scene.opacities[:, None] + scene.fades, 0, 1)
 
 
 def faded(scene: Scene) -> IndexArray:
-    """Strokes of three cubics of which the middle one is much fainter than both others."""
+    """Return the strokes of three cubics whose middle is much fainter than both ends."""
     first, middle, last = opacities_by_third(scene).T
     strokes = (scene.kind == Kind.STROKE) & (scene.basis == Basis.CUBIC) & (scene.point_counts() == POINTS)
     return np.flatnonzero(strokes & (middle < np.minimum(first, last) - FADED))
 
 
 def split(scene: Scene, index: IndexArray) -> Scene:
-    """The first and the last cubics of the strokes ``index``, each a stroke of three cubics: the same course,
-    two rows of the result for each of ``index``.
-    """
+    """Return the first and last cubic of each stroke of ``index``, as two strokes of three cubics each."""
     strokes = np.repeat(np.asarray(index, np.intp), 2)
     ends = np.tile([0, POINTS - 4], len(index))
     first = (scene.first[strokes] + ends)[:, None] + np.arange(4)
