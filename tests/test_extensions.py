@@ -53,6 +53,7 @@ def test_one_whose_requirement_is_missing_is_left_out(
         text = f"from warpsplat.extensions import Extension\nEXTENSION = Extension(requires={requires})\n"
         (tmp_path / name / "extension.py").write_text(text)
     monkeypatch.setattr(extensions, "__file__", str(tmp_path / "extensions.py"))
+    monkeypatch.setattr(extensions, "folders", extensions.folders.__wrapped__)
     assert list(extensions.extensions.__wrapped__()) == ["a"]
 
 
