@@ -1,4 +1,4 @@
-"""What the program says: figures on stdout, everything else on stderr, each in whole, printable lines."""
+"""Print: figures to stdout, everything else to stderr, as printable lines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from warpsplat.native import write_message
 
 
 def open_standard_streams() -> None:
-    """Make sure that 0, 1 and 2 are open: of a closed one, the next file opened would take the number."""
+    """Open descriptors 0, 1 and 2 if they are closed, or the next file opened would get such a number."""
     for number, name in ((0, "stdin"), (1, "stdout"), (2, "stderr")):
         try:
             os.fstat(number)
@@ -30,16 +30,16 @@ def open_standard_streams() -> None:
             )
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
-        if reconfigure:  # names that the terminal's encoding lacks are shown escaped
+        if reconfigure:  # characters that the terminal's encoding lacks are escaped
             reconfigure(errors="backslashreplace")
 
 
 def echo(text: str, *, err: bool = False) -> None:
-    """Print lines, control characters escaped. A stderr that takes no more is no reason to fail.
+    """Print lines with control characters escaped. Errors in writing to stderr are ignored.
 
     Raises:
         OutputError: stdout cannot be written.
-        BrokenPipeError: nobody reads it any more.
+        BrokenPipeError: the reader of stdout has gone.
     """
     text = "\n".join(printable(line) for line in text.split("\n"))
     try:
@@ -54,7 +54,7 @@ def echo(text: str, *, err: bool = False) -> None:
 
 
 def silence(stream: object) -> None:
-    """Send what is left in a stream's buffer, and all to come, to nowhere."""
+    """Discard what is left in a stream's buffer and all further output."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())  # type: ignore[attr-defined]
@@ -62,7 +62,7 @@ def silence(stream: object) -> None:
 
 
 class _Notices(logging.Handler):
-    """Shows the library's notices on stderr; on a terminal those that pass as well, in one line."""
+    """Prints the library's notices to stderr; passing ones, on terminals only, as a line that is replaced."""
 
     def __init__(self, *, terminal: bool) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class _Notices(logging.Handler):
 
 @contextlib.contextmanager
 def notices() -> Iterator[None]:
-    """Show the library's warnings, and on a terminal what it is busy with; ``set_verbosity`` changes that."""
+    """Print the library's warnings, and on a terminal its activity; ``set_verbosity`` changes that."""
     log = logging.getLogger("warpsplat")
     before, handler = (log.propagate, log.level), _Notices(terminal=sys.stderr.isatty())
     log.addHandler(handler)
@@ -95,5 +95,5 @@ def notices() -> Iterator[None]:
 
 
 def set_verbosity(*, quiet: bool) -> None:
-    """Show errors only, or everything."""
+    """Print errors only, or everything."""
     logging.getLogger("warpsplat").setLevel(logging.ERROR if quiet else logging.INFO)

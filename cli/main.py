@@ -1,4 +1,4 @@
-"""Entry point. Imports nothing heavy: ``--help`` must answer at once."""
+"""Entry point. Nothing heavy is imported, so that ``--help`` answers at once."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ FOR_FILES = {
     ".svg": ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg"),
     ".yaml": ("batch FILE.yaml",),
 }
-"""What can be done with files that are no images."""
+"""Commands for files that are not images."""
 FOR_FILES[".svgz"], FOR_FILES[".yml"] = FOR_FILES[".svg"], FOR_FILES[".yaml"]
 
 
 class LazyGroup(click.Group):
-    """Imports a command's file when the command is asked for; the list above is enough for ``--help``."""
+    """Imports a command when it is used; the table above is enough for ``--help``."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names in the order of ``COMMANDS``."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command, or None for an unknown name."""
+        """Return the command, or None for an unknown name."""
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = load(COMMANDS[cmd_name].target)
@@ -56,10 +56,10 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that is meant, and its arguments. A file in its place is an image to vectorize.
+        """Return the command and its arguments; an existing file in place of a command is vectorized.
 
         Raises:
-            click.UsageError: none is; the message says which one may be.
+            click.UsageError: an unknown command; the message suggests one.
         """
         name = args[0]
         if name in COMMANDS or ctx.resilient_parsing:
@@ -78,7 +78,7 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, ["vectorize", *args])
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command. Of a reader of stdout that has gone, click would say nothing and exit with 1."""
+        """Run the command, and report a closed stdout, which click would ignore."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
@@ -88,7 +88,7 @@ class LazyGroup(click.Group):
             raise OutputError("standard output: nobody reads it any more") from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list, without importing the commands."""
+        """Write the list without importing the commands."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
@@ -110,9 +110,9 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
-    """Run the command line; whatever is raised ends in one line on stderr and the exit code of its kind.
+    """Run the command line; any exception becomes one line on stderr and an exit code.
 
-    Where a signal came, the code says so, whatever else there is to say: a shell's loop must not go on.
+    After a signal the exit code is always the signal's, so that a shell's loop stops.
     """
     code: Any = ExitCode.INTERNAL
     given = sys.argv[1:] if arguments is None else arguments
@@ -125,7 +125,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     except SystemExit as error:
         code = error.code
     except BaseException as error:
-        code = report(error, json_stream(given))
+        code = report_error(error, json_stream(given))
     number = signals.received()
     if number:
         code = 128 + number
@@ -134,9 +134,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 
 def json_stream(arguments: list[str]) -> Literal["stdout", "stderr"] | None:
-    """Where objects of ``--json`` go: to stderr where a file goes to stdout. None without the flag.
+    """Return where ``--json`` prints: stderr if a file goes to stdout. None without the flag.
 
-    Read from the words themselves, which need not be right.
+    Found in the words themselves, since they may not parse.
     """
     words = arguments[: arguments.index("--")] if "--" in arguments else arguments
     if "--json" not in words:
@@ -146,22 +146,22 @@ def json_stream(arguments: list[str]) -> Literal["stdout", "stderr"] | None:
     return "stderr" if aside else "stdout"
 
 
-def report(error: BaseException, objects: Literal["stdout", "stderr"] | None = None) -> int:
-    """Say what was raised, and return the exit code for it.
+def report_error(error: BaseException, objects: Literal["stdout", "stderr"] | None = None) -> int:
+    """Print an exception, and return the exit code for it.
 
     Args:
         error: what was raised.
-        objects: where an object of JSON on it goes as well.
+        objects: where to print it as a JSON object too.
     """
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.format_message())
         return ExitCode.USAGE
-    message, code = told(error)
+    message, code = message_of(error)
     if isinstance(error, OSError) and error.filename is None:
         silence(sys.stdout)  # what is left in its buffer cannot be written either
     echo(f"warpsplat: {message}", err=True)
     if objects:
-        with contextlib.suppress(Exception):  # what failed may be this as well
+        with contextlib.suppress(Exception):  # stdout itself may have failed
             echo(json.dumps({"error": message, "exit_code": int(code)}), err=objects == "stderr")
     return code
 
@@ -170,13 +170,13 @@ QUOTED = re.compile(r"""(["'])([^"']*)\1""")
 """Values in click's messages."""
 
 
-def told(error: BaseException) -> tuple[str, int]:
-    """What to say of what was raised, and the exit code for it."""
+def message_of(error: BaseException) -> tuple[str, int]:
+    """Return the message for an exception, and the exit code."""
     number = signals.received() or (signal.SIGINT if isinstance(error, KeyboardInterrupt) else None)
     if os.environ.get("WARPSPLAT_TRACEBACK"):
         traceback.print_exception(error)
     if number or isinstance(error, click.exceptions.Abort):
-        # What a library makes of an interruption inside of it (an ImportError, say) is an interruption.
+        # An interrupted library may raise something else, such as an ImportError.
         return "interrupted", 128 + (number or signal.SIGINT)
     if isinstance(error, click.ClickException):
         context = getattr(error, "ctx", None)

@@ -19,7 +19,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 FILE: click.Path = click.Path(path_type=Path, readable=False)
-"""A file's name. Whether it can be read is for the command to say, with the exit code that is due."""
+"""A file name. The command itself checks whether it can be read, for the right exit code."""
 
 threads_option = click.option(
     "--threads",
@@ -41,7 +41,7 @@ overwrite_option = click.option(
 
 
 def checkpoint_options(function: Function) -> Function:
-    """How a run that was ended goes on; the keywords of ``warpsplat.vectorize`` but for ``overwrite``."""
+    """Add the options of checkpoints, which are keywords of ``warpsplat.vectorize``."""
     options = [
         click.option(
             "--checkpoint",
@@ -68,7 +68,7 @@ def checkpoint_options(function: Function) -> Function:
 
 
 def verbosity_options(function: Function) -> Function:
-    """``-v`` and ``-q``."""
+    """Add ``-v`` and ``-q``."""
 
     def follow(context: click.Context, parameter: click.Parameter, value: int | bool) -> int | bool:
         if value:
@@ -85,18 +85,18 @@ def verbosity_options(function: Function) -> Function:
 
 
 class Numbers(click.ParamType):
-    """A number of shapes, or several: ``512`` or ``50,200,1000``."""
+    """One number of shapes or several: ``512`` or ``50,200,1000``."""
 
     name = "N[,N]"
 
     def __init__(self, *, several: bool) -> None:
-        """``several``: whether the command takes them; else it says which one does."""
+        """``several``: whether several are allowed."""
         self._several = several
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> int | tuple[int, ...]:
-        """One number is a number, several are a tuple."""
+        """Return an int, or a tuple of several."""
         if isinstance(value, (int, tuple)):
             return value
         words = str(value).split(",")
@@ -114,7 +114,7 @@ class Numbers(click.ParamType):
 
 
 def flag(option: Option, *, several: bool = False) -> Callable[[Function], Function]:
-    """The flag of an option of the table; ``several``: whether there may be several numbers of shapes."""
+    """Return the flag of an option in the table; ``several``: allow several numbers of shapes."""
     default = option.default_text
     shown = f"{option.help}  [default: {default}]" if default else option.help
     if option.value is not None:
@@ -133,7 +133,7 @@ def flag(option: Option, *, several: bool = False) -> Callable[[Function], Funct
 
 
 def quality_options(function: Function, *, several: bool = False) -> Function:
-    """What decides the result; ``several``: see ``flag``."""
+    """Add the options that decide the result; ``several``: see ``flag``."""
     for option in reversed(OPTIONS):
         function = flag(option, several=several)(function)
     return function
@@ -150,7 +150,7 @@ several_quality_options = functools.partial(quality_options, several=True)
 
 
 def run_options(function: Function) -> Function:
-    """What does not change the result."""
+    """Add the options that do not change the result."""
     options = [
         click.option(
             "--device",

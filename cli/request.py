@@ -1,4 +1,4 @@
-"""What a command line asks for of one image, besides the settings."""
+"""The image and options of a command line that are not settings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from warpsplat.files.inputs import STANDARD, input_name
 
 @dataclass(frozen=True)
 class Request:
-    """One image, and the options of its command that are no settings."""
+    """One image, and the options of its command that are not settings."""
 
     image: Path
     output: Path | None
@@ -27,7 +27,7 @@ class Request:
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """All that is read.
+        """Return the files that are read.
 
         Raises:
             UsageError: more than one of them is the standard input.
@@ -38,7 +38,7 @@ class Request:
 
     @property
     def source(self) -> dict[str, Any]:
-        """What the library's functions take besides the image's bytes and the settings."""
+        """Return keyword arguments for the library's functions, besides the image and the settings."""
         return {
             "name": input_name(self.image),
             "importance": self.importance,
@@ -48,5 +48,5 @@ class Request:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Words of a command that does the same again, besides those of settings."""
+        """Return the words of an equivalent command, besides those of settings."""
         return () if self.importance is None else ("--importance", str(self.importance))

@@ -1,4 +1,4 @@
-"""One image in several numbers of shapes: names, the run, a table."""
+"""``vectorize`` with several numbers of shapes: file names, the run, a table."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from warpsplat.run.result import Result
 from warpsplat.run.several import check_several
 
 COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
-"""Of the table."""
+"""Columns of the table."""
 
 
 def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any], hooks: Hooks) -> None:
-    """Make a file for each number of shapes, and say how good each is.
+    """Make a file for each number of shapes, and print their figures.
 
     Raises:
-        WarpsplatError: what cannot be done is found before the work, as far as it can be.
+        WarpsplatError: what cannot be done; found before the run, as far as possible.
     """
     inputs, image = request.inputs, request.image
     settings = settings_from({**given, "curves": max(numbers)})
@@ -44,7 +44,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
             check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
     hooks.check(inputs, outputs, overwrite=request.overwrite)
     results = run_several(request, outputs, numbers, settings, data)
-    begun = sorted(numbers)[: len(results)]  # where it was stopped, the fewest shapes are there
+    begun = sorted(numbers)[: len(results)]  # an interrupted run has made the smallest ones
     paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]
     made = list(zip(paths, results, strict=True))
     if not request.quiet and results:
@@ -64,10 +64,10 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
 
 
 def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Settings) -> list[Path]:
-    """The file of each number: ``photo-50.svg`` here or in the folder that is given, or by its pattern.
+    """Return the file of each number: ``photo-50.svg`` here, in the given folder, or by the given pattern.
 
     Raises:
-        UsageError: files that would lie in one place, or none that could be written.
+        UsageError: two files would have one name, or one could not be written.
     """
     if STANDARD in (output, image) and (output is None or output == STANDARD):
         raise UsageError("several numbers of shapes make several files: give -o 'NAME-{curves}.svg'")
@@ -87,23 +87,23 @@ def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Se
 
 
 def _place(output: Path | None) -> Place:
-    """Makes errors that name what was given."""
+    """Return a function that makes errors about ``-o``."""
     return lambda message: UsageError(f"-o {output or '.'}: {message.removeprefix('output: ')}")
 
 
 def _literal(text: str) -> str:
-    """A text that means itself in a pattern of names."""
+    """Escape a text for a pattern of names."""
     return text.replace("{", "{{").replace("}", "}}")
 
 
 def _missing(numbers: Sequence[int], begun: Sequence[int]) -> list[str]:
-    """A line that says which of the ``numbers`` of shapes there is no file of, if there are some."""
+    """Return a line about the ``numbers`` without a file, if there are any."""
     left = [str(number) for number in numbers if number not in begun]
     return [f"interrupted: no file with {', '.join(left)} shapes"] if left else []
 
 
 def table(made: Sequence[tuple[Path, Result]]) -> str:
-    """Lines that compare results."""
+    """Return a table of results."""
     rows = [("", *COLUMNS), *((printable(str(path)), *_figures(result)) for path, result in made)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []

@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM: what the first one does, and the second.
+"""Handle Ctrl-C and SIGTERM.
 
-While there is nothing to save, the first signal raises KeyboardInterrupt. Once a run has asked whether to
-stop, it is a wish: the run ends by itself, with the best so far. A second signal ends the process at once.
+While there is nothing to save, the first signal raises KeyboardInterrupt. Once a run polls ``Interrupt``, the
+signal is a request: the run ends by itself, with the best result so far. A second signal ends the process.
 
-Handlers are the process's, so what they saw is kept here once. A signal that was ignored when the program
+Handlers belong to the process, so their state is kept here, once. A signal that was ignored when the program
 started (``nohup``, a background job of a shell) stays ignored; SIGHUP is never touched.
 """
 
@@ -20,22 +20,22 @@ STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
 SHOW_CURSOR = b"\x1b[?25h"
-"""A progress bar hides it, and is not asked any more."""
+"""A progress bar hides the cursor and gets no chance to show it again."""
 
 
 class _State:
-    """What the process's handlers saw."""
+    """State of the process's handlers."""
 
     received: int | None = None
     patient = False
-    """Whether somebody asks now and then if to stop, so that the first signal need not raise."""
+    """Whether a run polls ``Interrupt``, so that the first signal need not raise."""
 
 
 _state = _State()
 
 
 def received() -> int | None:
-    """Number of the first signal since ``handled`` began."""
+    """Return the number of the first signal since ``handled`` began."""
     return _state.received
 
 
@@ -48,7 +48,7 @@ def _handle(number: int, frame: Any) -> None:
 
 
 def _end(number: int) -> None:
-    """End now; no clean-up but that of files that are being written, no wait for threads."""
+    """Exit now: remove unfinished files, do not wait for threads."""
     with contextlib.suppress(OSError):
         os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + b"\nwarpsplat: interrupted\n")
     _exit(128 + number)
@@ -62,7 +62,7 @@ def _exit(code: int) -> None:
 
 
 def leave_compiler(code: int) -> None:
-    """End the process at once where kernels are being compiled: the compiler cannot be stopped."""
+    """Exit now if kernels are being compiled: the compiler cannot be stopped."""
     compiler = sys.modules.get("warpsplat.rendering.compiler")
     if compiler and compiler.compiling():
         _exit(code)
@@ -70,15 +70,13 @@ def leave_compiler(code: int) -> None:
 
 @contextlib.contextmanager
 def handled() -> Iterator[None]:
-    """Handle SIGINT and SIGTERM in the block, but where they are ignored or this is not the main thread."""
+    """Handle SIGINT and SIGTERM in the block, unless they are ignored or this is not the main thread."""
     _state.received, _state.patient = None, False
     before: dict[int, Any] = {}
     hook = sys.unraisablehook
 
     def unraisable(found: Any) -> None:
-        if not isinstance(
-            found.exc_value, KeyboardInterrupt
-        ):  # raised in a destructor, which nobody can catch
+        if not isinstance(found.exc_value, KeyboardInterrupt):  # raised in a destructor
             hook(found)
 
     sys.unraisablehook = unraisable
@@ -95,16 +93,16 @@ def handled() -> Iterator[None]:
 
 
 class Interrupt:
-    """Whether a run should stop: ask it between steps. Handed to the library as ``stop``."""
+    """Tells a run whether to stop; polled between steps as ``stop`` of the library."""
 
     def __call__(self) -> bool:
-        """Whether a signal came. From the first question on, the first signal is a wish."""
+        """Return whether a signal came. After the first call, signals no longer raise."""
         _state.patient = True
         return _state.received is not None
 
     @contextlib.contextmanager
     def watching(self) -> Iterator[None]:
-        """One run; it is patient from its first question to the end of the block."""
+        """Watch one run: signals no longer raise from its first call to the end of the block."""
         _state.patient = False
         try:
             yield

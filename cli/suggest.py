@@ -27,7 +27,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     """Print a suggestion, its reasons, and the command that follows it.
 
     Raises:
-        UsageError: settings that say how many shapes there are, or an output.
+        UsageError: settings that fix the number of shapes, or an output.
         Abort: interrupted.
     """
     if request.output:
@@ -56,7 +56,7 @@ NOTHING_ELSE = "--suggest takes one image, and writes nothing"
 
 
 def _command(request: Request, settings: Settings, made: Suggestion) -> str:
-    """The line that follows the suggestion."""
+    """Return the command that follows the suggestion."""
     from dataclasses import replace
 
     from warpsplat.files.inputs import STANDARD
@@ -69,7 +69,7 @@ def _command(request: Request, settings: Settings, made: Suggestion) -> str:
 
 
 def _lines(name: str, made: Suggestion) -> list[str]:
-    """A suggestion for people."""
+    """Return a suggestion as text."""
     if made.curves is None:
         return [f"{name}: {made.why}"]
     lines = [f"{name}: {made.curves} shapes", "    shapes     dB      kB   twice as many buy"]
@@ -84,7 +84,7 @@ def _lines(name: str, made: Suggestion) -> list[str]:
 
 
 TWICE = 1.9
-"""Shapes of a row over those of the row before, from which on they are about twice as many."""
+"""Ratio of shapes from which a row has about twice as many as the row before."""
 
 
 def _wrapped(text: str) -> list[str]:

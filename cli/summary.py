@@ -1,4 +1,4 @@
-"""A result in one line, for people."""
+"""A result in one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from warpsplat.extensions import load_renderer
 
 
 def summary(output: Path, values: dict[str, Any]) -> str:
-    """One line on the result, for people."""
+    """Return one line about a result."""
     from warpsplat.run.formats import PICTURE_ENDINGS
 
     name = "standard output" if str(output) == "-" else printable(str(output))
@@ -35,5 +35,5 @@ def summary(output: Path, values: dict[str, Any]) -> str:
 
 
 def _level(level: dict[str, Any]) -> str:
-    """What a layered file shows up to the end of a level."""
+    """Return the PSNR of a layered file up to a level."""
     return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")

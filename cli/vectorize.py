@@ -107,17 +107,17 @@ def command(
 def single(
     request: Request, given: dict[str, Any], hooks: Hooks, keeping: dict[str, Any], *, as_uri: bool
 ) -> None:
-    """Make a file of one image, and all that is asked for besides.
+    """Make a file of one image, and whatever hooks add.
 
     Args:
-        request: what is to be done.
+        request: the image and options.
         given: settings.
         hooks: what extensions add to the run.
-        keeping: how its state is kept: ``checkpoint`` and what goes with it, see ``warpsplat.vectorize``.
-        as_uri: whether the file is printed.
+        keeping: ``checkpoint``, ``resume`` and ``checkpoint_every``, see ``warpsplat.vectorize``.
+        as_uri: whether to print the file as a data URI.
 
     Raises:
-        WarpsplatError: what cannot be done is found before the work, as far as it can be.
+        WarpsplatError: what cannot be done; found before the run, as far as possible.
     """
     settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input

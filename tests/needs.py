@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests import ROOT
 from warpsplat.extensions import extensions
 
@@ -24,6 +26,8 @@ WORDS = {
 
 MISSING = WORDS.keys() - extensions().keys()
 ABSENT_WORDS = {word for name in MISSING for word in WORDS[name]}
+
+WHOLE = pytest.mark.skipif(bool(MISSING), reason="the documentation is of the whole program")
 
 
 def needs_missing(path: Path) -> bool:

@@ -48,7 +48,7 @@ ANYTHING = {"", "__main__", "_version", "cli", "configs"}
 ANYWHERE = {"", "_version", "extensions"}
 """Modules that all others may import."""
 
-EXTENSIONS = extensions.extensions()
+EXTENSIONS = extensions.folders()
 
 HEAVY = {
     "numpy",

@@ -18,11 +18,12 @@ import pytest
 from PIL import Image
 
 from tests import ROOT
+from tests.needs import WHOLE
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
 from warpsplat.svg.viewer import render_svg
 
-pytestmark = pytest.mark.usefixtures("single_precision")
+pytestmark = [pytest.mark.usefixtures("single_precision"), WHOLE]
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 CAT = "docs/images/cat.jpg"

@@ -16,14 +16,19 @@ import pytest
 from PIL import Image
 
 from tests import ROOT
+from tests.needs import WHOLE
 from warpsplat.cli.main import cli
 from warpsplat.run.options import KINDS
 from warpsplat.svg.inspect import inspect_svg
 
 DOCS = ROOT / "docs"
-pytestmark = pytest.mark.skipif(
-    not (DOCS / "gallery" / "gallery.yaml").exists(), reason="source distributions are without the gallery"
-)
+pytestmark = [
+    WHOLE,
+    pytest.mark.skipif(
+        not (DOCS / "gallery" / "gallery.yaml").exists(),
+        reason="source distributions are without the gallery",
+    ),
+]
 
 MOST_BYTES = 5_000_000
 """Of all that is kept of the gallery."""

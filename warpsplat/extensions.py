@@ -45,8 +45,8 @@ class Extension:
 
 
 @functools.cache
-def extensions() -> dict[str, Extension]:
-    """Return the extensions that are there, by the names of their folders, in alphabetical order."""
+def folders() -> dict[str, Extension]:
+    """Return the declarations of all folders that have one, in alphabetical order."""
     found: dict[str, Extension] = {}
     for path in sorted(Path(__file__).parent.glob("*/extension.py")):
         # By its path, because the package around it may need what is not installed.
@@ -56,6 +56,13 @@ def extensions() -> dict[str, Extension]:
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         found[path.parent.name] = module.EXTENSION
+    return found
+
+
+@functools.cache
+def extensions() -> dict[str, Extension]:
+    """Return the extensions that can be used: those of ``folders`` whose requirements are there."""
+    found = dict(folders())
     while incomplete := [name for name, one in found.items() if not found.keys() >= set(one.requires)]:
         for name in incomplete:
             del found[name]

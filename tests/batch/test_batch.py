@@ -6,8 +6,6 @@ import json
 import os
 import shutil
 import signal
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +14,8 @@ from PIL import Image
 
 from tests.batch.helpers import answers, load_jobs, write
 from tests.cli.helpers import one_line, run
-from warpsplat.batch.executors.serial import Serial
-from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, Stop, Task
-from warpsplat.batch.executors.work import do
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
-from warpsplat.batch.run import Batch, Report
+from warpsplat.batch.run import JobReport
 from warpsplat.batch.show import Show
 
 
@@ -60,13 +55,13 @@ def test_an_interrupted_run_says_what_is_left(
 ) -> None:
     for i in range(5):
         shutil.copy(folder / "in" / "a.png", folder / "in" / f"more{i}.png")
-    usual = Show.hear
+    usual = Show.add
 
-    def hear(show: Show, report: Report) -> None:
+    def interrupting(show: Show, report: JobReport) -> None:
         usual(show, report)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Show, "hear", hear)
+    monkeypatch.setattr(Show, "add", interrupting)
     settings = ("--curves", 4, "--iterations", 6, "--device", "cpu", "--workers", 1)
     arguments = ("batch", folder / "in", "-o", folder / "out", *settings, *(["--json"] if as_json else []))
     assert run(*arguments) == 130
@@ -339,36 +334,3 @@ def test_processes_make_the_same_files(folder: Path, capsys: pytest.CaptureFixtu
         assert len({image["image"] for image in images_said}) == 4
     first, second = ({p.name: p.read_bytes() for p in (folder / w).glob("*.svg")} for w in ("1", "2"))
     assert first == second
-
-
-def test_workers_that_do_not_see_files(folder: Path) -> None:
-    """Images go out, and results and figures come back, as bytes."""
-    path = write(folder, "jobs: [{images: in/a.png, output: out, curves: 30, iterations: 3, device: cpu}]")
-    jobs = load_jobs(path)
-    seen: list[Task] = []
-
-    class Far(Serial):
-        def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
-            for task in tasks:
-                seen.append(task)
-                yield do(replace(task, output="/nowhere/a.svg"))
-
-    def reports(executor: Executor, carry: bool, name: str) -> list[Report]:
-        found: list[Report] = []
-        notes = Manifest(folder / name)
-        notes.open()
-        batch = Batch(jobs, notes, hear=found.append, carry=carry)
-        batch.run(executor, lambda: False, lambda number, part: None)
-        notes.close()
-        return found
-
-    (made,) = reports(Far(), True, "far.jsonl")
-    svg = jobs[0].output.read_bytes()
-    assert made.status == "made"
-    (found,) = reports(Far(), True, "other.jsonl")
-    assert (found.status, found.figures["psnr"]) == ("skipped", made.figures["psnr"])
-    assert [(task.measure, task.bring) for task in seen] == [(False, True), (True, True)]
-    jobs[0].output.unlink()
-    (near,) = reports(Serial(), False, "near.jsonl")
-    assert near.status == "made"
-    assert jobs[0].output.read_bytes() == svg

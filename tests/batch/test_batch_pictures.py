@@ -14,7 +14,7 @@ from warpsplat.batch.executors.serial import Serial
 from warpsplat.batch.executors.tasks import Stop
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.batch.plan import plan_jobs
-from warpsplat.batch.run import Batch, Report
+from warpsplat.batch.run import Batch, JobReport
 from warpsplat.files.marks import mark_pdf, mark_png, picture_key
 from warpsplat.files.output import may_replace
 
@@ -121,13 +121,15 @@ def test_results_beside_the_images_are_no_images(folder: Path, capsys: pytest.Ca
 
 def test_a_stopped_picture_is_made_again(folder: Path) -> None:
     path = write(folder, "jobs: [{images: in/a.png, output: 'out/{stem}.png', curves: 3, iterations: 30}]")
-    reports: list[Report] = []
+    reports: list[JobReport] = []
 
     def done(stop: Stop) -> None:
         notes = Manifest(folder / NAME)
         notes.open()
         with contextlib.closing(notes):
-            Batch(load_jobs(path), notes, hear=reports.append).run(Serial(), stop, lambda number, part: None)
+            Batch(load_jobs(path), notes, on_report=reports.append).run(
+                Serial(), stop, lambda number, part: None
+            )
 
     asked = iter([False] * 4)
     done(lambda: next(asked, True))

@@ -12,6 +12,7 @@ from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run, shell
 from tests.forks import CLOSED, Forks
+from warpsplat.cli.main import COMMANDS
 from warpsplat.errors import CapacityError, ExitCode
 from warpsplat.svg.viewer import render_own
 
@@ -27,7 +28,7 @@ def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for name in ("vectorize", "batch", "render", "bench", "info"):
+    for name in COMMANDS:
         assert name in done.stdout
     assert "\\b" not in done.stdout
 

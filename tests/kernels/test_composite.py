@@ -19,9 +19,10 @@ from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Basis, Kind, Scene
 
 
+@pytest.mark.needs("paper")  # the coverages that it takes as given are those of splats
 @pytest.mark.parametrize("opaque", [False, True])
 def test_blending_and_adjoint(device: str, opaque: bool) -> None:
-    """Colour and opacity gradients need nothing of the splats: the coverage is taken as given."""
+    """The image, and the gradients of colours, opacities and coverages."""
     scene = random_scene(Kind.FILL, count=8, seed=5)
     if opaque:
         scene.opacities[:] = 0.996

@@ -34,7 +34,7 @@ def test_bench_through_torch(capsys: pytest.CaptureFixture[str]) -> None:
     options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--threads", 1, "--device", "cpu", "--torch")
     assert run("bench", *options) == 0
     shown = capsys.readouterr().out
-    assert "by turns, torch" in shown
+    assert "alternately, torch" in shown
     assert "through PyTorch" in shown
 
 

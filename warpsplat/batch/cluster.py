@@ -1,4 +1,4 @@
-"""Options of a batch that is done by other machines."""
+"""Options of a batch on other machines."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 @dataclass(frozen=True)
 class Cluster:
-    """A Ray cluster, and what tasks take of it."""
+    """A Ray cluster, and the GPUs that each task takes of it."""
 
     address: str
     gpus: float
 
     def executor(self, workers: int | None) -> Executor:
-        """Who does the tasks; nothing is connected to yet.
+        """Return the executor; it is not connected yet.
 
         Raises:
             UsageError: Ray is not installed.
@@ -35,7 +35,7 @@ class Cluster:
 
 
 def cluster_options(function: Function) -> Function:
-    """``--executor`` and ``--gpus``."""
+    """Add ``--executor`` and ``--gpus``."""
     options = [
         click.option(
             "--executor",
@@ -56,10 +56,10 @@ def cluster_options(function: Function) -> Function:
 
 
 def cluster_of(executor: str | None, gpus: float | None) -> Cluster | None:
-    """What the options say; None: this machine.
+    """Return the cluster of the options, or None for this machine.
 
     Raises:
-        UsageError: an executor that there is not, or GPUs that cannot be had so.
+        UsageError: an unknown executor, or an invalid number of GPUs.
     """
     name, _, address = (executor or "").partition("=")
     if executor is not None and name != "ray":

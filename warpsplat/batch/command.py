@@ -76,7 +76,7 @@ class Shard(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
-        """Two numbers, the first from 1 to the second."""
+        """Parse two numbers, the first from 1 to the second."""
         if isinstance(value, tuple):
             return value
         found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", value)
@@ -214,7 +214,7 @@ def vectorize_images(
 
 
 def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The flags of settings, as keys of batch files."""
+    """Return flags of settings as keys of batch files."""
     flags = {key.replace("_", "-"): value for key, value in given.items() if key != "kind"}
     return flags | {name: True for name, kind in KINDS.items() if given.get("kind") == kind}
 
@@ -222,17 +222,17 @@ def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
 def perform(
     inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str], options: BatchOptions
 ) -> None:
-    """Do a batch, and end the program with the code for it, if there is one to give.
+    """Do a batch, and exit with the code for failures or missed goals, if there are any.
 
     Raises:
-        WarpsplatError: what concerns the batch as a whole.
+        WarpsplatError: the batch as a whole cannot be done.
     """
     from warpsplat.batch.index import Index
     from warpsplat.batch.layers import command_layer
     from warpsplat.batch.manifest import NAME, Manifest
     from warpsplat.batch.plan import home_of, in_shard, plan_jobs
     from warpsplat.batch.reports import Reports
-    from warpsplat.batch.run import Batch, Report
+    from warpsplat.batch.run import Batch, JobReport
     from warpsplat.batch.show import Show
     from warpsplat.cli import signals
 
@@ -254,15 +254,17 @@ def perform(
             reports = Reports.at(options.report, home, taken=taken, overwrite=options.overwrite)
         index = Index(planned, reports) if reports else None
 
-        def hear(report: Report) -> None:
+        def on_report(report: JobReport) -> None:
             if index:
-                index.hear(report)
-            show.hear(report)
+                index.add(report)
+            show.add(report)
 
-        batch = Batch(jobs, notes, hear=hear, retry=options.retry_failed, threads=threads, reports=reports)
+        batch = Batch(
+            jobs, notes, on_report=on_report, retry=options.retry_failed, threads=threads, reports=reports
+        )
         with interrupt.watching():
             if options.dry_run:
-                batch.look(interrupt)
+                batch.dry_run(interrupt)
             else:
                 notes.open()
                 with contextlib.suppress(KeyboardInterrupt), executor:
@@ -281,10 +283,10 @@ def perform(
 def executor_for(
     jobs: Sequence[Job], options: BatchOptions, interrupt: Interrupt
 ) -> tuple[Executor, int | None]:
-    """Who does the jobs, and the threads of each.
+    """Return the executor of the jobs, and the threads of each.
 
     Raises:
-        UsageError: a device that is not here; that is found before the first image.
+        UsageError: an unknown device.
     """
     if options.cluster:
         return options.cluster.executor(options.workers), options.threads or 1
@@ -302,10 +304,10 @@ def executor_for(
 
 
 def check_ours(jobs: list[Job], manifest: Manifest) -> None:
-    """Refuse to replace files of others.
+    """Check that no result replaces a file that warpsplat did not write.
 
     Raises:
-        UsageError: there are some; the message names them.
+        UsageError: there are such files; the message names them.
     """
     from warpsplat.batch.run import not_ours
     from warpsplat.batch.show import NAMED

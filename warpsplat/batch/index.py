@@ -10,7 +10,7 @@ from typing import Any
 from warpsplat.batch.manifest import Manifest
 from warpsplat.batch.plan import Job
 from warpsplat.batch.reports import Reports
-from warpsplat.batch.run import Report
+from warpsplat.batch.run import JobReport
 from warpsplat.errors import printable
 from warpsplat.files.output import write_result
 from warpsplat.files.remote import is_remote
@@ -18,26 +18,26 @@ from warpsplat.files.remote import is_remote
 ASSETS = ("index.css", "index.js")
 
 MOST_THUMBNAILS = 2000
-"""In a list of more images there are none: each is 3 kB."""
+"""Lists of more images have none: each is 3 kB."""
 
 FIGURES = ("psnr", "bytes", "shapes", "seconds")
 """What images can be sorted by, besides their names."""
 
 
 class Index:
-    """Listens to a batch, and writes its list."""
+    """Collects what becomes of a batch's jobs, and writes the page that lists them."""
 
     def __init__(self, jobs: Sequence[Job], reports: Reports) -> None:
         """``jobs``: all, also those that other processes do."""
         self._jobs, self._reports = jobs, reports
-        self._heard: dict[Path, Report] = {}
+        self._reported: dict[Path, JobReport] = {}
 
-    def hear(self, report: Report) -> None:
-        """Take note of what became of a job."""
-        self._heard[report.job.output] = report
+    def add(self, report: JobReport) -> None:
+        """Keep what became of a job."""
+        self._reported[report.job.output] = report
 
     def write(self, manifest: Manifest) -> None:
-        """Write the list as things stand.
+        """Write the list as of now.
 
         Raises:
             OutputError: it cannot be written.
@@ -50,7 +50,7 @@ class Index:
         write_result(self._reports.index, text.encode())
 
     def _row(self, job: Job, manifest: Manifest, *, with_thumbnail: bool) -> dict[str, Any]:
-        """What the list says of a job."""
+        """Return a job's row of the list."""
         status, figures, error = self._state(job, manifest)
         there = status == "made" or (status == "stopped" and bool(figures))
         report = self._reports.report_of(job.output)
@@ -68,17 +68,21 @@ class Index:
         }
 
     def _state(self, job: Job, manifest: Manifest) -> tuple[str, Mapping[str, Any], str]:
-        """What became of a job, its figures, and the cause if it failed: as was heard, else as noted."""
-        heard = self._heard.get(job.output)
-        if heard:
-            return "made" if heard.status == "skipped" else heard.status, heard.figures, heard.error
+        """Return a job's status, figures and error: as reported in this run, else from the manifest."""
+        reported = self._reported.get(job.output)
+        if reported:
+            return (
+                "made" if reported.status == "skipped" else reported.status,
+                reported.figures,
+                reported.error,
+            )
         noted = [entry for entry in manifest.entries(job.output) if entry.event in ("made", "failed")]
         if not noted:
             return "open", {}, ""
         return noted[-1].event, noted[-1].figures, noted[-1].error
 
     def _address(self, path: Path) -> str:
-        """A link from the list to a file; empty where no relative one leads there."""
+        """Return a relative link from the list to a file; empty if there is none."""
         if is_remote(path):
             return ""
         try:
@@ -90,7 +94,7 @@ class Index:
 
 
 def _numbers(figures: Mapping[str, Any]) -> dict[str, float | None]:
-    """Those that images are sorted by; a manifest may hold anything."""
+    """Return the figures that images are sorted by; a manifest may hold anything."""
     found = {}
     for name in FIGURES:
         value = figures.get(name)

@@ -1,4 +1,4 @@
-"""Doing the jobs of a batch: each once, whoever else is at the same list, whatever was interrupted before."""
+"""Do the jobs of a batch, each once, even if other processes share it or earlier runs were interrupted."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ log = logging.getLogger(__name__)
 Status = Literal["made", "skipped", "failed", "stopped", "planned"]
 
 PAUSE = 0.3
-"""Seconds between two looks at what other processes have in work."""
+"""Seconds between two checks of what other processes are working on."""
 
 TAIL = b"</svg>\n"
-"""How every SVG that was written here ends; one that was cut short does not."""
+"""End of every complete SVG."""
 
 
 @dataclass(frozen=True)
-class Report:
+class JobReport:
     """What became of a job."""
 
     job: Job
@@ -58,24 +58,23 @@ class Report:
         return values | ({"error": self.error, "before": self.before} if self.error else {})
 
 
-class Prepared(NamedTuple):
-    """What is known of a job before it is done."""
+class JobInputs(NamedTuple):
+    """A job's key and inputs."""
 
     key: str
     image: bytes
     mask: bytes | None
 
 
-class Standing(NamedTuple):
-    """Whether a result is there."""
+class ResultState(NamedTuple):
+    """Whether a result exists."""
 
     made: bool
     entry: Entry | None
-    """What the manifest says of it: of a result that is there, how it was made; of one that is not, that it
-    failed."""
+    """Its entry in the manifest: how an existing result was made, or that the job failed."""
 
 
-def prepare(job: Job) -> Prepared:
+def read_inputs(job: Job) -> JobInputs:
     """Read a job's inputs.
 
     Raises:
@@ -83,32 +82,32 @@ def prepare(job: Job) -> Prepared:
     """
     image = read_input(job.image)
     mask = read_input(job.importance) if job.importance else None
-    return Prepared(job_key(job.settings, image, mask), image, mask)
+    return JobInputs(job_key(job.settings, image, mask), image, mask)
 
 
-def standing(job: Job, key: str, manifest: Manifest) -> Standing:
-    """Whether the result of ``key`` is there, whole: its mark says so, or the manifest knows its bytes."""
+def result_state(job: Job, key: str, manifest: Manifest) -> ResultState:
+    """Find the complete result of ``key``, by the key in the file or the file's digest in the manifest."""
     entries = [entry for entry in manifest.entries(job.output) if entry.key == key]
     if is_remote(job.output):
-        # The manifest is believed: fetching each result would take longer than many take to make.
+        # The manifest is trusted: fetching each result would take longer than many take to make.
         latest = entries[-1] if entries else None
         if latest and latest.event == "made" and exists(job.output):
-            return Standing(True, latest)
+            return ResultState(True, latest)
     data = read_result(job.output)
     if data is not None:
         sum_ = digest(data)
-        # What was about to be written and is there, is made.
+        # A result that was about to be written and exists has been made.
         known = [e for e in entries if e.digest == sum_ and (e.event == "made" or e.figures)]
         if known:
-            return Standing(True, known[-1])
+            return ResultState(True, known[-1])
         if marked(data) == key or any(entry.digest == sum_ for entry in entries):
-            return Standing(True, None)
+            return ResultState(True, None)
     failed = entries[-1] if entries and entries[-1].event == "failed" else None
-    return Standing(False, failed)
+    return ResultState(False, failed)
 
 
 def read_result(path: Path) -> bytes | None:
-    """The bytes of a result; None if there is none, or no file."""
+    """Return the bytes of a result, or None if there is none or it is no regular file."""
     if is_remote(path):
         return read_remote(path, MAX_INPUT) if listed(path) else None
     with contextlib.suppress(OSError):
@@ -121,7 +120,7 @@ def read_result(path: Path) -> bytes | None:
 
 
 def marked(data: bytes) -> str:
-    """The key that a whole result bears; empty if it has none, or was cut short."""
+    """Return the key in a complete result; empty if it has none or is incomplete."""
     if data[:2] == GZIP:
         try:
             data = svg_text(data, "").encode()
@@ -133,7 +132,7 @@ def marked(data: bytes) -> str:
 
 
 def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
-    """The results that are there already and that warpsplat did not write."""
+    """Return the existing files in place of results that warpsplat did not write."""
     found = []
     for job in jobs:
         if is_remote(job.output) and (not listed(job.output) or manifest.entries(job.output)):
@@ -152,38 +151,36 @@ def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
 
 
 class Batch:
-    """Jobs, who does them, and what is known of them."""
+    """Runs jobs and keeps the manifest."""
 
     def __init__(
         self,
         jobs: list[Job],
         manifest: Manifest,
         *,
-        hear: Callable[[Report], None],
+        on_report: Callable[[JobReport], None],
         retry: bool = False,
         threads: int | None = None,
-        carry: bool = False,
         reports: Reports | None = None,
     ) -> None:
         """Args:
         jobs: what to do.
         manifest: open.
-        hear: told what becomes of each job, as soon as that is known.
+        on_report: called with what became of each job, as soon as that is known.
         retry: whether what failed is tried again.
         threads: of each task, on a CPU.
-        carry: whether workers do not see the files: images go out, and results come back, as bytes.
         reports: where pages on results are kept; None: none are made.
         """
         self.jobs, self.manifest = jobs, manifest
-        self._hear, self._retry, self._threads, self._carry = hear, retry, threads, carry
+        self._on_report, self._retry, self._threads = on_report, retry, threads
         self._reports = reports
         self._made_before: dict[int, Entry] = {}
-        """What the manifest says of results in work that only lack a report."""
+        """Manifest entries of results that exist and only lack a report."""
         self._keys: dict[int, str] = {}
-        """Of the tasks in work."""
+        """Keys of the tasks in progress."""
 
     def run(self, executor: Executor, stop: Stop, advance: Advance) -> None:
-        """Do the jobs. What another process has in work is waited for, and done if that process dies.
+        """Do the jobs. Wait for those claimed by another process, and do them if it dies.
 
         Raises:
             OutputError: the manifest cannot be written.
@@ -197,35 +194,35 @@ class Batch:
                 self._settle(outcome)
             if later and not waiting:
                 waiting = True
-                log.info("waiting for %d images that another process has in work", len(later))
+                log.info("waiting for %d images that another process is working on", len(later))
             if len(later) == len(todo):
                 time.sleep(PAUSE)
             todo = later
 
-    def look(self, stop: Stop) -> None:
-        """Say what a run would do, and do nothing."""
+    def dry_run(self, stop: Stop) -> None:
+        """Report what a run would do, and do nothing."""
         for number, job in enumerate(self.jobs):
             if stop():
                 return
-            if self._prepared(number) is not None:
-                self._hear(Report(job, "planned"))
+            if self._inputs(number) is not None:
+                self._on_report(JobReport(job, "planned"))
 
     def _tasks(self, todo: list[int], later: list[int], stop: Stop) -> Iterator[Task]:
-        """The tasks among the jobs ``todo``, each claimed; those that others have go to ``later``."""
+        """Claim the jobs ``todo`` and yield their tasks; append those claimed by others to ``later``."""
         for number in todo:
             if stop():
                 return
             job = self.jobs[number]
-            found = self._prepared(number)
+            found = self._inputs(number)
             if stop():
-                self._hear(Report(job, "stopped"))
+                self._on_report(JobReport(job, "stopped"))
                 return
             if found is None:
                 continue
             if not self.manifest.claim(job.output, found.key):
                 later.append(number)
                 continue
-            # Who had the claim until now may have made it.
+            # The previous holder of the claim may have made it.
             self.manifest.refresh()
             state = self._known(job, found.key)
             if state is None:
@@ -236,45 +233,45 @@ class Batch:
                 self._made_before[number] = state.entry
             yield self._task(number, found, measure=state.made)
 
-    def _prepared(self, number: int) -> Prepared | None:
-        """A job's inputs; None if nothing is to be done, which was reported."""
+    def _inputs(self, number: int) -> JobInputs | None:
+        """Return a job's inputs; None, after a report, if nothing is to be done."""
         job = self.jobs[number]
         try:
-            found = prepare(job)
+            found = read_inputs(job)
         except Exception as error:
-            self._hear(Report(job, "failed", error=failure(error, str(job.image), str(job.output))))
+            self._on_report(JobReport(job, "failed", error=failure(error, str(job.image), str(job.output))))
             return None
         return found if self._known(job, found.key) else None
 
-    def _known(self, job: Job, key: str) -> Standing | None:
-        """How a result stands; None if nothing is to be done, which was reported."""
-        state = standing(job, key, self.manifest)
+    def _known(self, job: Job, key: str) -> ResultState | None:
+        """Return the state of a result; None, after a report, if nothing is to be done."""
+        state = result_state(job, key, self.manifest)
         reported = not (self._reports and self._reports.lacks(job.output))
         if state.made and (is_picture(job.output) or (state.entry and reported)):  # pictures are not measured
-            self._hear(Report(job, "skipped", state.entry.figures if state.entry else {}))
+            self._on_report(JobReport(job, "skipped", state.entry.figures if state.entry else {}))
             return None
         if not state.made and state.entry and not self._retry:
-            self._hear(Report(job, "failed", error=state.entry.error, before=True))
+            self._on_report(JobReport(job, "failed", error=state.entry.error, before=True))
             return None
         return state
 
-    def _task(self, number: int, found: Prepared, *, measure: bool) -> Task:
+    def _task(self, number: int, found: JobInputs, *, measure: bool) -> Task:
         job = self.jobs[number]
         away = is_remote(job.output)
         return Task(
             number,
-            found.image if self._carry or is_remote(job.image) else str(job.image),
+            found.image if is_remote(job.image) else str(job.image),
             str(job.image),
             str(job.output),
             job.settings,
             job.device,
             self._threads,
             self._mask(job, found),
-            # What bears no mark is known by its digest, which must be noted before it is written; a picture
-            # is drawn once, for both.
-            bring=self._carry or away or job.settings.minify or is_picture(job.output),
+            # A result without a key in it is known by its digest, which is noted before it is written; a
+            # picture is drawn once, for both.
+            bring=away or job.settings.minify or is_picture(job.output),
             measure=measure,
-            result=read_result(job.output) if measure and (away or self._carry) else None,
+            result=read_result(job.output) if measure and away else None,
             report=self._report_wish(number),
         )
 
@@ -285,13 +282,13 @@ class Batch:
         back = self._reports.way_back(self.jobs[number].output)
         return ReportWish(back, before.figures if before else {})
 
-    def _mask(self, job: Job, found: Prepared) -> Source | None:
+    def _mask(self, job: Job, found: JobInputs) -> Source | None:
         if job.importance is None:
             return None
-        return found.mask if self._carry or is_remote(job.importance) else str(job.importance)
+        return found.mask if is_remote(job.importance) else str(job.importance)
 
     def _settle(self, outcome: Outcome) -> None:
-        """Write what is to be written, note it, and report it."""
+        """Write a result if the worker did not, and note and report the outcome."""
         job, key = self.jobs[outcome.number], self._keys.pop(outcome.number)
         before = self._made_before.pop(outcome.number, None)
         status: Status = "skipped" if outcome.status == "measured" else outcome.status
@@ -306,7 +303,7 @@ class Batch:
         except OutputError as failed:
             status, error = "failed", failure(failed, str(job.image), str(job.output))
         if status == "failed" and outcome.key:
-            with contextlib.suppress(OutputError):  # said once is enough
+            with contextlib.suppress(OutputError):  # reported once is enough
                 self.manifest.append(
                     Entry(
                         self.manifest.name(job.output),
@@ -319,9 +316,11 @@ class Batch:
         if self._reports and status != "failed":
             self._reports.keep(job.output, outcome)
         self.manifest.release(job.output, key)
-        self._hear(Report(job, status, before.figures if before else outcome.figures, error))
+        self._on_report(JobReport(job, status, before.figures if before else outcome.figures, error))
 
     def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
         name, image = self.manifest.name(job.output), str(job.image)
-        key = STOPPED if outcome.status == "stopped" else outcome.key  # ours, and no result of the job
+        key = (
+            STOPPED if outcome.status == "stopped" else outcome.key
+        )  # written by us, but not the job's result
         self.manifest.append(Entry(name, key, event, outcome.digest, image, figures=outcome.figures))

@@ -1,4 +1,4 @@
-"""What a batch shows: a line for each image as it ends, a bar for all of them, a table at the end."""
+"""Show a batch: a line for each image when it is done, a progress bar, and a table at the end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from warpsplat.batch.run import Report
+from warpsplat.batch.run import JobReport
 from warpsplat.batch.totals import Totals
 from warpsplat.cli.echo import echo
 from warpsplat.cli.run import SUBJECTS
@@ -19,17 +19,17 @@ from warpsplat.errors import printable
 from warpsplat.run.formats import is_picture
 
 NAMED = 20
-"""Most files that one message names."""
+"""Maximum number of files that one message names."""
 
 CLEAR = "\r\x1b[2K"
-"""To a terminal: empties the line."""
+"""Clears the line of a terminal."""
 
 WIDTH = 30
-"""Of the bar [characters]."""
+"""Width of the bar [characters]."""
 
 
 class Show:
-    """Listens to a batch."""
+    """Prints the progress of a batch."""
 
     def __init__(self, total: int, *, quiet: bool, as_json: bool) -> None:
         self.totals = Totals(total)
@@ -39,7 +39,7 @@ class Show:
         self._begun: float | None = None
         self._seen = 0
 
-    def hear(self, report: Report) -> None:
+    def add(self, report: JobReport) -> None:
         """Show what became of a job."""
         self.totals.add(report)
         self._seen += 1
@@ -58,7 +58,7 @@ class Show:
         self._draw()
 
     def advance(self, number: int, part: float) -> None:
-        """Show how far a job is."""
+        """Update the fraction of a job that is done."""
         self._begun = self._begun or time.monotonic()
         self._parts[number] = part
         self._draw()
@@ -76,7 +76,7 @@ class Show:
         click.echo(bar, nl=False, err=True)
 
     def _seconds_left(self) -> int | None:
-        """If work goes on as it did; None before there was any."""
+        """Estimate the remaining time from the rate so far; None before any work."""
         done = sum(self._parts.values())
         if self._begun is None or not done:
             return None
@@ -109,8 +109,8 @@ class Show:
                 echo(f"  and {len(failures) - NAMED} more", err=True)
 
 
-def line(report: Report) -> str:
-    """One line on a job that did not fail, for people."""
+def line(report: JobReport) -> str:
+    """Return one line about a job that did not fail."""
     output, figures = report.job.output, report.figures
     name = printable(str(output))
     if report.status == "skipped":

@@ -6,18 +6,18 @@ import statistics
 from dataclasses import dataclass, field
 from typing import Any
 
-from warpsplat.batch.run import Report
+from warpsplat.batch.run import JobReport
 
 COUNTED = ("made", "skipped", "failed")
-"""What every summary counts ..."""
+"""Always in a summary."""
 
 RARE = ("stopped", "planned")
-"""... and what only one that has some."""
+"""In a summary if there are some."""
 
 
 @dataclass
 class Totals:
-    """Sums, as reports come in."""
+    """Sums over the reports so far."""
 
     asked: int
     """Images of the batch."""
@@ -31,7 +31,7 @@ class Totals:
     missed: bool = False
     """Whether an image that was made now misses a goal."""
 
-    def add(self, report: Report) -> None:
+    def add(self, report: JobReport) -> None:
         """Count a report."""
         self.counts[report.status] += 1
         if report.error:
@@ -45,13 +45,13 @@ class Totals:
             self.missed |= bool(figures.get("missed"))
 
     def shown_counts(self) -> dict[str, int]:
-        """The counts that are worth a word."""
+        """Return the counts to show."""
         counts = {**self.counts, "not started": self.not_started}
         return {name: n for name, n in counts.items() if n or name in COUNTED}
 
     @property
     def not_started(self) -> int:
-        """Images of which nothing was reported: those that an interrupted batch did not come to."""
+        """Images that an interrupted batch did not get to."""
         return self.asked - sum(self.counts.values())
 
     def as_dict(self) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class Totals:
         }
 
     def rows(self) -> list[tuple[str, ...]]:
-        """A table: what, mean, median, sum."""
+        """Return a table: name, mean, median, sum."""
         rows: list[tuple[str, ...]] = [("", "mean", "median", "sum")]
         if self.psnr:
             mean, median = statistics.fmean(self.psnr), statistics.median(self.psnr)

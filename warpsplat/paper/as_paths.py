@@ -1,4 +1,4 @@
-"""What paths can say of soft Gaussians: the scene that a file of the paper's own model holds.
+"""Approximate soft Gaussians by paths, for the file.
 
 A path is equally opaque throughout and ends at its outline; a soft shape is neither. Its path has the opacity
 and, of strokes, the width that keep the integrals of the coverage and of its square: of all boxes the nearest
@@ -35,21 +35,21 @@ LEVELS = np.linspace(0, 1, 201)
 
 
 def _row_profile(opacity: Floats, distance: Floats) -> Floats:
-    """Coverage at a distance from a row of Gaussians [standard deviations], shape (opacity, distance)."""
+    """Return coverages at distances [standard deviations] from a row of Gaussians: (opacity, distance)."""
     along = np.arange(-REACH, REACH + 1) / constants.SPREAD
     g = elementary.exp(-0.5 * (along[:, None] ** 2 + distance**2))
     return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None, None] * g, axis=1))
 
 
 def _plateau(opacity: Floats) -> Floats:
-    """Coverage well inside a grid of Gaussians."""
+    """Return the coverage well inside a grid of Gaussians."""
     along = np.arange(-REACH, REACH + 1) / constants.SPREAD
     g = elementary.exp(-0.5 * (along[:, None] ** 2 + along**2)).ravel()
     return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None] * g, axis=1))
 
 
 def _outlines(scene: Scene) -> FloatArray:
-    """The scene's points, those of fills moved outwards by ``OUTSET``: shape (point, 2)."""
+    """Return the scene's points, those of fills moved outwards by ``OUTSET``: shape (point, 2)."""
     points = scene.points.copy()
     for group in scene.alike():
         if group.kind != Kind.FILL:
@@ -66,7 +66,7 @@ def _outlines(scene: Scene) -> FloatArray:
 
 
 def as_paths(scene: Scene, softness: float) -> Scene:
-    """``scene`` of soft Gaussians of at least ``softness`` [canvas units], as paths look like it."""
+    """Return paths that look like a scene of Gaussians of at least ``softness`` [canvas units]."""
     distance = np.linspace(-4, 4, 161)
     profile = _row_profile(LEVELS, distance)
     mass, energy = profile.sum(axis=1), np.square(profile).sum(axis=1)

@@ -17,7 +17,7 @@ from warpsplat.scene import Kind
 
 @dataclass
 class GridBuffers:
-    """What the stage owns."""
+    """Buffers of the stage."""
 
     shape_stations: wp.array = buffer(wp.int32, "shapes")
     """Gaussians along each shape."""
@@ -55,7 +55,7 @@ class GridBuffers:
 
 @dataclass(frozen=True)
 class GridKernels:
-    """What puts one kind of shape on a grid, and the adjoint."""
+    """Kernels that put one kind of shape on a grid, and their adjoints."""
 
     plan: wp.Kernel
     forward: wp.Kernel
@@ -80,7 +80,7 @@ class Grid:
     """Puts a grid of Gaussians along and across each shape."""
 
     owned: type[GridBuffers] = GridBuffers
-    """Of which kind its buffers are."""
+    """Class of its buffers."""
 
     def __init__(
         self,
@@ -105,7 +105,7 @@ class Grid:
         self.buffers = backend.allocate(self.owned, {"shapes": parameters.shape_count, "gaussians": capacity})
 
     def samples(self) -> dict[str, wp.array]:
-        """What tiles are found by: ``bins.rectangles``'s parameters."""
+        """Return the parameters of ``bins.rectangles``."""
         b = self.buffers
         return {
             "sample_first": b.gaussian_first,

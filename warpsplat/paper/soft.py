@@ -16,14 +16,14 @@ from warpsplat.scene import GRADIENTS, Kind
 
 @dataclass
 class SoftBuffers(GridBuffers):
-    """What the stage owns."""
+    """Buffers of the stage."""
 
     strength: wp.array = buffer(wp.float32, "gaussians")
     """Opacity of each Gaussian."""
     strength_grad: wp.array = buffer(wp.float32, "gaussians")
     gaussian_width_grad: wp.array = buffer(wp.float32, "gaussians")
     paint_opacities: wp.array = buffer(wp.float32, "shapes")
-    """1: what compositing takes for the shapes' opacities, which are in their coverages."""
+    """All 1, for compositing: the shapes' opacities are in their coverages."""
 
 
 class SoftGrid(Grid):

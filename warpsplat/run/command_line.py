@@ -1,4 +1,4 @@
-"""Settings as the command line that gives them."""
+"""Write settings as a command line."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from warpsplat.run.options import OPTIONS
 from warpsplat.scene import Kind
 
 REFINE_ITERATIONS = 200
-"""Steps of ``warpsplat refine`` that are not given."""
+"""Default number of steps of ``warpsplat refine``."""
 
 
 def vectorize_command(settings: Settings, image: str, output: str, *further: str) -> str:
-    """The line that makes ``output`` of ``image`` with ``settings``; ``further``: what it says besides.
+    """Return the command that makes ``output`` of ``image`` with ``settings``; ``further``: words to add.
 
-    Where no flags say the same, as of settings that only batch files have, a comment tells so.
+    If flags cannot express them, as for settings that only batch files have, a comment says so.
     """
     quality, given = flags_of(settings)
     line = shlex.join(
@@ -39,7 +39,7 @@ def vectorize_command(settings: Settings, image: str, output: str, *further: str
 def several_command(
     settings: Settings, numbers: Sequence[int], image: str, output: os.PathLike[str] | None, *further: str
 ) -> str:
-    """The line that makes the files of several ``numbers`` of shapes; without an ``output``, here."""
+    """Return the command that makes files of several ``numbers`` of shapes; without an ``output``, here."""
     quality, given = flags_of(replace(settings, curves=max(numbers), simplify=False))
     words = _words(quality, {**given, "curves": ",".join(map(str, numbers))})
     where = () if output is None else ("-o", os.fspath(output))
@@ -47,7 +47,7 @@ def several_command(
 
 
 def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:
-    """The line that makes ``output`` of ``svg`` and ``image``."""
+    """Return the command that makes ``output`` of ``svg`` and ``image``."""
     default = make_settings(iterations=REFINE_ITERATIONS)
     names = ("iterations", *(option.field for option in OPTIONS if option.refine))
     given = {
@@ -60,12 +60,12 @@ def refine_command(settings: Settings, svg: str, image: str, output: str, *furth
 
 
 def as_path(name: str) -> str:
-    """A file's name that no command takes for a flag."""
+    """Return a file name that is not parsed as a flag."""
     return f"./{name}" if name.startswith("-") and name != "-" else name
 
 
 def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:
-    """The effort, and what else ``make_settings`` has to be given for ``settings``: as little as there is."""
+    """Return the quality and the fewest other arguments of ``make_settings`` that give ``settings``."""
     choices = [(quality, _given(settings, quality)) for quality in QUALITIES]
     exact = [one for one in choices if _settings(*one) == settings]
     return min(exact or choices, key=lambda one: (len(one[1]), one[0] != DEFAULT_QUALITY))
@@ -91,7 +91,7 @@ def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
 
 
 def _settings(quality: Quality, given: dict[str, Any]) -> Settings | None:
-    """Return what these make; None if they contradict each other."""
+    """Return the settings, or None if the arguments do not go together."""
     try:
         return make_settings(quality, **given)
     except UsageError:

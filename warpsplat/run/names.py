@@ -1,4 +1,4 @@
-"""What results are called, and whether they can be written: found out before the work."""
+"""Name results, and check before the run that they can be written."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from warpsplat.run.formats import ENDINGS, check_format
 from warpsplat.run.options import KINDS
 
 FIELD = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
-"""What braces mean in the name of a result: themselves, doubled, or a field."""
+"""Braces in the name of a result: doubled, a field, or unbalanced."""
 
 LIKELY = "out/{stem}-{curves}.svg"
-"""An example, for messages."""
+"""An example for messages."""
 
 
 Place = Callable[[str], UsageError]
@@ -38,25 +38,25 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Wanted:
-    """An image, its settings, and what is said of its result's name."""
+    """An image, its settings, and the requested name of its result."""
 
     image: Found
     output: Path | None
     """A folder, a name or a pattern of names (``is_pattern``); None: beside the image."""
     settings: Settings
     fields: Mapping[str, Any]
-    """What names may hold, besides the image's own."""
+    """Fields that names may contain, besides the image's."""
     place: Place
-    """Where the name was given."""
+    """Makes errors that say where the name was given."""
 
 
 def is_pattern(output: str) -> bool:
-    """Whether an output says the name of a file, not that of a folder."""
+    """Return whether an output is a file name or pattern, not a folder."""
     return "{" in output or "}" in output or output.lower().endswith(ENDINGS)
 
 
 def root_of(output: Path) -> Path:
-    """The folder that all results of an output lie in: what stands before the first field."""
+    """Return the folder of all results of an output: the part before the first field."""
     if not is_pattern(str(output)):
         return output
     root = output.parent
@@ -66,20 +66,19 @@ def root_of(output: Path) -> Path:
 
 
 def fields_of(settings: Settings, given: Mapping[str, Any]) -> dict[str, Any]:
-    """What names may hold: settings as they were given, or as they are."""
+    """Return the fields that names may contain: settings as given, or their values."""
     own = {key.replace("_", "-"): value for key, value in vars(settings).items()}
     own["kind"] = next(name for name, kind in KINDS.items() if kind == settings.kind)
     return {**own, "quality": DEFAULT_QUALITY, **given}
 
 
 def name_results(wanted: Sequence[Wanted], masks: Iterable[Path] = ()) -> list[Path]:
-    """The path of each result; no two may have one, and none that of an image, or of one of the ``masks``.
+    """Return the path of each result; all are different, and none is an image or one of the ``masks``.
 
-    Where a folder is all that is said, results have the image's name: of a.png and a.jpg in one folder with
-    its ending.
+    In a folder, a result has the image's name, including its ending if there are both a.png and a.jpg.
 
     Raises:
-        UsageError: an unknown field, or results that would lie in one place.
+        UsageError: an unknown field, or several results with one path.
     """
     folders = [item.output if item.output else item.image.path.parent for item in wanted]
     patterns = [item.output is not None and is_pattern(str(item.output)) for item in wanted]
@@ -110,10 +109,10 @@ def name_results(wanted: Sequence[Wanted], masks: Iterable[Path] = ()) -> list[P
 
 
 def filled_in(item: Wanted) -> Path:
-    """The name of a result, by its pattern.
+    """Return the name of a result by its pattern.
 
     Raises:
-        UsageError: a field that there is not.
+        UsageError: an unknown field.
     """
     path, root = item.image
     away = is_remote(path)
@@ -137,7 +136,7 @@ def filled_in(item: Wanted) -> Path:
 
 
 def _real(path: Path) -> str:
-    """The file itself, behind all links."""
+    """Return the path without symbolic links."""
     return str(path) if is_remote(path) else os.path.realpath(path)
 
 
@@ -148,11 +147,11 @@ def _text(value: Any) -> str:
 
 
 def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
-    """Find out before the work whether every result can be written.
+    """Check before the run that every result can be written.
 
     Raises:
-        UsageError: a folder that is none, cannot be written or cannot be made, a name that is too long, a
-            result that is a folder, a pipe, a device or a loop of links, or one that needs a package.
+        UsageError: a folder that is a file, or cannot be written or made, a name that is too long, a
+            result that is a folder, a pipe, a device or a loop of links, or that needs a missing package.
     """
     usable: set[Path] = set()
     for place, output in zip(places, outputs, strict=True):
@@ -176,7 +175,7 @@ def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
 
 
 def _check_folder(folder: Path) -> None:
-    """Check that ``folder`` can be written, or made."""
+    """Check that ``folder`` can be written or made."""
     if folder.is_dir():
         check_folder(folder)
         return
@@ -191,7 +190,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _check_names(folder: Path, name: str = "") -> None:
-    """Check the lengths of names in a folder that is yet to be made."""
+    """Check the lengths of names in a folder that does not exist yet."""
     above = folder
     while not above.is_dir():
         above = above.parent

@@ -1,4 +1,4 @@
-"""Times the stages of a training step on a stated random scene."""
+"""Time the stages of a training step on a random scene."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SMOOTH = 8.0
 
 
 def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float, seed: int) -> Scene:
-    """Shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
+    """Return shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
     rng = np.random.default_rng(seed)
     centres = rng.uniform(0, [width, height], (curves, 2))
     radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > LARGE else 1.0)
@@ -66,13 +66,13 @@ def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float
 
 
 def bench_target(width: int, height: int, seed: int) -> FloatArray:
-    """Smooth noise: sRGB in [0, 1], shape (height, width, 3)."""
+    """Return smooth noise: sRGB in [0, 1], shape (height, width, 3)."""
     noise = np.random.default_rng(seed).uniform(0, 1, (height, width, 3)).astype(np.float32)
     return np.asarray(cv2.GaussianBlur(noise, (0, 0), SMOOTH), np.float32)
 
 
 def peak_memory(device: wp.Device) -> int | None:
-    """Largest memory so far [bytes]: of the process, or of the device's pool; None where it is not known."""
+    """Return the peak memory so far [bytes] of the process, or of the device's pool; None if unknown."""
     if device.is_cuda:
         return int(wp.get_mempool_used_mem_high(device)) if wp.is_mempool_enabled(device) else None
     try:
@@ -151,7 +151,7 @@ def _through_torch(own: Renderer, repeats: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Times:
-    """What steps took [s], one entry a repeat."""
+    """Times of steps [s], one entry a repeat."""
 
     steps: list[float]
     both: list[float]
@@ -160,7 +160,7 @@ class Times:
     """By stage and name."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Medians, lows and highs [ms]."""
+        """Return medians, lows and highs [ms]."""
         stages = {
             stage: [sum(v for k, v in kernels.items() if k[0] == stage) for kernels in self.kernels]
             for stage in STAGES

@@ -1,4 +1,4 @@
-"""Times a forward and backward pass through PyTorch against the renderer's own."""
+"""Time a forward and backward pass through PyTorch against the renderer's own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpsplat.torch import SceneTensors, render
 
 
 def bench_torch(own: Renderer, repeats: int) -> dict[str, Any]:
-    """Time ``repeats`` passes of each, by turns, after a warm-up.
+    """Time ``repeats`` passes of each, alternately, after a warm-up.
 
     Args:
         own: renders the scene, as a step does it.

@@ -1,4 +1,4 @@
-"""An image vectorized by us and by another program, and the files of both measured alike."""
+"""Vectorize an image by warpsplat and by another program, and measure both files alike."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Row:
     """What went wrong, as one line."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return values for JSON."""
         figures = self.score.as_dict() if self.score else {"error": self.error}
         names = {"image": self.image, "program": self.program, "setting": self.setting}
         times = {"seconds": round(self.seconds, 2), "cpu_seconds": round(self.cpu_seconds, 2)}
@@ -56,7 +56,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All rows, and what they were made with."""
+    """All rows, and how they were made."""
 
     rows: Sequence[Row]
     settings: Settings
@@ -64,14 +64,14 @@ class Comparison:
     tracer: Tracer
 
     def by_image(self) -> dict[str, list[Row]]:
-        """The rows of each image."""
+        """Return the rows of each image."""
         found: dict[str, list[Row]] = {}
         for row in self.rows:
             found.setdefault(row.image, []).append(row)
         return found
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return values for JSON."""
         ours = {
             "version": __version__,
             "kind": self.settings.kind.name.lower(),
@@ -107,13 +107,13 @@ def compare(
 
 
 class Watch:
-    """Measures time from when it is made."""
+    """Measures time since its creation."""
 
     def __init__(self) -> None:
         self.begin = time.monotonic(), time.process_time()
 
     def read(self) -> tuple[float, float]:
-        """Seconds since then on the clock, and by the processor."""
+        """Return the wall time and the processor time since then [s]."""
         return time.monotonic() - self.begin[0], time.process_time() - self.begin[1]
 
 
@@ -159,7 +159,7 @@ def their_row(image: str, target: FloatArray, png: bytes, tracer: Tracer, settin
 
 
 def warm_up(settings: Settings, backend: Backend) -> None:
-    """Load the kernels that a run needs, compiled where they must be: no row's seconds are to hold that."""
+    """Load or compile the kernels of a run, so that no row's time includes that."""
     y, x = np.mgrid[:64, :64].astype(np.float32) / 64
     target = np.stack([y, x, x * y], axis=2)
     quick = make_settings(kind=settings.kind, renderer=settings.renderer, curves=8, iterations=60)

@@ -1,4 +1,4 @@
-"""Rows of a comparison as tables and as a plot."""
+"""Tables and a plot of a comparison."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ COLUMNS: dict[str, tuple[str, Callable[[float], str]]] = {
 
 
 def figures(row: Row) -> Figures:
-    """What was measured; nothing of a row that failed."""
+    """Return the figures of a row; none if it failed."""
     if row.score is None:
         return {}
     return {**asdict(row.score), "seconds": row.seconds, "cpu_seconds": row.cpu_seconds}
 
 
 def means(found: Comparison) -> list[tuple[str, str, Figures]]:
-    """Program, setting, and its means, of those settings that have figures of every image."""
+    """Return program, setting and mean figures of the settings that succeeded on every image."""
     count = len(found.by_image())
     groups: dict[tuple[str, str], list[Figures]] = {}
     for row in found.rows:
@@ -65,7 +65,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def table(entries: Sequence[tuple[str, str, Figures]]) -> str:
-    """Markdown that can be read as it is: columns have one width. Those without a figure are left out."""
+    """Return aligned Markdown; columns without any figure are left out."""
     shown = [name for name in COLUMNS if any(values.get(name) is not None for *_, values in entries)]
     cells = [["program", "setting", *(COLUMNS[name][0] for name in shown)]]
     for program, setting, values in entries:
@@ -77,14 +77,14 @@ def table(entries: Sequence[tuple[str, str, Figures]]) -> str:
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
-    """One line of a table: two columns of words, then numbers."""
+    """Return a line of a table: two columns of words, then numbers."""
     words = map(str.ljust, cells[:2], widths[:2])
     numbers = map(str.rjust, cells[2:], widths[2:])
     return f"| {' | '.join([*words, *numbers])} |"
 
 
 def markdown(found: Comparison) -> str:
-    """All tables: image by image, the means of several, and what the settings stand for."""
+    """Return all tables: each image, the means of several, and the meaning of settings."""
     parts = []
     images = found.by_image()
     for image, rows in images.items():
@@ -103,7 +103,7 @@ def markdown(found: Comparison) -> str:
 
 
 def options_text(options: Options) -> str:
-    """A tracer's options for people."""
+    """Return a tracer's options as text."""
     return ", ".join(f"{name} {value}" for name, value in options.items()) or "none"
 
 
@@ -137,7 +137,7 @@ def plot(found: Comparison) -> bytes:
 
 
 def draw_panel(axes: Any, image: str, rows: Sequence[Row], tracer: str) -> None:
-    """One image: our numbers of shapes as a line, the tracer's settings as points."""
+    """Draw the panel of an image: our numbers of shapes as a line, the tracer's settings as points."""
     for program, style in ((OURS, "o-"), (tracer, "s")):
         points = [
             (row.score.bytes / 1000, row.score.psnr, row.setting)

@@ -1,4 +1,4 @@
-"""What a run needs, looked at piece by piece. What may be broken is imported only when it is looked at."""
+"""Check what a run needs, piece by piece; each piece is imported in its own check, as it may be broken."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MODULES = {
     "pyyaml": "yaml",
     "resvg-py": "resvg_py",
 }
-"""What packages are imported as, where that is not their name."""
+"""Package -> module, where the names differ."""
 
 EXTRAS = {
     "torch": ("torch", "warpsplat.torch, and code written for DiffVG"),
@@ -38,38 +38,38 @@ EXTRAS = {
     "serve": ("starlette", "warpsplat serve"),
     "remote": ("upath", "images and results behind URLs"),
 }
-"""Extra -> its package, and what it is for."""
+"""Extra -> its module, and what it is for."""
 
 LEAST_MEMORY = 1.0
-"""Of the machine, free [GB]: what a photograph of some megapixels takes."""
+"""Free memory that a photograph of some megapixels needs [GB]."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """What was found of one thing."""
+    """Result of one check."""
 
     name: str
     status: Status
     text: str
-    """One line, for people."""
+    """One line."""
     hint: str = ""
     """What to do about it."""
     values: dict[str, Any] = field(default_factory=dict)
-    """The same for programs."""
+    """The same as data."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return values for JSON."""
         found = {"name": self.name, "status": self.status, "text": self.text, **self.values}
         return found | ({"hint": self.hint} if self.hint else {})
 
 
 def checks(device: str = "auto") -> Iterator[Check]:
-    """All that is looked at, in an order in which the first broken thing explains those after it.
+    """Yield all checks, ordered so that the first broken thing explains later ones.
 
     Args:
-        device: that the self-test runs on.
+        device: where the self-test runs.
     """
-    looks: tuple[tuple[str, Callable[[], Check]], ...] = (
+    tests: tuple[tuple[str, Callable[[], Check]], ...] = (
         ("python", check_python),
         ("packages", check_packages),
         ("extras", check_extras),
@@ -80,17 +80,17 @@ def checks(device: str = "auto") -> Iterator[Check]:
         ("self-test", lambda: check_itself(device)),
         ("adjoint", lambda: check_adjoint(device)),
     )
-    for name, look in looks:
+    for name, test in tests:
         try:
-            yield look()
+            yield test()
         except KeyboardInterrupt:
             raise
-        except BaseException as error:  # whatever is broken: to find it is what this is for
+        except BaseException as error:  # broken packages raise anything
             yield Check(name, "broken", explain(error)[0])
 
 
 def check_python() -> Check:
-    """The interpreter, the program and the system."""
+    """Check the interpreter, the program and the system."""
     values = {"warpsplat": __version__, "python": platform.python_version(), "executable": sys.executable}
     values["system"] = f"{platform.system()} {platform.release()} {platform.machine()}"
     text = f"warpsplat {__version__}, Python {values['python']} ({sys.executable}) on {values['system']}"
@@ -100,7 +100,7 @@ def check_python() -> Check:
 
 
 def needed() -> list[str]:
-    """Packages that warpsplat cannot do without, as it was installed."""
+    """Return the packages that warpsplat requires, as it was installed."""
     try:
         requires = importlib.metadata.requires("warpsplat") or []
     except importlib.metadata.PackageNotFoundError:  # a checkout that was not installed
@@ -110,7 +110,7 @@ def needed() -> list[str]:
 
 
 def check_packages() -> Check:
-    """Each is imported: that it is installed says little."""
+    """Check that each required package can be imported."""
     versions: dict[str, str] = {}
     wrong: list[str] = []
     for package in needed():
@@ -134,7 +134,7 @@ def check_packages() -> Check:
 
 
 def version_of(package: str) -> str | None:
-    """Of what is installed; None: it is not."""
+    """Return the version of an installed package, or None."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
@@ -142,7 +142,7 @@ def version_of(package: str) -> str | None:
 
 
 def check_extras() -> Check:
-    """What is not needed, but of use."""
+    """Check the optional packages."""
     found = {extra: version_of(package) for extra, (package, _) in EXTRAS.items()}
     there = [f"{extra} ({EXTRAS[extra][0]} {version})" for extra, version in found.items() if version]
     missing = [f"{extra} (for {EXTRAS[extra][1]})" for extra, version in found.items() if not version]
@@ -151,7 +151,7 @@ def check_extras() -> Check:
 
 
 def check_devices() -> Check:
-    """What Warp can compute on."""
+    """Check the devices that Warp finds."""
     import warp as wp
 
     from warpsplat.rendering.device import choose_device, start_warp
@@ -181,7 +181,7 @@ def check_devices() -> Check:
 
 
 def check_machine() -> Check:
-    """Cores and memory."""
+    """Check cores and memory."""
     from warpsplat.native import available_cores, free_memory
 
     values: dict[str, Any] = {"cpu_threads": available_cores(), "free_memory": free_memory()}
@@ -195,7 +195,7 @@ def check_machine() -> Check:
 
 
 def check_cache() -> Check:
-    """Where compiled kernels are kept."""
+    """Check the folder of compiled kernels."""
     import warp as wp
 
     from warpsplat.rendering.kernel_cache import damaged
@@ -221,7 +221,7 @@ def check_cache() -> Check:
 
 
 def check_viewer() -> Check:
-    """The renderer that files are measured with."""
+    """Check resvg, which files are measured with."""
     from warpsplat.svg.viewer import render_svg
 
     head = '<svg xmlns="http://www.w3.org/2000/svg" width="2" height="2">'
@@ -242,7 +242,7 @@ NEAR_PSNR = 1.0
 
 
 def check_itself(device: str) -> Check:
-    """A tiny run, whose figure is known."""
+    """Check a tiny run, whose figure is known."""
     import numpy as np
     import warp as wp
 
@@ -271,7 +271,7 @@ MOST_DIFFERENCE = 0.02
 
 
 def check_adjoint(device: str) -> Check:
-    """A derivative of a picture against a difference of pictures."""
+    """Check a derivative of an image against a difference of images."""
     import numpy as np
 
     from warpsplat.api.images import starting_scene

@@ -15,7 +15,7 @@ WARM_UP = 3
 
 @dataclass(frozen=True)
 class Spread:
-    """Of repeated timings [ms]."""
+    """Spread of repeated timings [ms]."""
 
     median: float
     low: float
@@ -23,12 +23,12 @@ class Spread:
 
     @staticmethod
     def of(seconds: list[float]) -> Spread:
-        """Median, lowest and highest."""
+        """Return median, lowest and highest."""
         return Spread(*(round(1e3 * f(seconds), 3) for f in (statistics.median, min, max)))
 
 
 def timed(device: wp.Device, work: Callable[[], object]) -> float:
-    """How long ``work`` takes, the device's part included [s]."""
+    """Return how long ``work`` takes [s], including the device."""
     begin = time.perf_counter()
     work()
     wp.synchronize_device(device)

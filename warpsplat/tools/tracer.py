@@ -1,4 +1,4 @@
-"""Programs to compare with: how each is called, and at which of its settings."""
+"""Programs to compare with: how to call each, and with which settings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from warpsplat.errors import UsageError
 from warpsplat.native import messages_hidden
 
 Options = Mapping[str, str | int | float]
-"""What a tracer is called with, by its own names."""
+"""Arguments of a tracer, by its own names."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Tracer:
     settings: Mapping[str, Options]
     """Options by the name that tables and files give them."""
     trace: Callable[[bytes, Options], str]
-    """PNG, options -> SVG. Raises whatever it likes."""
+    """PNG, options -> SVG. May raise anything."""
 
 
 POLYGON: Options = {"mode": "polygon", "path_precision": 0}
@@ -59,7 +59,7 @@ def require(module: str) -> Any:
 
 
 def vtracer() -> Tracer:
-    """VTracer (visioncortex), by its Python package.
+    """Return VTracer (visioncortex), by its Python package.
 
     Raises:
         UsageError: the package is not installed.

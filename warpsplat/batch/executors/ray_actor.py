@@ -59,10 +59,10 @@ class Actor:
         self._stop.clear()
         self._done = 0.0
 
-        def report(progress: Progress) -> None:
+        def on_progress(progress: Progress) -> None:
             self._done = progress.work
 
-        return do(task, self._stop.is_set, report)
+        return do(task, self._stop.is_set, on_progress)
 
     def stop(self) -> None:
         """End the task in work, with the best so far."""

@@ -41,11 +41,11 @@ class Serial:
             yield self._done(task, stop, advance)
 
     def _done(self, task: Task, stop: Stop, advance: Advance) -> Outcome:
-        def report(progress: Progress) -> None:
+        def on_progress(progress: Progress) -> None:
             advance(task.number, progress.work)
 
         try:
             with self._around():
-                return do(task, stop, report)
+                return do(task, stop, on_progress)
         except KeyboardInterrupt:
             return Outcome(task.number, "stopped")

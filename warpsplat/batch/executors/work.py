@@ -1,4 +1,4 @@
-"""Doing one task, in whatever process: bytes in, a result and its figures out."""
+"""Do one task, in whatever process: bytes in, a result and its figures out."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from warpsplat.run.result import Result
 from warpsplat.run.vectorize import vectorize_image
 from warpsplat.svg.inspect import svg_text
 
-Report = Callable[[Progress], None]
+OnProgress = Callable[[Progress], None]
 
 
-def do(task: Task, stop: Stop | None = None, report: Report | None = None) -> Outcome:
-    """Do ``task``; whatever goes wrong is in the outcome.
+def do(task: Task, stop: Stop | None = None, on_progress: OnProgress | None = None) -> Outcome:
+    """Do ``task``, and return any error in its outcome.
 
     Args:
         task: what to do.
         stop: asked after every step; once true, the shapes as they are make the file.
-        report: called every few steps.
+        on_progress: called every few steps.
 
     Raises:
         KeyboardInterrupt: by a signal's handler, with nothing of this image to save.
@@ -47,7 +47,7 @@ def do(task: Task, stop: Stop | None = None, report: Report | None = None) -> Ou
         key = job_key(task.settings, image, mask)
         if task.measure:
             return _measured(task, key, image)
-        return _made(task, key, image, stop, report)
+        return _made(task, key, image, stop, on_progress)
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:  # a panic of Rust code derives from no Exception
@@ -55,14 +55,14 @@ def do(task: Task, stop: Stop | None = None, report: Report | None = None) -> Ou
 
 
 def failure(error: BaseException, *names: str) -> str:
-    """What to tell a user of an error of an image, one line with the image's name, the first of ``names``."""
+    """Return one line about an error; it starts with the first of ``names`` if it contains none of them."""
     message, _ = explain(error)
     shown = [printable(name) for name in names]
     return message if any(name in message for name in shown) else f"{shown[0]}: {message}"
 
 
 def read(source: Source, what: str = "an image") -> bytes:
-    """The bytes of an image, or of ``what`` it should be.
+    """Return the bytes of an image, or of ``what`` it should be.
 
     Raises:
         ImageError: it cannot be read.
@@ -70,7 +70,7 @@ def read(source: Source, what: str = "an image") -> bytes:
     return source if isinstance(source, bytes) else read_input(Path(source), what)
 
 
-def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report | None) -> Outcome:
+def _made(task: Task, key: str, image: bytes, stop: Stop | None, on_progress: OnProgress | None) -> Outcome:
     output = Path(task.output)
     start_warp()
     backend = Backend.on(choose_device(task.device), task.threads)
@@ -85,7 +85,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
             name=task.name,
             importance=task.mask,
             keyed=True,
-            report=report,
+            report=on_progress,
             stop=stop,
         )
         made = Outcome(task.number, "made")
@@ -146,5 +146,5 @@ def _with_report(
 
 
 def digest(data: bytes) -> str:
-    """Names the bytes of a result."""
+    """Return the SHA-256 of a result."""
     return hashlib.sha256(data).hexdigest()

@@ -90,14 +90,14 @@ def _serve(channel: Connection, task: Task, workers: int) -> None:
             stopped = _received(channel) == STOP
         return stopped
 
-    def report(progress: Progress) -> None:
+    def on_progress(progress: Progress) -> None:
         nonlocal told
         now = time.monotonic()
         if now - told > PAUSE:
             told = now
             channel.send(Part(task.number, progress.work))
 
-    channel.send(do(task, stop, report))
+    channel.send(do(task, stop, on_progress))
 
 
 def _received(channel: Connection) -> object:

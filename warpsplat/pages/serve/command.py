@@ -77,7 +77,7 @@ def command(
     from warpsplat.run.options import settings_from
 
     limits = Limits(upload=parse_bytes(max_upload))
-    settings_from({"max_memory": max_memory})  # what cannot be used is said now
+    settings_from({"max_memory": max_memory})  # errors are reported now
     start_warp()
     choose_device(device)
     server = WarpsplatServer(
@@ -86,12 +86,12 @@ def command(
     if not is_loopback(host):
         risk = "others can reach it, and who has the address can use it; it is not encrypted"
         echo(f"warpsplat: --host {host}: {risk}", err=True)
-    set_verbosity(quiet=False)  # that kernels are being compiled is for the page as well
+    set_verbosity(quiet=False)  # the page shows compilation too
 
     def ready() -> None:
         echo(f"warpsplat: {server.address()} (Ctrl-C ends it)")
         if opens:
-            # Some browsers are programs of the terminal, which return when they are closed.
+            # Terminal browsers return only when they are closed.
             threading.Thread(target=webbrowser.open, args=[server.ticket()], daemon=True).start()
 
     with contextlib.closing(server), interrupt.watching():

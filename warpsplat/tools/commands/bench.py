@@ -15,7 +15,7 @@ from warpsplat.extensions import renderer_names
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """``768x512`` -> (width, height) in px.
+    """Parse ``768x512`` as (width, height) [px].
 
     Raises:
         UsageError: not a size, or one side is not between 16 and 16384.
@@ -27,13 +27,13 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def table(values: dict[str, Any], verbose: int) -> str:
-    """The figures, for people."""
+    """Return the figures as text."""
     rows = [("step", values["step"]), ("forward + backward", values["forward_backward"])]
     rows += [(f"  {name}", spread) for name, spread in values["stages"].items()]
     if verbose:
         rows += [(f"    {name}", spread) for name, spread in values["kernels"].items()]
     both = values.get("through_torch", {})
-    rows += [(f"by turns, {name}", both[name]) for name in ("own", "torch") if both]
+    rows += [(f"alternately, {name}", both[name]) for name in ("own", "torch") if both]
     memory = values["peak_memory"]
     where = values["device"] + (
         f", {values['threads']} threads" if values["device"] == "cpu" else f" ({values['device_name']})"

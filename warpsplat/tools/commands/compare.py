@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from warpsplat.tools.tracer import Tracer
 
 TABLES, FIGURES, PLOT = "comparison.md", "comparison.json", "comparison.svg"
-"""What a folder gets besides the SVGs."""
+"""Files in the folder besides the SVGs."""
 
 
 def parse_curves(text: str) -> list[int]:
-    """``64,256`` -> [64, 256], each once, from few to many.
+    """Parse ``64,256`` as [64, 256], sorted, without duplicates.
 
     Raises:
         UsageError: not whole numbers.
@@ -41,12 +41,12 @@ def parse_curves(text: str) -> list[int]:
 
 
 def svg_name(image: Path, program: str, setting: str) -> str:
-    """Name of the file that ``program`` makes of ``image`` at ``setting``."""
+    """Return the name of the file that ``program`` makes of ``image`` at ``setting``."""
     return f"{image.stem}.{program.lower()}-{setting}.svg"
 
 
 def result_names(images: Sequence[Path], settings: Sequence[Settings], tracer: Tracer) -> list[str]:
-    """Names of all files that a comparison writes."""
+    """Return the names of all files that a comparison writes."""
     from warpsplat.tools.compare import OURS
 
     made = [(OURS, str(ours.curves)) for ours in settings]
@@ -55,10 +55,10 @@ def result_names(images: Sequence[Path], settings: Sequence[Settings], tracer: T
 
 
 def prepare_folder(folder: Path, names: Sequence[str], images: Sequence[Path], *, overwrite: bool) -> None:
-    """Make the folder of the results, and find out before the work whether they can be written.
+    """Make the folder of the results, and check before the run that they can be written.
 
     Raises:
-        UsageError: they cannot, or are there already and ``overwrite`` is not given.
+        UsageError: they cannot, or exist and ``overwrite`` is not given.
     """
     from warpsplat.files.output import check_output
 
@@ -71,11 +71,11 @@ def prepare_folder(folder: Path, names: Sequence[str], images: Sequence[Path], *
 
 
 def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
-    """The bytes of all images; what cannot be read as one is found before the work.
+    """Read all images, before the run.
 
     Raises:
         ImageError: one cannot be read.
-        UsageError: two would give their results the same names.
+        UsageError: two images have the same name.
     """
     from warpsplat.files.image import load_image
     from warpsplat.files.inputs import input_name, read_input
@@ -169,7 +169,7 @@ def command(
     except Stopped as error:
         raise KeyboardInterrupt from error
     finally:
-        if rows:  # whatever cut it short, the rows that there are count
+        if rows:  # publish what there is, however it ended
             publish(Comparison(rows, settings[0], tracer), output, as_json=as_json, quiet=quiet)
 
 

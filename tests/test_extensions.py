@@ -1,0 +1,107 @@
+"""The registry of extensions, and the core without one; ``python -m tests.without`` removes a folder."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import pytest
+
+from tests import ROOT
+from tests.cli.helpers import one_line, run
+from tests.needs import WORDS
+from warpsplat import extensions
+from warpsplat.cli.hooks import Done, Hooks, RunHook, hook_options
+from warpsplat.errors import UsageError
+from warpsplat.extensions import Extension, load, load_renderer, renderer_names
+from warpsplat.fit.renderers import FitRenderer
+
+
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch) -> dict[str, Extension]:
+    """What the registry finds, to change."""
+    known = dict(extensions.extensions())
+    monkeypatch.setattr(extensions, "extensions", lambda: known)
+    monkeypatch.setattr("warpsplat.cli.hooks.extensions", lambda: known)
+    return known
+
+
+def test_all_are_found() -> None:
+    folders = {path.parent.name for path in ROOT.glob("warpsplat/*/extension.py")}
+    assert extensions.extensions().keys() <= folders <= WORDS.keys()
+
+
+@pytest.mark.parametrize("name", extensions.extensions())
+def test_what_is_declared_is_there(name: str) -> None:
+    one = extensions.extensions()[name]
+    for command in one.commands.values():
+        assert isinstance(load(command.target), click.Command)
+    assert all(isinstance(load(target), FitRenderer) for target in one.renderers.values())
+    assert all(issubclass(load(target), RunHook) for target in one.run_hooks)
+    assert all(callable(load(target)) for target in one.provides.values())
+    assert all(callable(load(f"{module}:{public}")) for public, module in one.api.items())
+    assert {*one.requires, *one.uses} <= WORDS.keys()
+
+
+def test_one_whose_requirement_is_missing_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And so are those that require it."""
+    for name, requires in (("a", ()), ("b", ("none",)), ("c", ("b",))):
+        (tmp_path / name).mkdir()
+        text = f"from warpsplat.extensions import Extension\nEXTENSION = Extension(requires={requires})\n"
+        (tmp_path / name / "extension.py").write_text(text)
+    monkeypatch.setattr(extensions, "__file__", str(tmp_path / "extensions.py"))
+    monkeypatch.setattr(extensions, "folders", extensions.folders.__wrapped__)
+    assert list(extensions.extensions.__wrapped__()) == ["a"]
+
+
+def test_an_unknown_renderer() -> None:
+    assert load_renderer("exact").exact
+    for name in ("none", "", ["exact"]):
+        with pytest.raises(UsageError, match=f"must be one of {', '.join(renderer_names())}, not"):
+            load_renderer(name)
+
+
+def test_several_images_without_batches(
+    found: dict[str, Extension], image: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found.pop("batch", None)
+    assert run("vectorize", image, image) == 2
+    assert "several images need" in one_line(capsys.readouterr().err)
+
+
+class Noting(RunHook):
+    """A hook with an option, which notes what it is called with."""
+
+    options = {"note": click.option("--note")}  # noqa: RUF012
+    noted: list[object] = []  # noqa: RUF012
+
+    def __init__(self, note: str | None) -> None:
+        self.note = note
+
+    def flag(self) -> str | None:
+        return "--note" if self.note else None
+
+    def finish(self, done: Done) -> None:
+        self.noted.append((self.note, done.command))
+
+
+def test_a_hook(found: dict[str, Extension]) -> None:
+    found.clear()
+    found["own"] = replace(Extension(), run_hooks=("tests.test_extensions:Noting",))
+
+    @click.command()
+    @hook_options("vectorize")
+    def command(note: str | None) -> None: ...
+
+    assert [parameter.name for parameter in command.params] == ["note"]
+    given = {"note": "a", "curves": 3}
+    hooks = Hooks("vectorize", given)
+    assert given == {"curves": 3}
+    hooks.check_mode("one file")
+    with pytest.raises(UsageError, match="--note takes one image"):
+        hooks.check_mode("several images")
+    hooks.finish(Done(Path("a.png"), b"", [], "a line"))
+    assert Noting.noted == [("a", "a line")]
