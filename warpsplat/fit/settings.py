@@ -427,8 +427,9 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
         if name not in known:
             raise UsageError(f"unknown setting {shown(name)}{nearest(name, known)}")
         given[name] = known[name].parsed(value)
-    preset = _preset(given)  # which changes them
-    settings = replace(preset, **given)
+    expand(given)
+    preset = preset_for(given.pop("quality", DEFAULT_QUALITY), given)
+    settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.size or settings.page or settings.units:
         from warpsplat.svg.page import check_placing  # brings what writes files
 
@@ -436,11 +437,11 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     return settings
 
 
-def _preset(given: dict[str, Any]) -> Settings:
-    """Return the settings that the ``given`` ones imply, in which shorthands become values of fields.
+def expand(given: dict[str, Any]) -> None:
+    """Replace shorthands among the ``given`` options by what they stand for, and add what options require.
 
     Raises:
-        UsageError: shorthands that contradict each other, or a value that is implied otherwise.
+        UsageError: shorthands that contradict each other.
     """
     closed, is_open = given.pop("closed", None), given.pop("open", None)
     if closed and is_open:
@@ -451,26 +452,33 @@ def _preset(given: dict[str, Any]) -> Settings:
         given.setdefault("levels", levels_of(given.get("curves", Settings.curves)))
     if given.get("levels"):  # the last of them is the whole
         given.setdefault("curves", given["levels"][-1])
-    quality = given.pop("quality", DEFAULT_QUALITY)
+    if given.get("colors") or given.get("palette"):  # what shines through would make further colours
+        given["opaque"] = True
+
+
+def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
+    """Return the defaults that suit the ``given`` options, and all rates.
+
+    Raises:
+        UsageError: an option needs another value of one that is given.
+    """
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     rates = dict(preset.rates)
     renderer = given.get("renderer", "exact")
     if renderer != "exact":  # Gaussians lie along cubics
-        if given.setdefault("basis", Basis.CUBIC) != Basis.CUBIC:
+        if given.get("basis", Basis.CUBIC) != Basis.CUBIC:
             raise UsageError(f"renderer {renderer} needs the basis cubic")
-        preset = replace(preset, iterations=round(SPLAT_SHARE * preset.iterations))
+        iterations = round(SPLAT_SHARE * preset.iterations)
+        preset = replace(preset, iterations=iterations, basis=Basis.CUBIC)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if renderer == "gaussian":  # its own render is what counts, by its squared error
         preset = replace(preset, order="area", texture=0.0, viewer=False)
-    is_limited = bool(given.get("colors") or given.get("palette"))
-    if is_limited:  # what lies below would make further colours
-        given["opaque"] = True
     if given.get("opaque"):
         rates["opacities"] = 0.0
     if given.get("paint", "flat") != "flat":  # colours and frames can do the same for fewer bytes
         rates |= {"stop_opacities": 0.0, "stop_offsets": 0.0}
-    rates |= given.pop("rates", {})
-    if is_limited:  # colours are chosen, not trained
+    rates |= given.get("rates", {})
+    if given.get("colors") or given.get("palette"):  # colours are chosen, not trained
         rates["colors"] = 0.0
     return replace(preset, rates=rates)

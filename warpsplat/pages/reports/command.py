@@ -9,14 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpsplat.errors import UsageError
-from warpsplat.fit.settings import (
-    DEFAULT_QUALITY,
-    QUALITIES,
-    Quality,
-    Settings,
-    levels_of,
-    make_settings,
-)
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Quality, Settings, levels_of, make_settings
 from warpsplat.run.options import OPTIONS
 from warpsplat.scene import Kind
 
@@ -25,9 +18,9 @@ REFINE_ITERATIONS = 200
 
 
 def vectorize_command(settings: Settings, image: str, output: str, *further: str) -> str:
-    """The line that makes ``output`` of ``image`` with ``settings``; ``further``: what it says besides.
+    """Return the line that makes ``output`` of ``image`` with ``settings``; ``further``: further words.
 
-    Where no flags say the same, as of settings that only batch files have, a comment tells so.
+    Where no flags can express them, as for keys that only batch files have, it ends with a comment.
     """
     quality, given = flags_of(settings)
     line = shlex.join(
@@ -39,7 +32,7 @@ def vectorize_command(settings: Settings, image: str, output: str, *further: str
 def several_command(
     settings: Settings, numbers: Sequence[int], image: str, output: os.PathLike[str] | None, *further: str
 ) -> str:
-    """The line that makes the files of several ``numbers`` of shapes; without an ``output``, here."""
+    """Return the line that makes files of several ``numbers`` of shapes; without an ``output``, here."""
     quality, given = flags_of(replace(settings, curves=max(numbers), simplify=False))
     words = _words(quality, {**given, "curves": ",".join(map(str, numbers))})
     where = () if output is None else ("-o", os.fspath(output))
@@ -47,7 +40,7 @@ def several_command(
 
 
 def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:
-    """The line that makes ``output`` of ``svg`` and ``image``."""
+    """Return the line that makes ``output`` of ``svg`` and ``image``."""
     default = make_settings(iterations=REFINE_ITERATIONS)
     names = ("iterations", *(option.field for option in OPTIONS if option.refine))
     given = {
@@ -60,12 +53,12 @@ def refine_command(settings: Settings, svg: str, image: str, output: str, *furth
 
 
 def as_path(name: str) -> str:
-    """A file's name that no command takes for a flag."""
+    """Return a file's name in a form that no command takes for a flag."""
     return f"./{name}" if name.startswith("-") and name != "-" else name
 
 
 def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:
-    """The effort, and what else ``make_settings`` has to be given for ``settings``: as little as there is."""
+    """Return the quality and the fewest other keywords of ``make_settings`` that make ``settings``."""
     choices = [(quality, _given(settings, quality)) for quality in QUALITIES]
     exact = [one for one in choices if _settings(*one) == settings]
     return min(exact or choices, key=lambda one: (len(one[1]), one[0] != DEFAULT_QUALITY))
@@ -74,19 +67,19 @@ def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:
 def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
     given: dict[str, Any] = {"renderer": settings.renderer} if settings.renderer != "exact" else {}
     default = _settings(quality, given) or Settings()
-    if not settings.simplify and not settings.levels:
-        given["curves"] = settings.curves
-    if settings.levels:
-        layered = settings.levels == levels_of(settings.curves)
-        given |= {"layered": True, "curves": settings.curves} if layered else {"levels": settings.levels}
-    if settings.kind == Kind.STROKE:
-        given["kind"] = Kind.STROKE
-    implied = ("curves", "levels", "kind", "opaque", "renderer")
     for name in (option.field for option in OPTIONS if option.keyword == option.field):
-        if name not in implied and getattr(settings, name) != getattr(default, name):
+        if getattr(settings, name) != getattr(default, name):
             given[name] = getattr(settings, name)
-    if settings.opaque and not settings.is_limited:
-        given["opaque"] = True
+    if settings.kind == Kind.STROKE:
+        given["kind"] = settings.kind
+    if settings.is_limited:  # implies it
+        given.pop("opaque", None)
+    if settings.levels and settings.levels != levels_of(settings.curves):
+        given.pop("curves", None)
+    elif not settings.simplify:
+        given["curves"] = settings.curves
+        if given.pop("levels", None):
+            given["layered"] = True
     return given
 
 
