@@ -5,7 +5,6 @@ python docs/option_tables.py      # writes the former, after a change in fit/set
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from warpsplat.fit.options import Option, options_of
@@ -30,7 +29,10 @@ class RefineOptions(TypedDict, total=False):
 %s
 
 class Options(RefineOptions, total=False):
-    """The options of the command line, with ``_`` for ``-``: these, and those of ``RefineOptions``."""
+    """The options of the command line, with ``_`` for ``-``: these, and those of ``RefineOptions``.
+
+    The documentation's table explains them.
+    """
 
 %s'''
 
@@ -38,11 +40,7 @@ class Options(RefineOptions, total=False):
 def typed_options() -> str:
     """Return the source of both: all but the number of shapes, which functions take by itself."""
     shared, others = (
-        "".join(
-            f'    {option.keyword}: {annotation(option)} | None\n    """{option.help}"""\n'
-            for option in OPTIONS[1:]
-            if option.refine == refine
-        )
+        "".join(f"    {o.keyword}: {annotation(o)} | None\n" for o in OPTIONS[1:] if o.refine == refine)
         for refine in (True, False)
     )
     return HEAD % (shared, others)
@@ -57,30 +55,17 @@ def annotation(option: Option) -> str:
 
 def table(name: str) -> str:
     """Return a table in Markdown: of the ``options``, or of what is for ``research``."""
-    return "\n".join(option_rows() if name == "options" else research_rows())
-
-
-def option_rows() -> Iterator[str]:
-    """Yield the lines of the table of options."""
-    yield from ("| option | meaning | default |", "|---|---|---|")
-    for option in OPTIONS:
-        choices = f' <code class="choices">{", ".join(option.choices)}</code>' if option.choices else ""
-        name = f"<code>{f'--{option.name} {option.metavar}'.strip()}</code>{choices}"
-        limits = (
-            f"From {option.limits[0]:,} to {option.limits[1]:,}."
-            if option.type is int and option.limits
-            else ""
-        )
-        yield f"| {name} | {option.help} {limits} {option.details} | {option.default_text} |"
-
-
-def research_rows() -> Iterator[str]:
-    """Yield the lines of the table of keys for researchers, those of mappings last."""
-    yield from ("| key | values | meaning | default |", "|---|---|---|---|")
-    rows = [("", option) for option in options_of(Settings) if option.research]
-    for prefix, option in [*rows, *(("density.", option) for option in options_of(Density))]:
-        default = f"{option.default:g}" if option.type is float else option.default_text.lower()
-        yield f"| `{prefix}{option.name}` | {option.accepts} | {option.help} | {default} |"
+    if name == "options":
+        named = [(f"--{each.name} {each.metavar}".strip(), each) for each in OPTIONS]
+    else:
+        named = [(each.name, each) for each in options_of(Settings) if each.research]
+        named += [(f"density.{each.name}", each) for each in options_of(Density)]
+    lines = ["| option | values | meaning | default |", "|---|---|---|---|"]
+    for called, each in named:
+        values = each.accepts if each.choices or each.limits or each.wanted else ""
+        default = f"{each.default:g}" if isinstance(each.default, float) else each.default_text
+        lines.append(f"| <code>{called}</code> | {values} | {each.help} | {default} |")
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,9 @@ def test_flags_keys_keywords_and_rows(option: Option) -> None:
 def test_what_is_made_is_current() -> None:
     assert MADE["TYPED"].read_text("utf-8") == MADE["typed_options"](), "python docs/option_tables.py"
     rows = MADE["table"]("research")
-    assert all(f"| `{key}` |" in rows for key in (*RESEARCH_KEYS, "rates", "density", "density.stop"))
+    assert all(
+        f"| <code>{key}</code> |" in rows for key in (*RESEARCH_KEYS, "rates", "density", "density.stop")
+    )
 
 
 def test_a_palette_is_read_up_to_its_limit(tmp_path: Path) -> None:

@@ -101,13 +101,10 @@ def checked(key: str, value: Any, place: Place) -> None:
         if key in KINDS:
             if value is not True:
                 raise UsageError(f"must be true, not {shown(value)}; leave it out or give the other kind")
-        elif key in TEXT_KEYS:
-            if not isinstance(value, str):
-                raise UsageError(f"must be text, not {shown(value)}")
         elif key == "curves" and isinstance(value, str) and "," in value:
             numbers = ", ".join(word.strip() for word in value.split(","))
             raise UsageError(f"takes one number; for one job with each, {MATRIX}: {{{key}: [{numbers}]}}")
-        else:
+        elif key not in TEXT_KEYS:  # which are texts already
             settings_from({key.replace("-", "_"): value})
     except (UsageError, TypeError) as error:
         raise place(f"{name}: {error}") from error

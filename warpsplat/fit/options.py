@@ -35,8 +35,6 @@ class Option:
     """The default as help shows it, if not as it is; empty where none is shown."""
     help: str = ""
     """A line; empty if it cannot be given by this name."""
-    details: str = ""
-    """What the documentation says besides, in Markdown."""
     research: bool = False
     """Whether it is for researchers: a key of batch files and a keyword of ``make_settings``, but no flag."""
     refine: bool = False
@@ -159,6 +157,7 @@ def options_of(declaring: type) -> tuple[Option, ...]:
             field=field.name,
             type=get_origin(kind) or kind,
             choices=choices or declared.choices,
+            metavar=declared.metavar or ("N" if kind is int and not declared.parse else ""),
             shorthands=tuple(dataclasses.replace(s, field=field.name) for s in declared.shorthands),
         )
         found.append(made)

@@ -57,22 +57,14 @@ def default_rates() -> dict[str, float]:
 
 
 def parse_rates(value: object) -> object:
-    """Return some of the rates with underscores in their names; what is no mapping is left to be checked.
-
-    Raises:
-        UsageError: an unknown name.
-    """
-    return _known("rates", value, default_rates()) if isinstance(value, Mapping) else value
+    """Return some of the rates, with underscores in their names; see ``_known``."""
+    return _known("rates", value, default_rates())
 
 
 def parse_density(value: object) -> object:
-    """Return the default density with the values of a mapping; anything else is left to be checked.
-
-    Raises:
-        UsageError: an unknown name, or a value that is out of range.
-    """
-    known = [each.field for each in options_of(Density)]
-    return Density(**_known("density", value, known)) if isinstance(value, Mapping) else value
+    """Return the default density with the values of a mapping; see ``_known``."""
+    values = _known("density", value, [each.field for each in options_of(Density)])
+    return Density(**values) if isinstance(values, dict) else values
 
 
 def parse_basis(value: object) -> object:
@@ -80,13 +72,15 @@ def parse_basis(value: object) -> object:
     return Basis.__members__.get(value.upper(), value) if isinstance(value, str) else value
 
 
-def _known(name: str, given: Mapping[Any, Any], known: Iterable[str]) -> dict[str, Any]:
-    """Return ``given`` with underscores in its keys.
+def _known(name: str, value: object, known: Iterable[str]) -> object:
+    """Return a mapping with underscores in its keys; anything else as it is, for ``Option.check`` to refuse.
 
     Raises:
-        UsageError: one is not ``known``.
+        UsageError: a key is not ``known``.
     """
-    values = {str(key).replace("-", "_"): value for key, value in given.items()}
+    if not isinstance(value, Mapping):
+        return value
+    values = {str(key).replace("-", "_"): inner for key, inner in value.items()}
     for key in values:
         if key not in known:
             raise UsageError(f"unknown setting {shown(key)} in {name}{nearest(key, known)}")
@@ -108,24 +102,22 @@ class Density:
     """Pruning and densification (paper section 3.4), and growth from few shapes to all."""
 
     start: float = research(
-        1 / 3, "Fraction of the shapes at the start: the first settle as large ones.", (1e-3, 1.0)
+        1 / 3, "Fraction of the shapes at the start: they settle as large ones.", (1e-3, 1.0)
     )
     grown: float = research(
         0.5,
-        "Fraction of the run until which the number of shapes grows, geometrically, to all of them.",
+        "Fraction of the run in which the number of shapes grows, geometrically, to all.",
         FRACTION,
     )
     surplus: float = research(1.5, "Most shapes at any time, over those that are left in the end.", (1, 10))
     thin: float = research(
-        0.65, "Fraction of the run from which on the surplus is removed, until `stop`.", FRACTION
+        0.65, "Fraction of the run after which the surplus is removed, until `stop`.", FRACTION
     )
     mean_points: float = research(
         10.4, "Mean number of points of splines in the end: those of least use are removed.", (3, 100)
     )
     interval: int = research(25, "Steps between two densification steps; 0: none.", (0, 1_000_000))
-    stop: float = research(
-        0.85, "Fraction of the run after which the set of shapes stays as it is.", FRACTION
-    )
+    stop: float = research(0.85, "Fraction of the run after which the set of shapes is fixed.", FRACTION)
     opacity_start: float = research(
         0.2, "Prune below this opacity at the start; it falls linearly to `opacity-end` at `stop`.", FRACTION
     )
@@ -157,20 +149,11 @@ class Settings:
     curves: int = option(
         512,
         "Number of shapes; with a goal the most.",
-        limits=(1, 100_000),
-        metavar="N",
+        (1, 100_000),
         shown_default="512; fewer for a simple image",
-        details="Several (`50,200,1000`) make a file each. With `--target-psnr` or `--max-bytes` there are at"
-        " most this many (by default, 20,000). If it is not given, a drawing in a few flat colours gets eight"
-        " shapes for each region of one colour (at least 32), and a tiny image at most one for eight pixels.",
     )
     subject: Subject = option(
-        "auto",
-        "What the image shows: to a photo shapes are fitted, the others are traced.",
-        details="`photo`: translucent shapes are fitted. `drawing` (logos, icons, emoji, flags): one opaque"
-        " path a region, its outline fitted. `line` (line art, scanned signatures): opaque strokes along the"
-        " middle of the ink, a group for each pen, ordered to minimise pen-up travel. `pixel` (pixel art, QR"
-        " codes): cell by cell, without loss. `auto` detects the subject and reports it.",
+        "auto", "What the image shows: to a photo shapes are fitted, the others are traced."
     )
     kind: Kind = option(
         Kind.FILL,
@@ -184,21 +167,15 @@ class Settings:
         False,
         "Fills, and strokes where they remove more error; of line art, fills where it is filled.",
         subjects=(*FITTED, "line"),
-        details="A stroke is taken where the error is elongated.",
     )
     iterations: int = option(
         1000,
         "Steps; overrides the effort's number.",
-        limits=(1, 1_000_000),
-        metavar="N",
+        (1, 1_000_000),
         shown_default="",
         shorthands=(
             Option(
-                name="quality",
-                help="Effort: how many steps.",
-                default=DEFAULT_QUALITY,
-                choices=QUALITIES,
-                details="The draft of a drawing keeps needless nodes, in as little as a third of the time.",
+                name="quality", help="Effort: how many steps.", default=DEFAULT_QUALITY, choices=QUALITIES
             ),
         ),
     )
@@ -207,15 +184,11 @@ class Settings:
         "How the fit sees shapes: as viewers do, as Gaussians much like that, or as the paper's soft ones.",
         subjects=FITTED,
         choices=renderer_names(),
-        details="`exact`: what the file shows. `splat`: the paper's Gaussians, placed so that they look like"
-        " the file. `gaussian`: [the paper's own](paper.md), whose render is better than the file.",
     )
     paint: Painting = option(
         "flat",
         "A colour for each shape, a gradient for each, or whichever is worth its bytes.",
         subjects=FITTED,
-        details="`linear`, `radial`: a gradient of two stops. `auto`: a gradient of either kind where it"
-        " saves more than its bytes, as on skies, studio backgrounds and shaded drawings.",
     )
     levels: tuple[int, ...] = option(
         (),
@@ -223,42 +196,24 @@ class Settings:
         subjects=FITTED,
         metavar="N,N",
         parse=parse_levels,
-        details="The last is the number of all; by default a sixteenth, a quarter and all of the shapes.",
         shorthands=(
             Option(
                 name="layered",
                 type=bool,
                 help="Groups from coarse to fine, each with those before it a picture of its own.",
-                details="Hiding groups leaves a simpler picture. It takes about twice the time.",
             ),
         ),
     )
-    colors: int | None = option(
-        None,
-        "No more than N colours; the fills are opaque then.",
-        limits=(1, MOST_COLORS),
-        metavar="N",
-        details="They represent its pixels best; each shape has the one that suits what is seen of it. In a"
-        " drawing, what is less than half opaque is left out.",
-    )
+    colors: int | None = option(None, "No more than N colours; the fills are opaque then.", (1, MOST_COLORS))
     palette: tuple[str, ...] = option(
         (), "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS", parse=parse_palette
     )
     opaque: bool = option(False, "No translucent shapes.")
     target_psnr: float | None = option(
-        None,
-        "The smallest file with a PSNR of at least DB.",
-        subjects=FITTED,
-        metavar="DB",
-        details="Measured on the file as a viewer shows it; exit code 6 if it is out of reach.",
+        None, "The smallest file with a PSNR of at least DB.", subjects=FITTED, metavar="DB"
     )
     time_budget: float | None = option(
-        None,
-        "As many steps as end within 60s, 2m ...",
-        metavar="TIME",
-        parse=parse_duration,
-        refine=True,
-        details="The start of the program is not included. Exit code 6 if it takes longer.",
+        None, "As many steps as end within 60s, 2m ...", metavar="TIME", parse=parse_duration, refine=True
     )
     max_bytes: int | None = option(
         None,
@@ -266,19 +221,14 @@ class Settings:
         subjects=(*FITTED, "drawing"),
         metavar="SIZE",
         parse=parse_bytes,
-        details="With `--target-psnr`, the most that the file may take. A drawing gets simpler outlines, or"
-        " fewer regions where that is seen less.",
     )
     max_memory: int | None = option(
         None,
         "Memory to stay below, as 4GB: a larger image is worked on at a smaller size.",
         metavar="SIZE",
         parse=parse_bytes,
-        details="A message says so; the file has the full size. By default nine tenths of the memory of the"
-        " machine or its container. Images may have up to 120 million pixels, which take 2.4 GB. `refine`"
-        " refuses an image that takes more.",
     )
-    seed: int = option(0, "Random seed.", limits=(0, 2**32 - 1), metavar="N")
+    seed: int = option(0, "Random seed.", (0, 2**32 - 1))
     background: str = option(
         "auto",
         "auto: transparent where the image is; none; or a colour (#rrggbb).",
@@ -286,52 +236,21 @@ class Settings:
         wanted="auto, none or a colour as #ffffff",
         metavar="COLOR",
         refine=True,
-        details="With `auto`, an image with opacity has no background, any other one that of its colour. A"
-        " colour lies under the image as well.",
     )
-    title: str = option(
-        "", "Title of the picture, in the file.", limits=(0, 1000), metavar="TEXT", refine=True
-    )
-    size: str = option(
-        "",
-        "For plotters: size that the picture fills, as 200x150mm.",
-        metavar="WxH",
-        details="Or in `cm`, `in`, `pt`, `px`; proportions are kept. Figures stay those of the image.",
-    )
+    title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
+    size: str = option("", "For plotters: size that the picture fills, as 200x150mm.", metavar="WxH")
     page: str = option(
-        "",
-        "For plotters: sheet that it fills but for margins: a3, a4, a5, letter.",
-        metavar="NAME",
-        details="Upright or on its side, as suits it; the margins are 10 mm.",
+        "", "For plotters: sheet that it fills but for margins: a3, a4, a5, letter.", metavar="NAME"
     )
-    units: str = option(
-        "",
-        "Units in which the file says its size: mm, cm, in, pt, px.",
-        metavar="UNIT",
-        shown_default="",
-        details="By default pixels, or millimetres of a sheet. Without a sheet, an inch is 96 pixels.",
-    )
+    units: str = option("", "Units in which the file says its size: mm, cm, in, pt, px.", metavar="UNIT")
     ids: bool = option(
-        False,
-        "Name paths by their colours, and group neighbours of one, for editors.",
-        refine=True,
-        details="Names are `navy`, `navy-2` ...; those of one colour are brought together in a group"
-        " `navy-group` where nothing lies between.",
+        False, "Name paths by their colours, and group neighbours of one, for editors.", refine=True
     )
     minify: bool = option(
-        False,
-        "Smallest text: no line breaks, no mark that warpsplat wrote it.",
-        refine=True,
-        details="Then only `--overwrite` replaces it, or the batch whose manifest lists it.",
+        False, "Smallest text: no line breaks, no mark that warpsplat wrote it.", refine=True
     )
     precision: int | None = option(
-        None,
-        "Most decimals of a pixel in coordinates.",
-        limits=(0, 6),
-        metavar="N",
-        shown_default="auto",
-        refine=True,
-        details="`auto`: as many as are needed to lose little.",
+        None, "Most decimals of a pixel in coordinates.", (0, 6), shown_default="auto", refine=True
     )
     simplify: bool = option(False)
     basis: Basis = research(
@@ -345,17 +264,13 @@ class Settings:
     chain_cubics: int = research(2, "Cubics in each of the two chains of a fill.", (1, 8))
     coarse: float = research(0.82, "Fraction of the iterations on a reduced image.", FRACTION)
     coarse_pixels: int = research(
-        100_000, "Size of that image [pixels]; a smaller image is not reduced.", (1, 10**9)
+        100_000, "Most pixels of that image; a smaller one is not reduced.", (1, 10**9)
     )
-    fine_pixels: int = research(
-        1_600_000, "Largest size of the image in the last iterations [pixels].", (1, 10**9)
-    )
+    fine_pixels: int = research(1_600_000, "Most pixels of the image in the last iterations.", (1, 10**9))
     opacity: float = research(
         0.98, "Opacity of a new shape: it hides what it replaces, and may still become translucent.", FRACTION
     )
-    softness: float = research(
-        0.6, "Least standard deviation of soft Gaussians [px of the canvas].", (0, 100)
-    )
+    softness: float = research(0.6, "Least standard deviation of soft Gaussians [canvas px].", (0, 100))
     gaussian_density: float = research(
         0.5, "Soft Gaussians along and across a shape, over their usual number.", (0.05, 20)
     )
@@ -386,12 +301,8 @@ class Settings:
     )
     fold_end: float = research(3.0, "Weight of the fold loss at the end.", (1e-6, 1e6))
     through_scales: bool = research(True, "Whether gradients flow through the Gaussians' scales and angles.")
-    viewer: bool = research(
-        True, "Whether the last steps train on what a viewer shows, its rounding included."
-    )
-    tidy: bool = research(
-        True, "Whether drawings lose nodes that are worth less than their bytes: most of their time."
-    )
+    viewer: bool = research(True, "Whether the last steps see what a viewer shows, rounding included.")
+    tidy: bool = research(True, "Whether drawings lose nodes worth less than their bytes, which takes time.")
     level_weight: float = research(
         0.3, "Weight of the squared error of each earlier level's picture beside that of the whole.", WEIGHT
     )
@@ -508,8 +419,9 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
         if name not in known:
             raise UsageError(f"unknown setting {shown(name)}{nearest(name, known)}")
         given[name] = known[name].parsed(value)
-    preset = _preset(given)  # which changes them
-    settings = replace(preset, **given)
+    expand(given)
+    preset = preset_for(given.pop("quality", DEFAULT_QUALITY), given)
+    settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
     if settings.size or settings.page or settings.units:
@@ -519,11 +431,11 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     return settings
 
 
-def _preset(given: dict[str, Any]) -> Settings:
-    """Return the settings that the ``given`` ones imply, in which shorthands become values of fields.
+def expand(given: dict[str, Any]) -> None:
+    """Replace shorthands among the ``given`` options by what they stand for, and add what options require.
 
     Raises:
-        UsageError: shorthands that contradict each other, or a value that is implied otherwise.
+        UsageError: shorthands that contradict each other.
     """
     closed, is_open = given.pop("closed", None), given.pop("open", None)
     if closed and is_open:
@@ -534,7 +446,16 @@ def _preset(given: dict[str, Any]) -> Settings:
         given.setdefault("levels", levels_of(given.get("curves", Settings.curves)))
     if given.get("levels"):  # the last of them is the whole
         given.setdefault("curves", given["levels"][-1])
-    quality = given.pop("quality", DEFAULT_QUALITY)
+    if given.get("colors") or given.get("palette"):  # what shines through would make further colours
+        given["opaque"] = True
+
+
+def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
+    """Return the defaults that suit the ``given`` options, and all rates.
+
+    Raises:
+        UsageError: an option needs another value of one that is given.
+    """
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     rates = dict(preset.rates)
     renderer = given.get("renderer", "exact")
@@ -542,14 +463,11 @@ def _preset(given: dict[str, Any]) -> Settings:
         preset = load_renderer(renderer).preset(preset)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
-    is_limited = bool(given.get("colors") or given.get("palette"))
-    if is_limited:  # what lies below would make further colours
-        given["opaque"] = True
     if given.get("opaque"):
         rates["opacities"] = 0.0
     if given.get("paint", "flat") != "flat":  # colours and frames can do the same for fewer bytes
         rates |= {"stop_opacities": 0.0, "stop_offsets": 0.0}
-    rates |= given.pop("rates", {})
-    if is_limited:  # colours are chosen, not trained
+    rates |= given.get("rates", {})
+    if given.get("colors") or given.get("palette"):  # colours are chosen, not trained
         rates["colors"] = 0.0
     return replace(preset, rates=rates)

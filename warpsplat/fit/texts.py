@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from typing import TypeGuard
 
 from warpsplat.errors import UsageError, shown
 
@@ -18,12 +20,16 @@ MAX_DIGITS = 15
 
 
 def _words(value: object) -> str:
-    """A text itself; of anything else as much as can be right."""
+    """Return a text itself; of anything else as much as can be right."""
     return value if isinstance(value, str) else shown(value)
 
 
+def _is_list(value: object) -> TypeGuard[Iterable[object]]:
+    return isinstance(value, Iterable) and not isinstance(value, (str, bytes))
+
+
 def parse_duration(value: str | float) -> float:
-    """``60``, ``60s``, ``2m`` or ``1.5h`` -> seconds.
+    """Return the seconds of ``60``, ``60s``, ``2m`` or ``1.5h``.
 
     Raises:
         UsageError: none of these.
@@ -35,7 +41,7 @@ def parse_duration(value: str | float) -> float:
 
 
 def parse_bytes(value: str | int) -> int:
-    """``100000``, ``100KB`` or ``1MiB`` -> bytes.
+    """Return the bytes of ``100000``, ``100KB`` or ``1MiB``.
 
     Raises:
         UsageError: none of these.
@@ -47,12 +53,12 @@ def parse_bytes(value: str | int) -> int:
 
 
 def parse_levels(value: object) -> tuple[int, ...]:
-    """``64,256,1024`` -> numbers.
+    """Return the numbers of ``64,256,1024``, or of a list.
 
     Raises:
         UsageError: something else.
     """
-    parts = value if isinstance(value, (list, tuple)) else _words(value).split(",")
+    parts = value if _is_list(value) else _words(value).split(",")
     try:
         return tuple(int(str(part)) for part in parts)
     except ValueError as error:
@@ -63,12 +69,12 @@ PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
 def parse_palette(value: object) -> tuple[str, ...]:
-    """``#f00,#00ff00`` -> ``#ff0000``, ``#00ff00``: each once, in order.
+    """Return ``#f00,#00ff00``, or a list, as ``("#ff0000", "#00ff00")``: each once, in order.
 
     Raises:
         UsageError: something else.
     """
-    parts = value if isinstance(value, (list, tuple)) else re.split(r"[,\s]+", _words(value).strip(", \t\n"))
+    parts = value if _is_list(value) else re.split(r"[,\s]+", _words(value).strip(", \t\n"))
     colors: dict[str, None] = {}
     for part in parts:
         found = PALETTE_COLOR.fullmatch(_words(part))

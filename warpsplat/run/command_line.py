@@ -9,14 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpsplat.errors import UsageError
-from warpsplat.fit.settings import (
-    DEFAULT_QUALITY,
-    QUALITIES,
-    Quality,
-    Settings,
-    levels_of,
-    make_settings,
-)
+from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Quality, Settings, levels_of, make_settings
 from warpsplat.run.options import OPTIONS
 from warpsplat.scene import Kind
 
@@ -74,19 +67,19 @@ def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:
 def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
     given: dict[str, Any] = {"renderer": settings.renderer} if settings.renderer != "exact" else {}
     default = _settings(quality, given) or Settings()
-    if not settings.simplify and not settings.levels:
-        given["curves"] = settings.curves
-    if settings.levels:
-        layered = settings.levels == levels_of(settings.curves)
-        given |= {"layered": True, "curves": settings.curves} if layered else {"levels": settings.levels}
-    if settings.kind == Kind.STROKE:
-        given["kind"] = Kind.STROKE
-    implied = ("curves", "levels", "kind", "opaque", "renderer")
     for name in (option.field for option in OPTIONS if option.keyword == option.field):
-        if name not in implied and getattr(settings, name) != getattr(default, name):
+        if getattr(settings, name) != getattr(default, name):
             given[name] = getattr(settings, name)
-    if settings.opaque and not settings.is_limited:
-        given["opaque"] = True
+    if settings.kind == Kind.STROKE:
+        given["kind"] = settings.kind
+    if settings.is_limited:  # implies it
+        given.pop("opaque", None)
+    if settings.levels and settings.levels != levels_of(settings.curves):
+        given.pop("curves", None)
+    elif not settings.simplify:
+        given["curves"] = settings.curves
+        if given.pop("levels", None):
+            given["layered"] = True
     return given
 
 
