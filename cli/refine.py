@@ -86,10 +86,10 @@ def command(
         check_output(checkpoint, svg, image)
     motion.check(svg, image, output, *filter(None, [checkpoint]), overwrite=overwrite)
     check_report(report, (svg, image), output, overwrite=overwrite)
-    from warpsplat.api.refine import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.summary import summary
+    from warpsplat.run.refine import refine
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)

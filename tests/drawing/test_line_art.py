@@ -9,15 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
+import warpsplat
 from tests.drawing.trace.line_art import CROSS, TEE, drawn, grown, shown
-from warpsplat.drawing.line_art import tour_cost
-from warpsplat.drawing.strokes.tour import FEW, MANY
-from warpsplat.drawing.subjects import decided
+from tests.runs import vectorize
+from warpsplat.drawing.subjects import choose_subject
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize, vectorize_image
 from warpsplat.scene import Kind
 
 
@@ -69,10 +68,10 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
     assert ok
     for minify in (False, True):
         results = [
-            vectorize_image(
+            warpsplat.vectorize(
                 data.tobytes(),
-                make_settings(subject="line", page=page, minify=minify),
-                Backend.on(device),
+                settings=make_settings(subject="line", page=page, minify=minify),
+                device=device,
                 output=tmp_path / f"{len(page)}.svg",
                 name="a.png",
             )
@@ -121,9 +120,9 @@ def test_areas_alone_are_fills(device: str) -> None:
 def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
     line = drawn("".join(f'<path d="M{x} 8L{90 - x} 64"/>' for x in (8, 20, 50, 70)))
     settings = make_settings(mixed=True)
-    assert decided(line, settings)[0].subject == "line"
+    assert choose_subject(line, settings)[0].subject == "line"
     noise = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
-    chosen, why = decided(noise, settings)
+    chosen, why = choose_subject(noise, settings)
     assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
 
 
@@ -158,10 +157,3 @@ def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
     ink = 1 - image[..., 0]
     assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
     assert np.clip(painted - ink, 0, None).sum() < 0.03 * painted.sum()
-
-
-def test_tours_cost_by_how_thoroughly_they_are_sought() -> None:
-    costs = [tour_cost(count) for count in (0, 20, FEW, MANY)]
-    assert costs == sorted(costs) and costs[0] == 0 < costs[1]
-    assert tour_cost(FEW) > 2 * tour_cost(FEW + 1), "from several places"
-    assert tour_cost(MANY) > 5 * tour_cost(MANY + 1), "until nothing shortens it"

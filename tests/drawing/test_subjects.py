@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import warpsplat
 from tests.drawing.trace.drawings import draw
 from tests.drawing.trace.line_art import drawn
-from warpsplat.drawing.subjects import LEAST_SIDE, enlargement
+from tests.runs import vectorize
+from warpsplat.drawing.draw import LEAST_SIDE, enlargement
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.vectorize import vectorize, vectorize_image
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_svg
 
@@ -86,7 +87,9 @@ def test_figures_are_of_the_file_that_is_delivered(
     output = tmp_path / "out.svg"
     image = drawn('<circle cx="16" cy="16" r="9" fill="#06c" stroke="none"/>', 32, 32)
     settings = make_settings(subject="drawing", **placing)
-    result = vectorize_image((255 * image).astype(np.uint8), settings, Backend.on(device), output=output)
+    result = warpsplat.vectorize(
+        (255 * image).astype(np.uint8), settings=settings, device=device, output=output
+    )
     data = output.read_bytes()
     assert result.score
     assert (result.svg.encode(), result.score.bytes) == (data, len(data))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpsplat.drawing.subjects import decided
+from tests.runs import vectorize
+from warpsplat.drawing.subjects import choose_subject
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.vectorize import vectorize
 
 
 def ramp(width: int, height: int) -> np.ndarray:
@@ -47,7 +47,7 @@ def test_a_ramp_is_one_gradient(height: int, device: str) -> None:
 def test_what_has_no_regions_is_its_cells(device: str) -> None:
     noise = np.random.default_rng(0).random((2, 20, 3)).astype(np.float32)
     assert psnr_of(noise, "drawing", device) > 60
-    assert decided(noise, make_settings())[0].subject == "pixel"
+    assert choose_subject(noise, make_settings())[0].subject == "pixel"
 
 
 def test_lines_across(device: str) -> None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import empty_scene
+from tests.runs import vectorize
 from warpsplat.errors import UsageError
 from warpsplat.fit.density import densify
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.streaks import Streaks
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray, Kind
 
 BAR = cv2.RotatedRect((40.0, 30.0), (50.0, 4.0), 30.0)

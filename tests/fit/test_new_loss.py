@@ -10,6 +10,7 @@ from tests.kernels import trials
 from warpsplat.fit import losses
 from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.losses import LossInputs
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
@@ -39,7 +40,7 @@ def record_thin(program: Program, parameters: Parameters, settings: Settings) ->
 
 
 def short_fit(device: str) -> Fit:
-    return fit(picture(), make_settings(curves=8, iterations=40), Backend.on(device))
+    return fit(Problem(picture(), make_settings(curves=8, iterations=40)), Run(Backend.on(device)))
 
 
 def test_a_loss_of_the_image_changes_what_is_fitted(device: str, monkeypatch: pytest.MonkeyPatch) -> None:

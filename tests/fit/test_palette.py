@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
+from tests.runs import vectorize
 from warpsplat.errors import UsageError
 from warpsplat.fit.palette import CHOICE_INTERVAL, Palette, best_colors, main_colors
 from warpsplat.fit.schedule import Phase
@@ -19,7 +20,6 @@ from warpsplat.fit.step import Step, Target
 from warpsplat.fit.texts import parse_palette
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.options import settings_from
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 
 COLOR = re.compile(r'(?:fill|stroke)="(#[0-9a-f]{3,6})"')

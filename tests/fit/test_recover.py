@@ -12,12 +12,13 @@ from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.recover import mend
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.program import Launch
 from warpsplat.scene import ATTRIBUTES, Kind, Scene
@@ -146,7 +147,7 @@ def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(Step, "advance", spoiled)
     told: list[Progress] = []
-    made = fit(image, replace(SETTINGS, curves=9), Backend.on("cpu", 1), report=told.append)
+    made = fit(Problem(image, replace(SETTINGS, curves=9)), Run(Backend.on("cpu", 1), told.append))
     assert made.renewed == 1
     assert np.isfinite([made.render_psnr, made.estimated_psnr]).all()
     assert write_svg(made.scene, per_pixel=made.per_pixel)

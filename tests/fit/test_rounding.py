@@ -13,6 +13,7 @@ from tests.scenes import mixed_scene, random_scene, started_alike
 from warpsplat.fit import rounding
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rate import DB_PER_DOUBLING, byte_worth
 from warpsplat.fit.rounding import STAGES, choose_grid, hold_opacities, hold_stage, opacities_at, stage_at
 from warpsplat.fit.schedule import phases
@@ -201,7 +202,7 @@ def test_no_grid_is_finer_than_the_precision(
 @pytest.mark.parametrize("basis", list(Basis))
 def test_a_run_ends_with_what_the_file_holds(device: str, kind: Kind, basis: Basis) -> None:
     settings = make_settings(kind=kind, basis=basis, curves=10, iterations=60)
-    made = fit(picture(), settings, Backend.on(device))
+    made = fit(Problem(picture(), settings), Run(Backend.on(device)))
     held = rounded(made.scene, made.per_pixel)
     np.testing.assert_array_equal(made.scene.points, held.points)
     np.testing.assert_array_equal(made.scene.widths, held.widths)
@@ -221,5 +222,5 @@ def test_a_run_ends_with_what_the_file_holds(device: str, kind: Kind, basis: Bas
 @pytest.mark.parametrize("precision", [0, 1])
 def test_runs_of_few_steps_keep_to_the_precision(device: str, iterations: int, precision: int) -> None:
     settings = make_settings(curves=6, iterations=iterations, precision=precision)
-    made = fit(picture(), settings, Backend.on(device))
+    made = fit(Problem(picture(), settings), Run(Backend.on(device)))
     assert made.per_pixel <= 10**precision

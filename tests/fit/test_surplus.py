@@ -15,6 +15,7 @@ import warpsplat
 from tests.fit.pictures import picture
 from warpsplat.fit.budget import Budget
 from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
@@ -87,7 +88,7 @@ def test_what_a_checkpoint_keeps_has_its_surplus(tmp_path: Path) -> None:
 def test_the_figures_are_those_of_what_is_left(device: str) -> None:
     target = picture()
     settings = make_settings(curves=CURVES, iterations=100, seed=1)
-    made = fit(target, settings, Backend.on(device), stop=after(LATE), finish=False)
+    made = fit(Problem(target, settings), Run(Backend.on(device), stop=after(LATE)), rounding=None)
     error = np.square(render(made.scene, backend=Backend.on(device)) - target).mean()
     assert made.render_psnr == pytest.approx(-10 * np.log10(error), abs=0.1)
     assert made.estimated_psnr == pytest.approx(made.render_psnr, abs=0.1)

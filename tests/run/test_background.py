@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import warpsplat
 from warpsplat.errors import UsageError
 from warpsplat.files.image import load_image
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
-from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize_image
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own
 
@@ -40,7 +39,7 @@ def badge(opaque: bool = False) -> bytes:
 def made(tmp_path: Path, device: str, source: bytes, **settings: object) -> tuple[Result, str]:
     output = tmp_path / "o.svg"
     chosen = make_settings(curves=12, iterations=200, **settings)
-    return vectorize_image(source, chosen, Backend.on(device), output=output), output.read_text()
+    return warpsplat.vectorize(source, settings=chosen, device=device, output=output), output.read_text()
 
 
 @pytest.mark.slow

@@ -12,11 +12,12 @@ from PIL import Image
 from tests.fit.pictures import picture
 from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.refine import likeness, refine
+from warpsplat.run.refine import likeness, refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.page import placed
@@ -29,7 +30,7 @@ from warpsplat.svg.write import write_svg
 def improved(
     text: str, target: np.ndarray, settings: Settings, device: str, **how: bool
 ) -> tuple[Result, float]:
-    refined = refine(text, target, settings, Backend.on(device), name="a.svg", **how)
+    refined = refine_svg(text, Problem(target, settings), Run(Backend.on(device)), "a.svg", **how)
     assert refined.before is not None
     return refined, refined.before
 

@@ -13,14 +13,14 @@ import pytest
 
 from tests import ROOT
 from tests.fit.pictures import picture
+from tests.runs import vectorize
 from warpsplat.cli.summary import summary
 from warpsplat.files.image import load_image
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
-from warpsplat.fit.work import Progress
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.figures import has_time_for_eyes, render_figures
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 
@@ -244,3 +244,33 @@ def test_shapes_of_one_colour_are_named_groups(device: str) -> None:
     grouped = sum(inner.count("<path") for inner in re.findall(r'<g id="[a-z]+-group.*?</g>', text))
     assert paths == 16
     assert grouped >= 8, "13 to 15 over five seeds"
+
+
+LINES = np.ones((64, 64, 3), np.float32)
+LINES[20:22, 8:56] = LINES[8:56, 40:42] = 0
+
+DISCS = np.ones((48, 64, 3), np.float32)
+DISCS[8:40, 10:30] = [0.9, 0.2, 0.1]
+DISCS[20:44, 36:56] = [0.1, 0.3, 0.8]
+
+STRATEGIES = {
+    "fit": (picture(), {"curves": 8, "iterations": 30}),
+    "layers": (picture(), {"levels": "3,8", "iterations": 20}),
+    "psnr": (picture(), {"target_psnr": 22.0, "iterations": 20, "curves": 30}),
+    "bytes": (picture(), {"max_bytes": 900, "iterations": 20}),
+    "time": (picture(), {"curves": 8, "time_budget": 1.0, "coarse_pixels": 1000}),
+    "drawing": (DISCS, {"subject": "drawing"}),
+    "drawing within a size": (DISCS, {"subject": "drawing", "max_bytes": 200}),
+    "line": (LINES, {"subject": "line"}),
+}
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_work_grows_to_one(device: str, strategy: str) -> None:
+    image, given = STRATEGIES[strategy]
+    seen: list[Progress] = []
+    vectorize(image, make_settings(**given), Backend.on(device), report=seen.append)
+    work = [progress.work for progress in seen]
+    assert work == sorted(work) and len(work) > 1
+    assert 0 <= work[0] < 0.9 and work[-1] == 1
+    assert all(progress.snapshot for progress in seen)

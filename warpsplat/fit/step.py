@@ -11,11 +11,11 @@ from warpsplat.fit.importance import weights_at
 from warpsplat.fit.levels import Level
 from warpsplat.fit.losses import Aim, LossInputs
 from warpsplat.fit.optimizer import record_adam
+from warpsplat.fit.progress import Snapshot
 from warpsplat.fit.schedule import Phase, fold_weight
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
-from warpsplat.fit.work import Snapshot
 from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import ExactModel, GaussianModel, Model, SplatModel

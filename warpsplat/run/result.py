@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Renderer, Subject
-from warpsplat.fit.work import Progress
 from warpsplat.metrics import Score
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene

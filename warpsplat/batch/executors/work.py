@@ -6,23 +6,25 @@ import hashlib
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from warpsplat.batch.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.errors import WarpsplatError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import make_folder
-from warpsplat.fit.work import Progress
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Progress
 from warpsplat.metrics import score_svg
 from warpsplat.pages.reports.command import vectorize_command
 from warpsplat.pages.reports.single import Facts, report_page
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.turns import turn
-from warpsplat.run.formats import named_bytes
+from warpsplat.run.formats import named_bytes, write_named
 from warpsplat.run.keys import STOPPED, job_key
-from warpsplat.run.prepare import load_target
-from warpsplat.run.vectorize import vectorize_image
+from warpsplat.run.prepare import load_target, prepare
+from warpsplat.run.vectorize import make_result
 from warpsplat.svg.inspect import svg_text
 
 Report = Callable[[Progress], None]
@@ -76,17 +78,9 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
     if not task.bring:
         make_folder(output.parent)
     with turn(backend.device):
-        result = vectorize_image(
-            image,
-            task.settings,
-            backend,
-            output=None if task.bring else output,
-            name=task.name,
-            importance=task.mask,
-            keyed=True,
-            report=report,
-            stop=stop,
-        )
+        prepared = prepare(image, task.settings, name=task.name, importance=task.mask, keyed=True)
+        write = None if task.bring else partial(write_named, output)
+        result = make_result(prepared, Run(backend, report, stop), write)
         made = Outcome(task.number, "made")
         if task.report and not result.stopped:
             line = vectorize_command(task.settings, task.name, task.output)
