@@ -20,7 +20,7 @@ from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, Renderer, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_eyes, render_figures
+from warpsplat.run.figures import has_time_for_ssimulacra2, render_figures
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 
@@ -124,9 +124,9 @@ def test_time_budget_sizes_the_run(device: str) -> None:
 
 def test_eyes_have_to_wait_in_large_images_and_short_times() -> None:
     small, large = np.zeros((1000, 1000, 3), np.float32), np.zeros((1000, 1001, 3), np.float32)
-    assert has_time_for_eyes(make_settings(), small)
-    assert not has_time_for_eyes(make_settings(), large)
-    assert not has_time_for_eyes(make_settings(time_budget="2m"), small)
+    assert has_time_for_ssimulacra2(make_settings(), small)
+    assert not has_time_for_ssimulacra2(make_settings(), large)
+    assert not has_time_for_ssimulacra2(make_settings(time_budget="2m"), small)
 
 
 def test_target_psnr_is_reached_with_few_bytes(device: str) -> None:

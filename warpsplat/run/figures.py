@@ -12,7 +12,7 @@ from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.memory import has_room_for_eyes
+from warpsplat.run.memory import has_memory_for_ssimulacra2
 from warpsplat.run.reduction import Reduction
 from warpsplat.run.result import LevelScore
 from warpsplat.scene import FloatArray, Scene
@@ -28,14 +28,18 @@ def pixels_of(target: FloatArray) -> int:
     return target.shape[0] * target.shape[1]
 
 
-def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
+def has_time_for_ssimulacra2(settings: Settings, target: FloatArray) -> bool:
     """Return whether a run measures SSIMULACRA2, if it is installed.
 
     Up to ``QUICK_PIXELS`` it takes a twentieth of a run of the default effort, and much memory. Within a time
     budget other things are worth more.
     """
     pixels = pixels_of(target)
-    return pixels <= QUICK_PIXELS and settings.time_budget is None and has_room_for_eyes(settings, pixels)
+    return (
+        pixels <= QUICK_PIXELS
+        and settings.time_budget is None
+        and has_memory_for_ssimulacra2(settings, pixels)
+    )
 
 
 def scored(
@@ -49,7 +53,7 @@ def scored(
 ) -> Score | None:
     """Return the score of a file; None if there is no time for it, or the run was stopped."""
     quick = pixels_of(target) <= QUICK_PIXELS
-    eyes = has_time_for_eyes(settings, target) and not interrupted
+    eyes = has_time_for_ssimulacra2(settings, target) and not interrupted
     if (interrupted and not quick) or (not interrupted and run.stopped()):
         return None
     try:

@@ -24,7 +24,7 @@ from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
 from warpsplat.run.backend import backend_on
 from warpsplat.run.checkpoint import identity, open_checkpoint
-from warpsplat.run.figures import has_time_for_eyes, missed_goals
+from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
 from warpsplat.run.formats import write_named
 from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
@@ -160,7 +160,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
     svg = minified(svg) if settings.minify else svg if view else shortened(svg)
-    eyes = has_time_for_eyes(settings, target) and not made.interrupted
+    eyes = has_time_for_ssimulacra2(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr
     if eyes and not better:

@@ -17,7 +17,7 @@ from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import Score, score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_eyes
+from warpsplat.run.figures import has_time_for_ssimulacra2
 from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
 from warpsplat.run.vectorize import make_result
@@ -101,7 +101,7 @@ def compare(
     """
     for ours in settings:
         yield our_row(image, target, ours, make)
-    eyes = all(has_time_for_eyes(ours, target) for ours in settings)
+    eyes = all(has_time_for_ssimulacra2(ours, target) for ours in settings)
     file = io.BytesIO()
     Image.fromarray(np.round(255 * target).astype(np.uint8)).save(file, "PNG", compress_level=1)
     for setting in tracer.settings:
