@@ -8,6 +8,7 @@ from warpsplat.fit.loop import Start
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import Settings
+from warpsplat.metrics import Score
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
@@ -27,3 +28,9 @@ def vectorize(
 ) -> Result:
     """The result of a run on what is shown, as ``settings`` say."""
     return make_result(PreparedImage(Problem(target, settings)), Run(backend, report, stop), write, start)
+
+
+def scored(result: Result) -> Score:
+    """The score of a run that was not stopped."""
+    assert result.score
+    return result.score

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.runs import vectorize
+from tests.runs import scored, vectorize
 from warpsplat.drawing.byte_limit import DEAREST, PRICE_STEP, PRICES, Sketch, best_within
 from warpsplat.drawing.subjects import choose_subject
 from warpsplat.drawing.trace.trace import trace
@@ -34,12 +34,10 @@ def squares() -> FloatArray:
 def test_a_drawing_has_as_many_regions_as_fit(device: str) -> None:
     """Squares have no node to spare: some of them have to go."""
     whole = vectorize(squares(), make_settings(subject="drawing"), Backend.on(device))
-    assert whole.score
     assert len(whole.scene) >= len(COLORS)
-    limit = round(0.75 * whole.score.bytes)
+    limit = round(0.75 * scored(whole).bytes)
     made = vectorize(squares(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
-    assert made.score
-    assert made.score.bytes <= limit and not made.missed
+    assert scored(made).bytes <= limit and not made.missed
     assert len(COLORS) // 2 <= len(made.scene) < len(whole.scene)
 
 
@@ -58,13 +56,13 @@ def wavy() -> FloatArray:
 @pytest.mark.slow
 def test_outlines_get_simpler_before_regions_go(device: str) -> None:
     whole = vectorize(wavy(), make_settings(subject="drawing"), Backend.on(device))
-    assert whole.score and len(whole.scene) == 2
-    limit = round(0.75 * whole.score.bytes)
+    assert len(whole.scene) == 2
+    limit = round(0.75 * scored(whole).bytes)
     made = vectorize(wavy(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
-    assert made.score and made.score.bytes <= limit and not made.missed
+    assert scored(made).bytes <= limit and not made.missed
     assert len(made.scene) == 2
-    assert made.score.nodes < whole.score.nodes
-    assert made.score.psnr > 25, "without one of the discs it is 12"
+    assert scored(made).nodes < scored(whole).nodes
+    assert scored(made).psnr > 25, "without one of the discs it is 12"
 
 
 def sketch(regions: int, size: int, psnr: float) -> Sketch:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
-from tests.runs import vectorize
+from tests.runs import scored, vectorize
 from tests.scenes import mixed_scene
 from warpsplat.errors import UsageError
 from warpsplat.fit.layered import fit_layered
@@ -70,16 +70,14 @@ def test_each_level_is_a_picture(device: str) -> None:
     assert re.findall('<g id="([^"]+)">', result.svg) == ["level-6", "level-16", "level-40"]
     figures = [level.psnr or 99 for level in result.levels]
     assert [level.shapes for level in result.levels] == list(levels)
-    assert result.score
-    assert figures[-1] == pytest.approx(result.score.psnr, abs=1e-3)
+    assert figures[-1] == pytest.approx(scored(result).psnr, abs=1e-3)
     assert figures == sorted(figures)
     plain = vectorize(picture(), make_settings(curves=levels[-1], iterations=80), Backend.on(device))
-    assert plain.score
     firsts = [render(plain.scene.take(np.arange(n)), backend=Backend.on(device)) for n in levels[:-1]]
     gains = [a - psnr(255 * b, 255 * picture()) for a, b in zip(figures, firsts, strict=False)]
     # Over five seeds 3.7 to 5.0 dB, and 0.3 to 1.3 dB more for the whole.
     assert np.mean(gains) > 1
-    assert figures[-1] > plain.score.psnr - 2
+    assert figures[-1] > scored(plain).psnr - 2
     work = [progress.work for progress in told]
     assert work == sorted(work)
     assert work[-1] == 1

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
+from tests.runs import scored
 from warpsplat.errors import UsageError
 from warpsplat.files.image import load_image
 from warpsplat.fit.place import grid_scene
@@ -51,11 +52,10 @@ def test_a_transparent_image_makes_a_transparent_file(tmp_path: Path, device: st
     empty = wanted[..., 3] == 0
     assert not shown[:4][empty[:4]].any(), "far from what is drawn"
     assert (shown[..., 3][empty] > 0).mean() < 0.03, "and but for a few pixels beside it"
-    assert result.score is not None
-    assert result.score.psnr > 22
+    assert scored(result).psnr > 22
     # White on white tells nothing: the figure is that on black.
     on_white = score_svg(text, load_image(badge())).psnr
-    assert result.score.psnr < on_white
+    assert scored(result).psnr < on_white
 
 
 @pytest.mark.slow

@@ -54,10 +54,10 @@ WORTHWHILE = 0.004
 RECOVERED = 10.0
 """Largest error of an edit before refitting, over the largest one after: refitting recovers most of it."""
 
-FIRST_END, ROUNDS_END, SECOND_END = 0.4, 0.8, 0.95
+FIRST_END, ROUNDS_END, SECOND_END = 0.2, 0.75, 0.9
 """Shares of the progress at which the first refinement, the rounds, and the second refinement are done."""
 
-ROUND_SHARE = 0.2
+ROUND_SHARE = 0.1
 """Share of the remaining progress of the rounds that each refitting takes."""
 
 Floats = npt.NDArray[np.float64]

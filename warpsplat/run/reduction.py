@@ -99,7 +99,7 @@ class Memory:
     def smaller(
         self, target: FloatArray, name: str, settings: Settings, factor: int
     ) -> tuple[FloatArray, int]:
-        """Reduce ``target``, which was read ``factor`` times smaller, further if need be; return its factor too."""
+        """Reduce ``target``, read ``factor`` times smaller, further if need be; return its factor too."""
         wanted = self.factor(name, settings, factor)
         return (target if wanted == factor else boxed(target, wanted // factor)), wanted
 

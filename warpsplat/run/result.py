@@ -69,8 +69,8 @@ class Result:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result; an existing file is replaced atomically.
 
-        The ending decides the format: ``.svg``, ``.svgz`` gzipped, ``.png`` as a viewer shows it, ``.pdf`` (the
-        extra ``pdf``) its paths.
+        The ending decides the format: ``.svg``, ``.svgz`` gzipped, ``.png`` as a viewer shows it, or ``.pdf``
+        (the extra ``pdf``) its paths.
 
         Raises:
             UsageError: the package that makes PDFs is not installed.

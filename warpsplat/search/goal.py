@@ -17,7 +17,7 @@ from warpsplat.fit.rate import DB_PER_DOUBLING
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary
-from warpsplat.search.candidate import Candidate, Change, changed, measured
+from warpsplat.search.candidate import LAST_STEPS, Candidate, Change, changed, measured
 from warpsplat.search.few_shapes import FEW, for_few
 from warpsplat.svg.write import GRIDS
 
@@ -52,8 +52,8 @@ TRIES = 3
 ROUNDS = 6
 """Most times that shapes are removed or added."""
 
-PROBES_END, FIRST_END = 0.1, 0.55
-"""Shares of the progress at which the probe runs, and the first fits, are done."""
+LIKELY_PROBES, LIKELY_ROUNDS = 2, 3
+"""Probe runs and rounds that a search takes on average, for its progress."""
 
 ENOUGH_DB = 0.03
 """A file this little above the target is small enough [dB]."""
@@ -97,15 +97,16 @@ def search_goal(problem: Problem, run: Run) -> Fit:
     settings, curves, done = problem.settings, problem.settings.curves, 0
     if settings.max_bytes:
         curves = affordable_curves(settings, *problem.size)
+    probed, fitted = _progress(settings)
     if settings.target_psnr:
-        curves, done, last = estimate_curves(problem, curves, run.part(0.0, PROBES_END))
+        curves, done, last = estimate_curves(problem, curves, run.part(0.0, probed))
         if last.interrupted:
             return replace(last, iterations=done)
-    first, steps = fit_first(problem.having(curves=curves), run.part(PROBES_END, FIRST_END))
+    first, steps = fit_first(problem.having(curves=curves), run.part(probed, fitted))
     done += steps
     if first.interrupted:
         return replace(first, iterations=done)
-    tried, parts = [measured(problem, first)], run.open_parts(FIRST_END)
+    tried, parts = [measured(problem, first)], run.open_parts(fitted, 1 / LIKELY_ROUNDS)
     for _ in range(ROUNDS):
         change = next_change(tried, settings)
         if change is None or run.over():
@@ -120,6 +121,13 @@ def search_goal(problem: Problem, run: Run) -> Fit:
         tried.append(candidate)
     best = min(tried, key=lambda candidate: _rank(candidate, settings))
     return replace(best.fit, iterations=done, interrupted=run.stopped())
+
+
+def _progress(settings: Settings) -> tuple[float, float]:
+    """Return the likely shares of all steps that are done after the probe runs, and after the first fit."""
+    probes = LIKELY_PROBES * _draft(settings).iterations if settings.target_psnr else 0
+    steps = probes + (1 + LIKELY_ROUNDS * LAST_STEPS) * settings.iterations
+    return probes / steps, (probes + settings.iterations) / steps
 
 
 def _for_search(problem: Problem) -> Problem:
