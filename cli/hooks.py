@@ -15,7 +15,7 @@ from warpsplat.errors import UsageError
 from warpsplat.extensions import extensions, load
 
 if TYPE_CHECKING:
-    from warpsplat.fit.work import Progress
+    from warpsplat.fit.progress import Progress
     from warpsplat.run.result import Result
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -76,10 +76,10 @@ def command(
     if checkpoint:
         check_output(checkpoint, svg, image)
     hooks.check([svg, image], [output, *filter(None, [checkpoint])], overwrite=overwrite)
-    from warpsplat.api.refine import refine
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.summary import summary
+    from warpsplat.run.refine import refine
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)

@@ -58,7 +58,7 @@ def command(
     try:
         check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
         if renderer != "viewer":
-            from warpsplat.api.render import render
+            from warpsplat.run.render import render
 
             png = to_png(render(text, scale=scale, renderer=renderer, device=device, threads=threads))
             write_result(output, mark_png(png))

@@ -1,4 +1,4 @@
-"""One run with a progress bar, that Ctrl-C ends with the best so far."""
+"""Runs on one image, with a progress bar; Ctrl-C ends them with the best result so far."""
 
 from __future__ import annotations
 
@@ -12,42 +12,39 @@ from typing import Any
 
 import click
 
-from warpsplat.api.several import vectorize_several
-from warpsplat.api.suggest import suggest
-from warpsplat.api.vectorize import vectorize
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Hooks
 from warpsplat.cli.request import Request
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
 from warpsplat.files.inputs import input_name
+from warpsplat.fit.progress import Progress, TimeLeft
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.work import Progress, TimeLeft
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.run.result import Result
-from warpsplat.run.suggest import Suggestion
+from warpsplat.run.several import vectorize_several
+from warpsplat.run.suggest import Suggestion, suggest
+from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
 
 SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing", "pixel": "picture of cells"}
-"""What messages call what an image shows."""
+"""Subjects as messages call them."""
 
 BAR_LENGTH = 1000
-"""Of a progress bar: thousandths of the work."""
+"""Length of a progress bar: thousandths of the work."""
 
 
 class Bar:
-    """What a bar shows of a run's reports: nothing of it goes back."""
+    """The text beside a progress bar, whose decibels never fall."""
 
     def __init__(self) -> None:
         self._time = TimeLeft()
         self._best = -math.inf
-        self.work = 0.0
 
     def update(self, progress: Progress, now: float) -> str:
-        """Take note of a report, and say what there is to say, at a time ``now`` [s]."""
-        self.work = max(self.work, progress.work)  # the share falls where a goal takes more than was thought
+        """Return the text for a progress report at a time ``now`` [s]."""
         if progress.fine:  # a reduced image has more decibels than the whole one
             self._best = max(self._best, progress.psnr)
         seconds = self._time.update(progress.work, now)
@@ -60,7 +57,7 @@ class Bar:
 def progress_bar(
     source: Path, settings: Settings, *, quiet: bool, verbose: int
 ) -> Iterator[Callable[[Progress], None]]:
-    """A function to report progress to: a bar on stderr where that is a terminal, lines with ``-vv``."""
+    """Yield a callback that shows progress: a bar if stderr is a terminal, else lines with ``-vv``."""
     if not sys.stderr.isatty() or quiet:
 
         def tell(progress: Progress) -> None:
@@ -84,15 +81,14 @@ def progress_bar(
 
         def show(progress: Progress) -> None:
             text = state.update(progress, time.monotonic())
-            bar.update(round(BAR_LENGTH * state.work) - bar.pos, text)
+            bar.update(round(BAR_LENGTH * progress.work) - bar.pos, text)
 
         yield show
 
 
 @contextlib.contextmanager
 def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Progress], None], Interrupt]]:
-    """What a run on the image of ``request`` reports to, a progress bar, and what it asks whether to stop,
-    Ctrl-C.
+    """Yield the progress callback of a run on the image of ``request``, and its stop callback, Ctrl-C.
 
     Raises:
         UsageError: an unknown device is found before a bar is shown.
@@ -108,9 +104,15 @@ def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Pr
 def run_file(
     request: Request, output: Path, settings: Settings, data: bytes, *, hooks: Hooks, **keeping: Any
 ) -> Result:
-    """``warpsplat.vectorize`` of the image, whose bytes are ``data``.
+    """Vectorize an image with a progress bar.
 
-    ``hooks``: what extensions add to the run. ``keeping``: how its state is kept, see there.
+    Args:
+        request: the image and where to compute.
+        output: the file.
+        settings: of the run.
+        data: bytes of the image.
+        hooks: what extensions add to the run.
+        keeping: ``checkpoint`` and what goes with it, see ``warpsplat.vectorize``.
     """
     if request.verbose:
         say_start(request, _asked(settings))
@@ -134,7 +136,7 @@ def run_file(
 def run_several(
     request: Request, outputs: Sequence[Path], numbers: Sequence[int], settings: Settings, data: bytes
 ) -> tuple[Result, ...]:
-    """``warpsplat.vectorize_several`` of the image, whose bytes are ``data``, with one bar."""
+    """Vectorize an image, whose bytes are ``data``, with several numbers of shapes and one progress bar."""
     if request.verbose:
         say_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
     with watched(request, settings) as (report, stop):
@@ -144,36 +146,36 @@ def run_several(
 
 
 def suggest_file(request: Request, settings: Settings, data: bytes) -> Suggestion | None:
-    """``warpsplat.suggest`` for the image, whose bytes are ``data``."""
+    """Suggest a number of shapes for the image, whose bytes are ``data``."""
     with watched(request, settings) as (report, stop):
         return suggest(data, settings=settings, callback=report, stop=stop, **request.source)
 
 
 def _asked(settings: Settings) -> str:
-    """How many shapes of which kind are asked for."""
-    pursued = settings.target_psnr or settings.max_bytes
-    number = f"{'at most ' if settings.simplify or pursued else ''}{settings.curves}"
-    if settings.simplify and pursued:
+    """Return the number and kind of shapes that are asked for."""
+    has_goal = settings.target_psnr or settings.max_bytes
+    number = f"{'at most ' if settings.simplify or has_goal else ''}{settings.curves}"
+    if settings.simplify and has_goal:
         number = "no more than needed"
     return f"{number} {'fills and strokes' if settings.mixed else PLURALS[settings.kind]}"
 
 
 def say_start(request: Request, what: str) -> None:
-    """Say what is about to be made, and where."""
+    """Print what is about to be made, and on which device."""
     start_warp()
     echo(f"{request.image}: {what} on {choose_device(request.device)}", err=True)
 
 
 def say_about(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
-    """Say what the image was taken for, and what else happened that one might not expect."""
-    pursued = settings.target_psnr or settings.max_bytes
+    """Print what the image was taken for, and what else may be unexpected."""
+    has_goal = settings.target_psnr or settings.max_bytes
     count = len(result.scene)
     traced = result.subject != "photo"
     if result.why and (traced or verbose):
         other = "; --subject photo fits translucent shapes" if traced else ""
         taken = f"taken for a {SUBJECTS[result.subject]}"
         echo(f"warpsplat: {input_name(source)}: {taken}: {result.why}{other}", err=True)
-    if not traced and settings.simplify and not pursued and count < settings.curves:
+    if not traced and settings.simplify and not has_goal and count < settings.curves:
         hint = f"a simple image: {count} shapes; --curves N for another number"
         echo(f"warpsplat: {input_name(source)}: {hint}", err=True)
     say_reduced(input_name(source), result)
@@ -181,20 +183,20 @@ def say_about(source: Path, settings: Settings, result: Result, *, verbose: int)
 
 
 def say_reduced(name: str, result: Result) -> None:
-    """Say what was done on ``name`` to stay below the limit of memory, if something was."""
+    """Print what was done to stay below the limit of memory, if anything."""
     if result.reduced:
         echo(f"warpsplat: {name}: {result.reduced}", err=True)
 
 
 def say_renewed(name: str, result: Result) -> None:
-    """Say how many shapes had to be set anew in the training on ``name``, if there were some."""
+    """Print how many shapes had to be reset in the training, if any."""
     if result.renewed:
         found = f"numbers of shapes that are not finite, {result.renewed} times; these began anew"
         echo(f"warpsplat: {name}: {found}", err=True)
 
 
 def leave(result: Result) -> None:
-    """Name missed goals and end the program with the code for it, if there is one to give."""
+    """Print missed goals, and end the program with the exit code for them, if there are any."""
     for goal in result.missed:
         echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.missed:

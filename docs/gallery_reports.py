@@ -6,7 +6,7 @@ from functools import cache
 
 from gallery import Entry, entries
 
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 from warpsplat.pages.reports.single import Facts, report_page
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import start_warp

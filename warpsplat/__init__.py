@@ -13,49 +13,51 @@ from warpsplat._version import __version__ as __version__
 from warpsplat.extensions import declared
 
 if TYPE_CHECKING:
-    from warpsplat.api.images import load_image as load_image
-    from warpsplat.api.images import starting_scene as starting_scene
-    from warpsplat.api.refine import refine as refine
-    from warpsplat.api.render import render as render
-    from warpsplat.api.several import vectorize_several as vectorize_several
-    from warpsplat.api.suggest import suggest as suggest
-    from warpsplat.api.svg import load_svg as load_svg
-    from warpsplat.api.svg import save_svg as save_svg
-    from warpsplat.api.svg import score as score
-    from warpsplat.api.vectorize import vectorize as vectorize
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
     from warpsplat.errors import ResourceError as ResourceError
     from warpsplat.errors import UsageError as UsageError
     from warpsplat.errors import WarpsplatError as WarpsplatError
+    from warpsplat.fit.progress import Progress as Progress
+    from warpsplat.fit.progress import Snapshot as Snapshot
     from warpsplat.fit.settings import Settings as Settings
     from warpsplat.fit.settings import make_settings as make_settings
-    from warpsplat.fit.work import Progress as Progress
-    from warpsplat.fit.work import Snapshot as Snapshot
     from warpsplat.metrics import Score as Score
     from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.pages.report import report as report
+    from warpsplat.run.images import load_image as load_image
+    from warpsplat.run.images import starting_scene as starting_scene
+    from warpsplat.run.refine import refine as refine
+    from warpsplat.run.render import render as render
     from warpsplat.run.render import to_pillow as to_pillow
     from warpsplat.run.result import Result as Result
+    from warpsplat.run.several import vectorize_several as vectorize_several
     from warpsplat.run.suggest import Expected as Expected
     from warpsplat.run.suggest import Suggestion as Suggestion
+    from warpsplat.run.suggest import suggest as suggest
+    from warpsplat.run.svg import load_svg as load_svg
+    from warpsplat.run.svg import save_svg as save_svg
+    from warpsplat.run.svg import score as score
+    from warpsplat.run.vectorize import vectorize as vectorize
     from warpsplat.scene import Canvas as Canvas
     from warpsplat.scene import Scene as Scene
 
 _HOMES = {
-    "vectorize": "warpsplat.api.vectorize",
-    "vectorize_several": "warpsplat.api.several",
-    "suggest": "warpsplat.api.suggest",
-    "refine": "warpsplat.api.refine",
-    "render": "warpsplat.api.render",
-    **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.api.images"),
-    **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.api.svg"),
+    "vectorize": "warpsplat.run.vectorize",
+    "vectorize_several": "warpsplat.run.several",
+    "suggest": "warpsplat.run.suggest",
+    "refine": "warpsplat.run.refine",
+    "render": "warpsplat.run.render",
+    "report": "warpsplat.pages.report",
+    **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.run.images"),
+    **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.run.svg"),
     **dict.fromkeys(
         ("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"), "warpsplat.errors"
     ),
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
-    **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.work"),
+    **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.progress"),
+    "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.run.render",
     "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",

@@ -12,11 +12,11 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run
-from warpsplat.api.svg import load_svg, save_svg
 from warpsplat.errors import UsageError
 from warpsplat.files.output import may_replace
 from warpsplat.metrics import psnr
 from warpsplat.run.formats import write_named
+from warpsplat.run.svg import load_svg, save_svg
 from warpsplat.svg.viewer import on_white, render_svg
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="64" height="48">

@@ -177,7 +177,7 @@ def test_whatever_is_raised_is_one_line_and_a_code(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("warpsplat.run.training.fit", fail)
+    monkeypatch.setattr("warpsplat.run.strategies.fit", fail)
     assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
     assert words in one_line(capsys.readouterr().err)
     monkeypatch.setenv("WARPSPLAT_TRACEBACK", "1")

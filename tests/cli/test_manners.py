@@ -88,7 +88,7 @@ def test_an_interruption_is_one_as_well(
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("warpsplat.run.training.fit", stop)
+    monkeypatch.setattr("warpsplat.run.strategies.fit", stop)
     assert run("vectorize", image, "-o", image.parent / "a.svg", "--json", *QUICK) == 130
     assert json.loads(capsys.readouterr().out) == {"error": "interrupted", "exit_code": 130}
 

@@ -14,7 +14,7 @@ import warpsplat
 from tests.cli.helpers import one_line, run
 from warpsplat.cli.main import main
 from warpsplat.drawing.trace.trace import Traced, trace
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 from warpsplat.run.suggest import suggestion
 from warpsplat.scene import FloatArray
 from warpsplat.search.survey import Worth
@@ -180,7 +180,7 @@ def test_a_drawing_that_has_fewer_regions_is_traced_once(
         calls.append(most)
         return trace(image, most=most)
 
-    monkeypatch.setattr("warpsplat.drawing.subjects.trace", noted)
+    monkeypatch.setattr("warpsplat.drawing.draw.trace", noted)
     settings = warpsplat.make_settings(subject="drawing")
     few, many, most = warpsplat.vectorize_several(path, [1, 9, 99], settings=settings, device="cpu")
     assert len(calls) == 2, "what 9 limit as little as 99 do is made once"

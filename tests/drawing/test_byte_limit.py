@@ -8,15 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from warpsplat.drawing.byte_limit import DEAREST, FEWER_ROUNDS, PRICE_STEP, PRICES, Sketch, Tries, best_within
-from warpsplat.drawing.subjects import decided
+from tests.runs import scored, vectorize
+from warpsplat.drawing.byte_limit import DEAREST, PRICE_STEP, PRICES, Sketch, best_within
+from warpsplat.drawing.subjects import choose_subject
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray
 
 COLORS = ("e00", "0a0", "00e", "ea0", "0ae", "a0e", "555", "000")
@@ -35,12 +34,10 @@ def squares() -> FloatArray:
 def test_a_drawing_has_as_many_regions_as_fit(device: str) -> None:
     """Squares have no node to spare: some of them have to go."""
     whole = vectorize(squares(), make_settings(subject="drawing"), Backend.on(device))
-    assert whole.score
     assert len(whole.scene) >= len(COLORS)
-    limit = round(0.75 * whole.score.bytes)
+    limit = round(0.75 * scored(whole).bytes)
     made = vectorize(squares(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
-    assert made.score
-    assert made.score.bytes <= limit and not made.missed
+    assert scored(made).bytes <= limit and not made.missed
     assert len(COLORS) // 2 <= len(made.scene) < len(whole.scene)
 
 
@@ -59,13 +56,13 @@ def wavy() -> FloatArray:
 @pytest.mark.slow
 def test_outlines_get_simpler_before_regions_go(device: str) -> None:
     whole = vectorize(wavy(), make_settings(subject="drawing"), Backend.on(device))
-    assert whole.score and len(whole.scene) == 2
-    limit = round(0.75 * whole.score.bytes)
+    assert len(whole.scene) == 2
+    limit = round(0.75 * scored(whole).bytes)
     made = vectorize(wavy(), make_settings(subject="drawing", max_bytes=limit), Backend.on(device))
-    assert made.score and made.score.bytes <= limit and not made.missed
+    assert scored(made).bytes <= limit and not made.missed
     assert len(made.scene) == 2
-    assert made.score.nodes < whole.score.nodes
-    assert made.score.psnr > 25, "without one of the discs it is 12"
+    assert scored(made).nodes < scored(whole).nodes
+    assert scored(made).psnr > 25, "without one of the discs it is 12"
 
 
 def sketch(regions: int, size: int, psnr: float) -> Sketch:
@@ -92,7 +89,7 @@ def test_what_shows_more_is_taken() -> None:
 
     for worth, regions in ((30.0, 8), (21.0, 4)):
         asked.clear()
-        made = best_within(drawn(8), 600, drawn, priced(worth), lambda: False, None)
+        made = best_within(drawn(8), 600, drawn, priced(worth), lambda: False)
         assert len(made.scene) == regions
         assert made.render_psnr == (30.0 if regions == 8 else 24.0)
         prices = [price for count, price in asked if count == 8]
@@ -109,7 +106,7 @@ def test_where_nothing_fits_the_smallest_is_taken() -> None:
         return sketch(len(drawing.scene), 900, 30.0)
 
     made = best_within(
-        sketch(2, 1000, 40.0), 10, lambda count: sketch(count, 500, 10.0), again, lambda: False, None
+        sketch(2, 1000, 40.0), 10, lambda count: sketch(count, 500, 10.0), again, lambda: False
     )
     assert len(made.scene) == 1
     assert asked == 2 * [8.0, 64.0, 512.0, DEAREST]
@@ -121,30 +118,7 @@ def test_a_size_leaves_drawings_what_they_are() -> None:
         cv2.circle(
             image, (25 + 45 * (i % 4), 40 + 80 * (i // 4)), 15 + i, (0.1 * i, 0.5, 0.9), -1, cv2.LINE_AA
         )
-    settings, why = decided(image, make_settings(max_bytes="1KB"))
+    settings, why = choose_subject(image, make_settings(max_bytes="1KB"))
     assert settings.subject == "drawing" and why
-    settings, why = decided(image, make_settings(target_psnr=30.0))
+    settings, why = choose_subject(image, make_settings(target_psnr=30.0))
     assert settings.subject == "photo" and "target-psnr" in why
-
-
-def test_tries_of_a_size_are_one_progress() -> None:
-    """Each is expected to go on from where the one before it ended, not to begin anew."""
-    traced, told = trace(squares()).scene, list[Progress]()
-
-    def half_way(tries: Tries, shapes: int) -> float:
-        report = tries.begun(traced.take(np.arange(shapes)))
-        assert report
-        report(Progress(1, 2, 20.0, 0.0, 0.5, fine=True))
-        return told[-1].work
-
-    assert half_way(Tries(told.append, 10**6), 8) == pytest.approx(0.5), "it fits"
-    tries = Tries(told.append, 100)
-    first = half_way(tries, 8)
-    assert 0 < tries.left < FEWER_ROUNDS, "with 8 regions there is not much to choose"
-    assert 0 < first < 0.25
-    tries.left = 1.0
-    second = half_way(tries, 4)
-    assert second > first
-    tries.left = 0.0
-    assert half_way(tries, 4) > second
-    assert Tries(None, 100).begun(traced) is None

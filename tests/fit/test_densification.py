@@ -18,6 +18,7 @@ from warpsplat.fit.budget import Budget
 from warpsplat.fit.densification import densify, remove_surplus
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.schedule import mean_points_at
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.simplify import MIN_SPLINE_POINTS
@@ -154,7 +155,7 @@ def test_a_checkpoint_keeps_the_surplus(tmp_path: Path) -> None:
 def test_figures_of_a_stopped_run_are_those_of_what_is_left(device: str) -> None:
     target = picture()
     settings = make_settings(curves=CURVES, iterations=100, seed=1)
-    made = fit(target, settings, Backend.on(device), stop=after(LATE), finish=False)
+    made = fit(Problem(target, settings), Run(Backend.on(device), stop=after(LATE)), rounding=None)
     error = np.square(render(made.scene, backend=Backend.on(device)) - target).mean()
     assert made.render_psnr == pytest.approx(-10 * np.log10(error), abs=0.1)
     assert made.estimated_psnr == pytest.approx(made.render_psnr, abs=0.1)

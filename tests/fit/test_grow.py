@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import empty_scene
+from tests.runs import vectorize
 from warpsplat.errors import UsageError
 from warpsplat.fit.elongated import ComponentBars
 from warpsplat.fit.grow import ERROR_LEVELS, candidates, new_shapes
@@ -16,7 +17,6 @@ from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.settings import make_settings
 from warpsplat.portable import filters
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray, Kind
 from warpsplat.scene.geometry import areas
 

@@ -10,6 +10,7 @@ from tests.kernels import trials
 from warpsplat.fit import losses
 from warpsplat.fit.loop import fit
 from warpsplat.fit.losses import Loss, LossInputs
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.program import Program
@@ -29,10 +30,10 @@ def launch_thin(program: Program, inputs: LossInputs, weight: float) -> None:
 
 def fits(device: str, monkeypatch: pytest.MonkeyPatch, name: str, loss: Loss) -> list[Scene]:
     """A short fit without and one with the loss."""
-    scenes = []
+    problem, scenes = Problem(picture(), make_settings(curves=8, iterations=40)), []
     for further in ((), (loss,)):
         monkeypatch.setattr(losses, name, (*getattr(losses, name), *further))
-        scenes.append(fit(picture(), make_settings(curves=8, iterations=40), Backend.on(device)).scene)
+        scenes.append(fit(problem, Run(Backend.on(device))).scene)
     return scenes
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture, step_for
+from tests.runs import vectorize
 from tests.scenes import random_scene, with_two_stops
 from warpsplat.fit.paints import choose_paints
 from warpsplat.fit.settings import make_settings
@@ -15,7 +16,6 @@ from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own

@@ -12,6 +12,8 @@ from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.recover import recover
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
@@ -140,7 +142,8 @@ def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> 
             poison(self, "colors", "value")
 
     monkeypatch.setattr(Step, "advance", spoiled)
-    made = fit(image, replace(SETTINGS, curves=9), Backend.on("cpu", 1))
+    told: list[Progress] = []
+    made = fit(Problem(image, replace(SETTINGS, curves=9)), Run(Backend.on("cpu", 1), told.append))
     assert made.renewed == 1
     assert np.isfinite([made.render_psnr, made.estimated_psnr]).all()
     assert write_svg(made.scene, per_pixel=made.per_pixel)

@@ -13,6 +13,7 @@ from tests.scenes import mixed_scene, random_scene, started_alike
 from warpsplat.fit import rounding
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rate import DB_PER_DOUBLING, byte_worth
 from warpsplat.fit.rounding import STAGES, choose_grid, freeze_opacities, freeze_stage, opacities_at, stage_at
 from warpsplat.fit.settings import make_settings
@@ -166,18 +167,18 @@ def test_no_grid_is_finer_than_the_precision(
 @pytest.mark.parametrize("basis", list(Basis))
 def test_a_run_ends_with_what_the_file_has(device: str, kind: Kind, basis: Basis) -> None:
     settings = make_settings(kind=kind, basis=basis, curves=10, iterations=60)
-    made = fit(picture(), settings, Backend.on(device))
-    low = rounded(made.scene, made.per_pixel)
-    np.testing.assert_array_equal(made.scene.points, low.points)
-    np.testing.assert_array_equal(made.scene.widths, low.widths)
+    made = fit(Problem(picture(), settings), Run(Backend.on(device)))
+    held = rounded(made.scene, made.per_pixel)
+    np.testing.assert_array_equal(made.scene.points, held.points)
+    np.testing.assert_array_equal(made.scene.widths, held.widths)
     opaque = made.scene.opacities == OPAQUE
-    np.testing.assert_array_equal(made.scene.opacities[~opaque], low.opacities[~opaque])
-    assert set(low.opacities[~opaque].tolist()) <= {float(np.float32(n / 10)) for n in range(1, 10)}
-    assert (low.opacities[opaque] == 1).all()
+    np.testing.assert_array_equal(made.scene.opacities[~opaque], held.opacities[~opaque])
+    assert set(held.opacities[~opaque].tolist()) <= {float(np.float32(n / 10)) for n in range(1, 10)}
+    assert (held.opacities[opaque] == 1).all()
     back, _ = load_scene(export(made.scene, settings, made.per_pixel), 64, 48, "a.svg")
     np.testing.assert_array_equal(back.basis, made.scene.basis)
-    if (back.first == low.first).all():
-        np.testing.assert_allclose(started_alike(back, low).points, low.points, rtol=3e-7, atol=1e-6)
+    if (back.first == held.first).all():
+        np.testing.assert_allclose(started_alike(back, held).points, held.points, rtol=3e-7, atol=1e-6)
     else:  # cubics without extent are left out
         assert basis == Basis.CUBIC
 
@@ -186,4 +187,5 @@ def test_a_run_ends_with_what_the_file_has(device: str, kind: Kind, basis: Basis
 @pytest.mark.parametrize("precision", [0, 1])
 def test_runs_of_few_steps_keep_to_the_precision(device: str, iterations: int, precision: int) -> None:
     settings = make_settings(curves=6, iterations=iterations, precision=precision)
-    assert fit(picture(), settings, Backend.on(device)).per_pixel <= 10**precision
+    made = fit(Problem(picture(), settings), Run(Backend.on(device)))
+    assert made.per_pixel <= 10**precision

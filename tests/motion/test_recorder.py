@@ -14,7 +14,7 @@ from PIL import Image
 from tests.scenes import mixed_scene, with_gradients
 from warpsplat import Canvas, Recorder, Result, Scene, UsageError
 from warpsplat.files.output import may_replace
-from warpsplat.fit.work import Progress, Snapshot
+from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import psnr
 from warpsplat.motion import films, recorder
 from warpsplat.motion.timing import HOLD, kept, showings

@@ -9,6 +9,7 @@ import pytest
 
 from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
+from tests.runs import vectorize
 from tests.scenes import random_scene
 from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
@@ -17,7 +18,6 @@ from warpsplat.metrics import score_svg
 from warpsplat.paper.renderers import fold_weight
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.figures import render_figures
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import write_svg
 

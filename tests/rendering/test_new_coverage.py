@@ -17,6 +17,7 @@ from tests.helpers import renderer_for
 from tests.kernels import trials
 from tests.scenes import random_scene
 from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import make_settings
 from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend, buffer
@@ -154,7 +155,7 @@ def test_a_run_trains_them(device: str, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("warpsplat.fit.step.model_for", lambda *_: BoxModel())
     seen = []
     settings = make_settings(curves=12, iterations=100, viewer=False)
-    done = fit(picture(), settings, Backend.on(device), report=lambda progress: seen.append(progress.psnr))
+    done = fit(Problem(picture(), settings), Run(Backend.on(device), lambda now: seen.append(now.psnr)))
     assert len(done.scene) == 12
     assert seen[-1] > seen[0] + 3
     np.testing.assert_allclose(

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import warpsplat
+from tests.runs import scored
 from warpsplat.errors import UsageError
 from warpsplat.files.image import load_image
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
-from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize_image
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own
 
@@ -40,7 +40,7 @@ def badge(opaque: bool = False) -> bytes:
 def made(tmp_path: Path, device: str, source: bytes, **settings: object) -> tuple[Result, str]:
     output = tmp_path / "o.svg"
     chosen = make_settings(curves=12, iterations=200, **settings)
-    return vectorize_image(source, chosen, Backend.on(device), output=output), output.read_text()
+    return warpsplat.vectorize(source, settings=chosen, device=device, output=output), output.read_text()
 
 
 @pytest.mark.slow
@@ -52,11 +52,10 @@ def test_a_transparent_image_makes_a_transparent_file(tmp_path: Path, device: st
     empty = wanted[..., 3] == 0
     assert not shown[:4][empty[:4]].any(), "far from what is drawn"
     assert (shown[..., 3][empty] > 0).mean() < 0.03, "and but for a few pixels beside it"
-    assert result.score is not None
-    assert result.score.psnr > 22
+    assert scored(result).psnr > 22
     # White on white tells nothing: the figure is that on black.
     on_white = score_svg(text, load_image(badge())).psnr
-    assert result.score.psnr < on_white
+    assert scored(result).psnr < on_white
 
 
 @pytest.mark.slow

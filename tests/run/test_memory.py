@@ -242,7 +242,7 @@ def test_refining_against_what_takes_too_much_is_refused(
     assert facts
     limit = memory.need_refined(facts, make_settings())
     assert run(*arguments, "--max-memory", limit) == 0
-    monkeypatch.setattr("warpsplat.api.refine.load_target", None)
+    monkeypatch.setattr("warpsplat.run.refine.load_target", None)
     capsys.readouterr()
     assert run(*arguments, "--max-memory", limit - 1) == ExitCode.RESOURCES
     error = one_line(capsys.readouterr().err)

@@ -10,13 +10,15 @@ import pytest
 from PIL import Image
 
 from tests.fit.pictures import picture
+from tests.runs import scored
 from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.refine import likeness, refine
+from warpsplat.run.refine import likeness, refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.page import placed
@@ -29,7 +31,7 @@ from warpsplat.svg.write import write_svg
 def improved(
     text: str, target: np.ndarray, settings: Settings, device: str, **how: bool
 ) -> tuple[Result, float]:
-    refined = refine(text, target, settings, Backend.on(device), name="a.svg", **how)
+    refined = refine_svg(text, Problem(target, settings), Run(Backend.on(device)), "a.svg", **how)
     assert refined.before is not None
     return refined, refined.before
 
@@ -40,9 +42,9 @@ def test_nothing_is_added(device: str) -> None:
     for behind in ("", '<rect width="40" height="30" fill="#ccc"/>'):
         text = f'{HEAD}width="40" height="30">{behind}<path d="M5 5H35V25Z" fill="red"/></svg>'
         result, before = improved(text, target, make_settings(iterations=10), device)
-        assert result.score and result.score.psnr > before
+        assert scored(result).psnr > before
         assert result.svg.count("<rect") == (1 if behind else 0)
-        assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
+        assert scored(result).psnr == pytest.approx(score_svg(result.svg, target).psnr)
 
 
 def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
@@ -52,10 +54,9 @@ def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
     moved = replace(scene, points=scene.points + rng.normal(0, 1, scene.points.shape).astype(np.float32))
     text = write_svg(moved)
     result, before = improved(text, target, make_settings(iterations=120), device)
-    assert result.score
-    assert result.score.psnr > before + 4
-    assert result.score.paths == 6
-    assert result.score.nodes <= 6 * 6
+    assert scored(result).psnr > before + 4
+    assert scored(result).paths == 6
+    assert scored(result).nodes <= 6 * 6
 
 
 def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
@@ -66,8 +67,7 @@ def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
     )
     target = np.full((30, 40, 3), 0.4, np.float32)
     result, _ = improved(text, target, make_settings(iterations=10), device)
-    assert result.score
-    assert result.score.nodes <= 20
+    assert scored(result).nodes <= 20
 
 
 def test_pictures_are_compared_strip_by_strip(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,11 +96,10 @@ def test_splines_of_own_files_stay_splines(device: str, kind: Kind) -> None:
     text = write_svg(replace(scene, points=(scene.points + noise).astype(np.float32)), per_pixel=10)
     settings = make_settings(iterations=60, precision=1)
     result, before = improved(text, target, settings, device)
-    assert result.score
-    assert result.score.psnr > before + 3
+    assert scored(result).psnr > before + 3
     assert set(result.scene.basis) == {Basis.SPLINE}
     np.testing.assert_array_equal(result.scene.first, scene.first)
-    assert result.score.bytes < 1.15 * len(text), "0.92 to 0.97 over five seeds"
+    assert scored(result).bytes < 1.15 * len(text), "0.92 to 0.97 over five seeds"
     back, _ = load_scene(result.svg, 48, 40, "b.svg")
     np.testing.assert_array_equal(back.basis, scene.basis)
 
@@ -111,8 +110,7 @@ def test_an_own_file_of_both_bases_is_refined(device: str) -> None:
     text = write_svg(ragged_scene(outlines, 48, 40, seed=1), per_pixel=3)
     target = np.full((80, 96, 3), 0.4, np.float32)
     result, before = improved(text, target, make_settings(iterations=10), device)
-    assert result.score
-    assert result.score.psnr > before
+    assert scored(result).psnr > before
     assert result.scene.basis.tolist() == [basis for _, basis, _ in outlines]
 
 
@@ -130,8 +128,7 @@ def test_shapes_of_any_kind_are_refined_together(device: str) -> None:
     wanted = text.replace("M3 3h20v20", "M4 4h19v22").replace("#a33", "#393").replace("l9 18", "l7 19")
     target = (on_white(render_svg(wanted)) / 255).astype(np.float32)
     result, before = improved(text, target, make_settings(iterations=80), device)
-    assert result.score
-    assert result.score.psnr > before + 6
+    assert scored(result).psnr > before + 6
     assert result.svg.count("<path") == 3
     for word in ("evenodd", "stroke-dasharray", "linearGradient", "fill-opacity"):
         assert word in result.svg
@@ -161,9 +158,9 @@ def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) ->
     still = write_svg(scene, per_pixel=2, background=not sheet.get("background"))
     text = placed(still, settings.size, settings.page, settings.units)
     wanted, result = (improved(svg, target, settings, device)[0] for svg in (still, text))
-    assert result.score and wanted.score and result.before
-    assert result.score.psnr == wanted.score.psnr > result.before
-    assert result.score.bytes == len(result.svg.encode())
+    assert wanted.score and result.before
+    assert scored(result).psnr == scored(wanted).psnr > result.before
+    assert scored(result).bytes == len(result.svg.encode())
     assert result.svg[result.svg.index("<path") :].strip() in wanted.svg
     before, after = (SHEET.match(svg) for svg in (text, result.svg))
     assert before and after and after.groups()[:2] == before.groups()[:2]
@@ -186,9 +183,8 @@ def test_what_lies_around_kept_elements_is_fitted_to_what_is_seen(device: str) -
     target = (on_white(render_svg(FILTERED)) / 255).astype(np.float32)
     moved = FILTERED.replace("M3 4h14v22h-14z", "M5 6h12v18h-12z").replace("M14 12h20v14z", "M18 13h13v10z")
     result, before = improved(moved, target, make_settings(iterations=150), device, keep=True)
-    assert result.score
-    assert result.score.psnr > before + 12
-    assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr)
+    assert scored(result).psnr > before + 12
+    assert scored(result).psnr == pytest.approx(score_svg(result.svg, target).psnr)
     below, above = result.svg.split(COVER)
     assert (below.count("<path"), above.count("<path")) == (2, 1)
     assert result.as_dict()["curves"] == 3
@@ -203,8 +199,7 @@ def test_what_blends_is_seen_as_well(device: str) -> None:
     target = (on_white(render_svg(text % '<path d="M5 5h30v12h-30z" fill="#4ac"/>')) / 255).astype(np.float32)
     moved = text % '<path d="M7 7h25v12h-25z" fill="#4ac"/>'
     result, before = improved(moved, target, make_settings(iterations=200), device, keep=True)
-    assert result.score
-    assert result.score.psnr > max(before + 8, 28)
+    assert scored(result).psnr > max(before + 8, 28)
     assert blend in result.svg
 
 
@@ -216,12 +211,11 @@ def test_a_transparent_image_keeps_the_file_transparent(device: str) -> None:
     text = f'{HEAD}width="40" height="30"><path d="M5 5h20v20h-20z" fill="#fff" fill-opacity=".7"/></svg>'
     target = clear(text.replace("M5 5h20v20", "M8 6h22v18"))
     result, before = improved(text, target, make_settings(iterations=100), device)
-    assert result.score
-    assert result.score.psnr > before + 10
+    assert scored(result).psnr > before + 10
     assert "<rect" not in result.svg
     shown = np.asarray(render_svg(result.svg).convert("RGBA"))
     assert not shown[target[..., 3] == 0].any(), "what is empty stays empty"
-    assert result.score.psnr == pytest.approx(score_svg(result.svg, target).psnr), "on black and on white"
+    assert scored(result).psnr == pytest.approx(score_svg(result.svg, target).psnr), "on black and on white"
 
 
 def test_backgrounds(device: str) -> None:
@@ -234,8 +228,7 @@ def test_backgrounds(device: str) -> None:
     def corner(text: str, image: np.ndarray, background: str) -> list[int]:
         settings = make_settings(iterations=20, background=background)
         result, before = improved(text, image, settings, device)
-        assert result.score
-        assert result.score.psnr > before
+        assert scored(result).psnr > before
         return np.asarray(render_svg(result.svg).convert("RGBA"))[29, 39].tolist()
 
     plain = text.replace(behind, "")

@@ -11,13 +11,13 @@ import pytest
 
 from tests import ROOT
 from tests.fit.pictures import picture
+from tests.runs import scored, vectorize
 from warpsplat.extensions import renderer_names
 from warpsplat.files.image import load_image
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, make_settings
-from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_eyes
-from warpsplat.run.vectorize import vectorize
+from warpsplat.run.figures import has_time_for_ssimulacra2
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 
@@ -42,13 +42,12 @@ def test_the_loss_falls_and_the_count_stays(device: str, kind: Kind) -> None:
     settings = make_settings(kind=kind, curves=20, iterations=80, density=Density(interval=10))
     seen: list[Progress] = []
     result = vectorize(picture(), settings, Backend.on(device), report=seen.append)
-    assert result.score
     assert len(result.scene) == 20
-    assert result.score.paths == 20
+    assert scored(result).paths == 20
     assert seen[-1].step == seen[-1].steps == 80
     assert seen[-1].psnr > seen[0].psnr + 2
-    assert result.score.psnr > 24
-    assert abs(result.score.psnr - result.render_psnr) < 2
+    assert scored(result).psnr > 24
+    assert abs(scored(result).psnr - result.render_psnr) < 2
 
 
 def test_stop_ends_the_run_early_with_a_file(device: str) -> None:
@@ -61,8 +60,7 @@ def test_stop_ends_the_run_early_with_a_file(device: str) -> None:
         return calls >= 5
 
     result = vectorize(picture(), settings, Backend.on(device), stop=stop)
-    assert result.score
-    assert result.stopped
+    assert result.stopped and result.score
     assert result.iterations == 5
     assert "<path" in result.svg
 
@@ -71,7 +69,6 @@ def test_stop_ends_the_run_early_with_a_file(device: str) -> None:
 def test_odd_sizes(device: str, size: tuple[int, int]) -> None:
     image = np.random.default_rng(0).uniform(size=(size[1], size[0], 3)).astype(np.float32)
     result = vectorize(image, make_settings(curves=30, iterations=12), Backend.on(device))
-    assert result.score
     assert (result.scene.canvas.width, result.scene.canvas.height) == size
     assert np.isfinite(result.scene.points).all()
 
@@ -89,16 +86,14 @@ def test_a_photograph_reaches_its_figure(renderer: str, kind: Kind, figure: floa
     """451x300, 192 curves, 100 steps: PSNR of the file, and how much more the training render has."""
     settings = make_settings(renderer=renderer, kind=kind, curves=192, iterations=100, coarse_pixels=30_000)
     result = vectorize(load_image(CAT), settings, Backend.on("cpu"))
-    assert result.score
-    assert result.score.psnr > figure
-    assert abs(result.render_psnr - result.score.psnr) < gap
+    assert scored(result).psnr > figure
+    assert abs(result.render_psnr - scored(result).psnr) < gap
 
 
 def test_time_budget_sizes_the_run(device: str) -> None:
     settings = make_settings(curves=12, time_budget="2s", coarse_pixels=1000)
     vectorize(picture(), replace(settings, time_budget=None, iterations=4), Backend.on(device))  # compile
     result = vectorize(picture(), settings, Backend.on(device))
-    assert result.score
     assert result.iterations > 20
     assert result.seconds < 6, "a step past the deadline at the most, however busy the machine"
     assert not result.stopped
@@ -106,29 +101,26 @@ def test_time_budget_sizes_the_run(device: str) -> None:
 
 def test_eyes_have_to_wait_in_large_images_and_short_times() -> None:
     small, large = np.zeros((1000, 1000, 3), np.float32), np.zeros((1000, 1001, 3), np.float32)
-    assert has_time_for_eyes(make_settings(), small)
-    assert not has_time_for_eyes(make_settings(), large)
-    assert not has_time_for_eyes(make_settings(time_budget="2m"), small)
+    assert has_time_for_ssimulacra2(make_settings(), small)
+    assert not has_time_for_ssimulacra2(make_settings(), large)
+    assert not has_time_for_ssimulacra2(make_settings(time_budget="2m"), small)
 
 
 def test_target_psnr_is_reached_with_few_bytes(device: str) -> None:
     """With a file between those of fixed numbers of shapes, and no more decibels than a shape is worth."""
     settings = make_settings(iterations=100, target_psnr=24.0)
     result = vectorize(picture(), settings, Backend.on(device))
-    assert result.score
-    assert 24 <= result.score.psnr < 31, "24.1 to 27.4 over five seeds"
+    assert 24 <= scored(result).psnr < 31, "24.1 to 27.4 over five seeds"
     assert not result.missed
     plain = vectorize(
         picture(), make_settings(iterations=100, curves=2 * len(result.scene)), Backend.on(device)
     )
-    assert plain.score
-    assert result.score.bytes < 0.75 * plain.score.bytes, "0.43 to 0.51 over five seeds"
+    assert scored(result).bytes < 0.75 * scored(plain).bytes, "0.43 to 0.51 over five seeds"
 
 
 def test_target_psnr_out_of_reach_says_so_and_keeps_to_the_curves(device: str) -> None:
     settings = make_settings(iterations=20, curves=10, target_psnr=60.0)
     missed = vectorize(picture(), settings, Backend.on(device))
-    assert missed.score
     assert len(missed.scene) == 10
     assert missed.missed[0].startswith("target-psnr 60 dB: reached ")
 
@@ -136,8 +128,7 @@ def test_target_psnr_out_of_reach_says_so_and_keeps_to_the_curves(device: str) -
 def test_target_psnr_within_a_size_and_a_time(device: str) -> None:
     settings = make_settings(iterations=20, target_psnr=60.0, max_bytes=1500)
     result = vectorize(picture(), settings, Backend.on(device))
-    assert result.score
-    assert 0.9 * 1500 < result.score.bytes <= 1500
+    assert 0.9 * 1500 < scored(result).bytes <= 1500
     late = vectorize(picture(), replace(settings, max_bytes=None, time_budget=0.5), Backend.on(device))
     assert not late.stopped
     assert late.missed[0].startswith("target-psnr 60 dB: reached ")
@@ -157,11 +148,9 @@ def test_max_bytes_is_kept(device: str) -> None:
     for limit in (900, 3000):
         settings = make_settings(curves=200, iterations=15, max_bytes=limit)
         result = vectorize(picture(), settings, Backend.on(device))
-        assert result.score
-        assert result.score.bytes <= limit
+        assert scored(result).bytes <= limit
         assert len(result.scene) >= limit // 300 - 1
     tiny = vectorize(picture(), replace(settings, max_bytes=50), Backend.on(device))
-    assert tiny.score
     assert "max-bytes 50" in tiny.missed[0]
 
 
@@ -171,8 +160,7 @@ def test_max_bytes_are_used(device: str, kind: Kind, precision: int) -> None:
     """On a photograph; its shapes fit a little more than the limit, and the least of them go."""
     settings = make_settings("draft", curves=900, kind=kind, precision=precision, max_bytes="20KB")
     result = vectorize(load_image(CAT), replace(settings, iterations=30), Backend.on(device))
-    assert result.score
-    assert 0.95 * 20_000 < result.score.bytes <= 20_000
+    assert 0.95 * 20_000 < scored(result).bytes <= 20_000
     assert result.missed == ()
 
 
@@ -193,3 +181,33 @@ def test_shapes_of_one_colour_are_named_groups(device: str) -> None:
     grouped = sum(inner.count("<path") for inner in re.findall(r'<g id="[a-z]+-group.*?</g>', text))
     assert paths == 16
     assert grouped >= 8, "13 to 15 over five seeds"
+
+
+LINES = np.ones((64, 64, 3), np.float32)
+LINES[20:22, 8:56] = LINES[8:56, 40:42] = 0
+
+DISCS = np.ones((48, 64, 3), np.float32)
+DISCS[8:40, 10:30] = [0.9, 0.2, 0.1]
+DISCS[20:44, 36:56] = [0.1, 0.3, 0.8]
+
+STRATEGIES = {
+    "fit": (picture(), {"curves": 8, "iterations": 30}),
+    "layers": (picture(), {"levels": "3,8", "iterations": 20}),
+    "psnr": (picture(), {"target_psnr": 22.0, "iterations": 20, "curves": 30}),
+    "bytes": (picture(), {"max_bytes": 900, "iterations": 20}),
+    "time": (picture(), {"curves": 8, "time_budget": 1.0, "coarse_pixels": 1000}),
+    "drawing": (DISCS, {"subject": "drawing"}),
+    "drawing within a size": (DISCS, {"subject": "drawing", "max_bytes": 200}),
+    "line": (LINES, {"subject": "line"}),
+}
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_work_grows_to_one(device: str, strategy: str) -> None:
+    image, given = STRATEGIES[strategy]
+    seen: list[Progress] = []
+    vectorize(image, make_settings(**given), Backend.on(device), report=seen.append)
+    work = [progress.work for progress in seen]
+    assert work == sorted(work) and len(work) > 1
+    assert 0 <= work[0] < 0.9 and work[-1] == 1
+    assert all(progress.snapshot for progress in seen)

@@ -15,6 +15,7 @@ from tests.kernels import trials
 from tests.scenes import mixed_scene, random_scene
 from warpsplat.fit import losses
 from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
@@ -91,7 +92,7 @@ def check_training(scene: Scene) -> None:
 
 def check_run() -> None:
     """All else of a run goes on: new shapes, surgery, the file and its reader."""
-    done = fit(picture(), make_settings(curves=12, iterations=100), Backend.on("cpu"))
+    done = fit(Problem(picture(), make_settings(curves=12, iterations=100)), Run(Backend.on("cpu")))
     assert (glows(done.scene)[:, 1] > 0.5).all()
     text = write_svg(random_scene(Kind.FILL))
     assert not glows(load_scene(text, 40, 36, "a.svg")[0]).any()

@@ -12,8 +12,8 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind
-from warpsplat.search.few_shapes import FEW, OPACITY, for_few, grounded
-from warpsplat.search.search import smaller
+from warpsplat.search.candidate import smaller
+from warpsplat.search.few_shapes import FEW, OPACITY, fit_background, for_few
 from warpsplat.svg.write import path_sizes
 
 
@@ -33,7 +33,7 @@ def test_the_ground_is_what_shows_between_shapes(device: str) -> None:
     wanted = np.array([0.2, 0.6, 0.8], np.float32)
     on_wanted = replace(scene, canvas=replace(scene.canvas, background=wanted))
     image = render(on_wanted, backend=backend)
-    found = grounded(scene, image, backend).canvas.background
+    found = fit_background(scene, image, backend).canvas.background
     assert found is not None
     np.testing.assert_allclose(found, wanted, atol=0.51 / 255)
     assert scene.canvas.background is not None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
@@ -69,12 +70,13 @@ def test_survey(monkeypatch: pytest.MonkeyPatch) -> None:
     """More shapes are better and larger; what is asked to stop stops."""
     monkeypatch.setattr("warpsplat.search.survey.STEPS", 60)
     monkeypatch.setattr("warpsplat.search.survey.INTERVAL", 10)
-    image, backend = picture(), Backend.on("cpu", 1)
+    backend = Backend.on("cpu", 1)
     work: list[float] = []
-    worth = survey(image, make_settings(), backend, report=lambda now: work.append(now.work))
+    problem = Problem(picture(), make_settings())
+    worth = survey(problem, Run(backend, lambda now: work.append(now.work)))
     assert worth is not None
     assert worth.most == 64 * 48 // 8
     assert float(worth.psnr(200)) > float(worth.psnr(50))
     assert float(worth.size(200)) > 2 * float(worth.size(50))
-    assert work == sorted(work) and work[-1] == pytest.approx(1, abs=0.05)
-    assert survey(image, make_settings(), backend, stop=lambda: True) is None
+    assert work == sorted(work) and work[-1] == 1
+    assert survey(problem, Run(backend, stop=lambda: True)) is None

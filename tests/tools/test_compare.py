@@ -13,14 +13,16 @@ import pytest
 from PIL import Image
 
 from tests.fit.pictures import picture
+from tests.runs import vectorize
 from tests.tracers import SIZES, bands, stub
 from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import FloatArray
 from warpsplat.tools.compare import OURS, compare, warm_up
 from warpsplat.tools.tracer import VTRACER_SETTINGS, Options, vtracer
@@ -122,10 +124,10 @@ def test_warm_up_loads_what_a_run_needs(monkeypatch: pytest.MonkeyPatch) -> None
     """By the kind and renderer of the settings, whatever else they say."""
     made: list[Settings] = []
 
-    def note(target: FloatArray, settings: Settings, backend: Backend) -> None:
-        made.append(settings)
+    def note(image: PreparedImage, run: Run) -> None:
+        made.append(image.problem.settings)
 
-    monkeypatch.setattr("warpsplat.tools.compare.vectorize", note)
+    monkeypatch.setattr("warpsplat.tools.compare.make_result", note)
     asked = make_settings(curves=100_000, iterations=1_000_000, renderer="splat")
     warm_up(asked, Backend.on("cpu"))
     assert (made[0].kind, made[0].renderer) == (asked.kind, asked.renderer)

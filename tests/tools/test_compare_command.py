@@ -118,7 +118,7 @@ def test_packages_that_are_missing(
     """Said before any work."""
     monkeypatch.chdir(image.parent)
     monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr("warpsplat.run.training.fit", None)
+    monkeypatch.setattr("warpsplat.run.strategies.fit", None)
     assert run("compare", image, *QUICK, *folder) == 2
     assert f"pip install {module}" in one_line(capsys.readouterr().err)
     assert list(image.parent.iterdir()) == [image]
@@ -151,7 +151,7 @@ def test_wrong_requests_are_one_line_before_any_work(
 ) -> None:
     use(monkeypatch)
     monkeypatch.chdir(image.parent)
-    monkeypatch.setattr("warpsplat.run.training.fit", None)
+    monkeypatch.setattr("warpsplat.run.strategies.fit", None)
     Path("text.png").write_text("no image")
     Image.new("RGB", (9, 9)).save("photo.jpg")
     before = set(Path().iterdir())

@@ -9,10 +9,10 @@ from tests import ROOT
 
 MODULES = (
     "warpsplat",
-    *(f"warpsplat.api.{name}" for name in ("vectorize", "several", "suggest", "refine", "render", "report")),
+    *(f"warpsplat.run.{name}" for name in ("vectorize", "several", "suggest", "refine", "render")),
     "warpsplat.cli.main",
     "warpsplat.tools.bench",
-    "warpsplat.run.vectorize",
+    "warpsplat.pages.report",
 )
 
 

@@ -13,11 +13,12 @@ import torch
 
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.errors import UsageError
+from warpsplat.extensions import renderer_names
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.torch import SceneTensors, over, render
-from warpsplat.torch.function import MODELS
 
 FILL = Kind.FILL
 
@@ -49,10 +50,10 @@ def test_the_image_is_the_renderers(width: int | None, scale: float) -> None:
     assert (image[..., 3] == 1).all()
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", renderer_names())
 def test_every_model_on_a_transparent_canvas(name: str) -> None:
     scene = replace(random_scene(FILL, seed=1), canvas=Canvas(40, 36, None))
-    native = native_render(scene, model=MODELS[name], backend=Backend.on("cpu"))
+    native = native_render(scene, model=renderer_of(name).default_model, backend=Backend.on("cpu"))
     np.testing.assert_allclose(render(SceneTensors.of(scene), renderer=name).numpy(), native, atol=1e-5)
 
 

@@ -1,21 +1,22 @@
-"""Outlines of a drawing fitted to the picture, clean as they are."""
+"""Fit the outlines of a traced drawing to the image, keeping their corners, lines and smooth joints."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.fit.constraints import Constraints, Drawing, Ints, Projection
+from warpsplat.fit.constraints import Constraints, Drawing, Projection
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.recover import recover
 from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
 from warpsplat.scene import Canvas, FloatArray, Scene
@@ -23,34 +24,33 @@ from warpsplat.scene import Canvas, FloatArray, Scene
 Colors = Literal["held", "fitted"]
 
 STEPS = 200
-"""Of a refinement."""
+"""Most steps of a refinement."""
 
 POINT_RATE = 0.25
 """Learning rate of points at the start [px]: outlines are traced to about a pixel."""
 
 FINAL_RATE = 0.02
-"""Fraction of the rates at the end: what is left to gain is hundredths of a pixel."""
+"""Learning rates at the end over those at the start: what is left to gain is hundredths of a pixel."""
 
 COLOR_RATE = 0.004
-"""Learning rate of colours: a level."""
-
+"""Learning rate of colours: one of 256 levels."""
 
 GAIN, PATIENCE = 0.005, 40
-"""Where the error has not fallen by this share in so many steps, the rest is not worth its time."""
+"""A refinement ends when the error has not fallen by this share in so many steps."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """How to fit a drawing."""
+    """Options of a refinement."""
 
     steps: int = STEPS
     point_rate: float = POINT_RATE
     """[px] at the start."""
     colors: Colors = "held"
-    """Whether colours stay or are fitted and then snapped to those of the picture."""
+    """Whether colours stay, or are fitted and then snapped to those of the image."""
 
     def settings(self, scene: Scene) -> Settings:
-        """As a run has them: nothing comes, goes or is weighed but the squared error."""
+        """Return the settings: the shapes stay, and the loss is the squared error alone."""
         plain = make_settings(
             curves=max(1, min(len(scene), 100_000)),
             iterations=self.steps,
@@ -64,71 +64,65 @@ class Refinement:
 
 def refine_drawing(
     target: FloatArray,
-    scene: Scene,
-    joints: Ints,
-    same: Ints,
-    backend: Backend,
+    drawing: Drawing,
+    run: Run,
     how: Refinement | None = None,
     *,
     held: npt.NDArray[np.bool_] | None = None,
     capacity: Capacity | None = None,
-    report: Callable[[Progress], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-) -> Scene:
-    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes and their opacities
-    stay.
+) -> Drawing:
+    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes and their opacities stay.
 
     Args:
         target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height, width,
             4), of a scene on a transparent canvas.
-        scene: fills of cubics.
-        joints: ``Joint`` of each point, shape (point,).
-        same: see ``Drawing``, shape (point,).
-        backend: where to compute.
+        drawing: fills of cubics.
+        run: how the work is carried out; when it is over, the best so far is taken.
         how: rates and steps.
         held: points that stay where they are, shape (point,).
         capacity: of the renderer to begin with, if it is known.
-        report: called every few steps.
-        stop: asked after every step; once true, the best so far is taken.
 
     Returns:
-        the scene with the least error of those looked at, its start among them.
+        the drawing with the least error of those evaluated, the start among them.
 
     Raises:
-        ValueError: ``joints`` or ``same`` do not fit the scene, or its shapes are no fills of cubics.
+        ValueError: joints do not fit the scene, or its shapes are not fills of cubics.
     """
     how = how or Refinement()
-    drawing = Drawing(scene, joints, same)
-    if not len(scene):
-        return scene
-    target = matching(target, scene.canvas)
-    step = start(target, drawing, backend, how, held, capacity)
-    best, least = _look(step)
+    if not len(drawing.scene):
+        return drawing
+    target = matching(target, drawing.scene.canvas)
+    step = start(target, drawing, run.backend, how, held, capacity)
+    best, least = _evaluate(step)
     gained = 0
     """Steps at the last gain that counts."""
     for done in range(1, how.steps + 1):
         step.advance()
         if done % CHECK_INTERVAL == 0 or done == how.steps:
             recover(step, replaces=False)
-            found, error = _look(step)
+            found, error = _evaluate(step)
             if error < (1 - GAIN) * least:
                 gained = done
             if error < least:
                 best, least = found, error
-            if report:
-                work, shapes = done / how.steps, step.state.shape_count
-                report(Progress(done, how.steps, step.psnr(), 0.0, work, True, shapes, step.snapshot()))
-        if done - gained >= PATIENCE or (stop and stop()):
+            if run.on_progress:
+                run.report(_progress(step, done, how.steps, time.monotonic() - run.started))
+        if done - gained >= PATIENCE or run.over():
             break
     if how.colors == "fitted":
         snapped = replace(best, colors=own_colors(best, target))
         step.state.parameters.assign(snapped)
-        best = _look(step)[0]
-    return best
+        best = _evaluate(step)[0]
+    return replace(drawing, scene=best)
+
+
+def _progress(step: Step, done: int, steps: int, seconds: float) -> Progress:
+    shapes, snapshot = step.state.shape_count, step.snapshot()
+    return Progress(done, steps, step.psnr(), seconds, done / steps, True, shapes, snapshot)
 
 
 def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
-    """``target`` with opacity, shape (height, width, 4), where the canvas is transparent."""
+    """Return ``target`` with opacity, shape (height, width, 4), if the canvas is transparent."""
     if canvas.background is None and target.shape[2] == 3:
         return np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
     return target
@@ -142,8 +136,9 @@ def start(
     held: npt.NDArray[np.bool_] | None = None,
     capacity: Capacity | None = None,
 ) -> Step:
-    """A step for ``drawing``, whose points are brought to where they may be; ``held`` ones stay there.
-    ``capacity``: to begin with; the first look makes room where it is not enough.
+    """Return a step for ``drawing``, its points projected onto the constraints; ``held`` ones stay there.
+
+    ``capacity``: of the renderer to begin with; the first evaluation enlarges it if need be.
     """
     state = FitState.start(drawing.scene, backend, np.random.default_rng(0))
     projection = Projection(Constraints.of(drawing), state.parameters, held)
@@ -160,24 +155,24 @@ def start(
     return Step(state, how.settings(drawing.scene), goal, capacity=capacity)
 
 
-def _look(step: Step) -> tuple[Scene, float]:
-    """The scene and its mean squared error."""
+def _evaluate(step: Step) -> tuple[Scene, float]:
+    """Return the scene and its mean squared error."""
     step.render()
     return step.state.scene(), step.measured_error()
 
 
 NEAR = 6 / 255
-"""A colour of the picture is a shape's own where it lies within so much of it in each channel."""
+"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
 
 OFTEN = 0.5
-"""... and where so much of what lies near it is of just that colour: in a noisy picture none is."""
+"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
 
 
 def own_colors(scene: Scene, target: FloatArray) -> FloatArray:
-    """Colours of the shapes, snapped to one of the picture's 8-bit ones where that is plainly meant.
+    """Return the colours of the shapes, snapped to the image's 8-bit colours, shape (shape, 3).
 
-    The most frequent colour near a shape's is meant, unless many others lie near as well: then the mean that
-    was fitted is better. Shape (shape, 3).
+    A colour is snapped to the most frequent one near it, unless many others lie near as well: then the fitted
+    mean is better.
     """
     pixels = target.reshape(-1, target.shape[2])
     if target.shape[2] == 4:

@@ -1,8 +1,7 @@
-"""Line art in, strokes out."""
+"""Line art, traced as strokes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,139 +9,93 @@ import numpy as np
 from warpsplat.drawing.filled_areas import filled
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
-from warpsplat.drawing.strokes.tour import BEGINS, FEW, MANY, toured
+from warpsplat.drawing.strokes.tour import toured
+from warpsplat.drawing.thin import THINNEST, continued, cut, margins
 from warpsplat.errors import ImageError
-from warpsplat.fit.costs import PIXELS, serial
-from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.loop import Fit, Start, fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import finest
-from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.fit.stages import Stages
-from warpsplat.fit.work import Meter, Report
-from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray, IndexArray, Scene
 
 STEPS = 80
-"""Of the refinement, at the most: the strokes are where they should be but for fractions of a pixel."""
+"""Most steps of the refinement: the strokes are traced to fractions of a pixel."""
 
 POINT_RATE = 0.12
 """Learning rate of points [px]."""
 
 WIDTH_RATE = 0.06
-"""Of widths [px]."""
+"""Learning rate of widths [px]."""
 
-STEP_PIXELS, STEP_POINT = 1.45, 0.0022
-"""What a step of the refinement costs: of ``costs.PIXELS``, of a point (``fit.costs``)."""
-
-TOUR_STROKE, TOUR_PAIR = 0.3, 0.0021
-"""What improving a tour costs, until nothing shortens it: of each stroke, of each pair of strokes."""
-
-LONG_STROKE, LONG_PAIR = 0.25, 0.00006
-"""The same of a tour of many strokes, which is improved once."""
+FILLED_END, FIT_END = 0.4, 0.9
+"""Shares of the progress at which filled areas, and the refinement of strokes, are done."""
 
 THIN = 1.0
-"""Width below which a stroke keeps it [px]: the least of a training."""
+"""Width below which a stroke keeps it [px]: the least of a fit."""
 
 FINE_PIXELS = 1_000_000
-"""Largest size of the image that the refinement sees [pixels]."""
+"""Largest image size of the refinement [pixels]."""
 
 
-def draw_lines(
-    target: FloatArray,
-    settings: Settings,
-    backend: Backend,
-    *,
-    seconds: float | None = None,
-    report: Report | None = None,
-    after: float = 0.0,
-    stop: Callable[[], bool] | None = None,
-    stages: Stages | None = None,
-) -> Fit:
-    """Trace line art as strokes, and refine them against its ink; arguments are those of ``draw``.
+def draw_lines(problem: Problem, run: Run) -> Fit:
+    """Trace line art as strokes, and refine them against its ink.
 
-    What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: if the settings say mixed its
-    filled areas, and strokes in an order of little way with the pen lifted.
+    What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: its filled areas, if the
+    settings say mixed, and strokes ordered to minimise pen-up travel.
 
     Raises:
         ImageError: there is no ink.
     """
-    ink = find_ink(target, mixed=settings.mixed)
+    across, down = margins(problem.target, THINNEST)
+    problem = replace(problem, target=continued(problem.target, across, down))
+    settings = problem.settings
+    ink = find_ink(problem.target, mixed=settings.mixed)
     color = solid_color(settings.background)
     if color is not None or settings.background == "none":
         ink = replace(ink, paper=color)
     traced = trace_ink(ink, mixed=settings.mixed)
     if not len(traced.scene) and not traced.areas:
         raise ImageError("no lines found: nothing but specks is darker than the paper around it")
-    fills = filled(traced, backend, finest(settings), stop, tidy=settings.tidy) if traced.areas else None
-    made = _fitted(
-        ink, traced, settings, backend, after, seconds=seconds, report=report, stop=stop, stages=stages
-    )
+    fills, begin = None, FILLED_END if traced.areas else 0.0
+    if traced.areas:
+        fills = filled(traced, run.part(0.0, begin), finest(settings), tidy=settings.tidy)
+    made = Fit(traced.scene, 1.0, 0.0, 0.0, 0, False)
+    if len(traced.scene):
+        start, picture, importance = _to_refine(ink, traced)
+        fitted = line_settings(settings, len(start))
+        lines = Problem(picture, fitted, importance)
+        made = fit(lines, run.part(begin, FIT_END), Start(scene=start))
+        made = replace(made, scene=_in_order(traced.scene, made.scene))
+    scene, per_pixel = made.scene, made.per_pixel
     if fills:
-        both = fills.scene.append(made.scene)
-        made = replace(
-            made,
-            scene=both.take(np.argsort(both.layer, kind="stable")),
-            per_pixel=max(made.per_pixel, fills.per_pixel),
-        )
-    layer = np.unique(made.scene.layer, return_inverse=True)[1].astype(np.int32)
-    scene = replace(made.scene, layer=layer)
-    return replace(made, scene=replace(scene, layer_names=pen_names(scene)))
+        both = fills.scene.append(scene)
+        scene, per_pixel = both.take(np.argsort(both.layer, kind="stable")), max(per_pixel, fills.per_pixel)
+    scene = replace(scene, layer=np.unique(scene.layer, return_inverse=True)[1].astype(np.int32))
+    scene = replace(scene, layer_names=pen_names(scene))
+    return replace(made, scene=cut(scene, across, down), per_pixel=per_pixel)
 
 
-def _fitted(
-    ink: Ink,
-    traced: TracedLines,
-    settings: Settings,
-    backend: Backend,
-    after: float,
-    *,
-    seconds: float | None,
-    report: Report | None,
-    stop: Callable[[], bool] | None,
-    stages: Stages | None,
-) -> Fit:
-    """The strokes of ``traced``, refined and in the order of a tour."""
+def _to_refine(ink: Ink, traced: TracedLines) -> tuple[Scene, FloatArray, FloatArray | None]:
+    """Return the strokes on the paper, the picture they are refined against, and its importance mask."""
     lines = traced.scene
-    if not len(lines):
-        return Fit(lines, 1.0, 0.0, 0.0, 0, False)
     canvas = replace(lines.canvas, background=_paper(ink))
-    start = replace(lines, layer=np.zeros_like(lines.layer), canvas=canvas)
-    importance = None
-    if traced.areas:  # into which strokes reach
+    start, importance = replace(lines, layer=np.zeros_like(lines.layer), canvas=canvas), None
+    if traced.areas:  # strokes reach into them
         importance = 1 - traced.areas.cover
         ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
-    fitted = line_settings(settings, len(lines))
-    plan = phases(fitted, lines.canvas.width, lines.canvas.height)
-    size = plan[-1].width * plan[-1].height / PIXELS
-    cost = fitted.iterations * (STEP_PIXELS * size + STEP_POINT * len(lines.points))
-    order = serial(backend) * sum(tour_cost(count) for count in np.bincount(lines.layer).tolist())
-    made = fit(
-        inked(ink, lines),
-        fitted,
-        backend,
-        scene=start,
-        importance=importance,
-        seconds=seconds,
-        report=Meter(report, after).stage(cost, order),
-        stop=stop,
-        stages=stages,
-    )
-    # A training knows no strokes thinner than a pixel; how wide they are was measured.
-    widths = np.where(lines.widths < THIN, lines.widths, made.scene.widths)
-    scene = replace(made.scene, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
-    return replace(made, scene=toured(rejoined(lines, scene)))
+    return start, inked(ink, lines), importance
 
 
-def tour_cost(count: int) -> float:
-    """Of finding the order of the strokes of a pen (``fit.costs``)."""
-    if count > MANY:
-        return count * (LONG_STROKE + LONG_PAIR * count)
-    tours = BEGINS + 2 if count <= FEW else 2  # from several places, and that of the drawing
-    return tours * count * (TOUR_STROKE + TOUR_PAIR * count)
+def _in_order(lines: Scene, refined: Scene) -> Scene:
+    """Return refined strokes in the order of a tour, with the pens of the traced ``lines``."""
+    # A fit knows no strokes thinner than a pixel; their widths were measured.
+    widths = np.where(lines.widths < THIN, lines.widths, refined.widths)
+    scene = replace(refined, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
+    return toured(rejoined(lines, scene))
 
 
 def line_settings(settings: Settings, count: int) -> Settings:
-    """What refines ``count`` strokes: their places and widths alone."""
+    """Return the settings of the refinement of ``count`` strokes: of their places and widths alone."""
     still = dict.fromkeys(settings.rates, 0.0)
     return replace(
         settings,
@@ -167,8 +120,9 @@ def _paper(ink: Ink) -> FloatArray:
 
 
 def inked(ink: Ink, traced: Scene) -> FloatArray:
-    """The picture that strokes of these pens would make if they were right: even paper and even ink, so that
-    nothing pulls at them but where the ink is. Shape (height, width, 3).
+    """Return the ideal picture of the strokes, even ink on even paper, shape (height, width, 3).
+
+    So nothing but the position of the ink pulls at them.
     """
     color = _nearest_colors(traced, ink) if traced.layer.max() > 0 else traced.colors[:1]
     paper = _paper(ink)
@@ -176,8 +130,9 @@ def inked(ink: Ink, traced: Scene) -> FloatArray:
 
 
 def _nearest_colors(traced: Scene, ink: Ink) -> FloatArray:
-    """At each pixel the colour of the pen whose mixture with the paper is the most like it, shape (height,
-    width, 3).
+    """Return the colour of the pen whose mixture with the paper is nearest, at each pixel.
+
+    Shape (height, width, 3).
     """
     pens = np.unique(traced.colors, axis=0)
     paper = _paper(ink)
@@ -186,7 +141,7 @@ def _nearest_colors(traced: Scene, ink: Ink) -> FloatArray:
 
 
 def pen_names(scene: Scene) -> tuple[str, ...]:
-    """Names of the layers of pens."""
+    """Return the names of the pens' layers."""
     shown: IndexArray = np.unique(scene.layer, return_index=True)[1]
     colors = np.round(255 * scene.colors[shown]).astype(np.uint8)
     return tuple(f"pen-{number}-{color.tobytes().hex()}" for number, color in enumerate(colors, 1))

@@ -1,8 +1,8 @@
-"""Pictures of few rows or columns: continued beyond their borders, so that what they show has an extent."""
+"""Images of few rows or columns: continued beyond their borders, so that what they show has an extent."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,31 +11,33 @@ from warpsplat.fit.loop import Fit
 from warpsplat.scene import FloatArray, Scene
 
 THIN = 16
-"""Rows or columns up to which tracing may find no regions, whose edges take a pixel on each side."""
+"""Most rows or columns of an image in which tracing may miss regions: edges take a pixel on each side."""
 
 THINNEST = 4
-"""The same, of what has no lines either."""
+"""Most rows or columns of an image in which tracing may miss lines too."""
 
 BEYOND = 4
-"""How far a thin picture is continued [px]: regions and lines are told apart within less."""
+"""How far a thin image is continued [px]: regions and lines are told apart within less."""
 
 SEEN = 30.0
-"""PSNR from which on a thin picture was traced [dB]; below, regions were missed."""
+"""PSNR from which on a thin image counts as traced [dB]; below, regions were missed."""
 
 
 def margins(image: FloatArray, thin: int) -> tuple[int, int]:
-    """By how many columns and rows a picture is continued on each side: where it has up to ``thin``."""
+    """Return by how many columns and rows an image is continued on each side: if it has up to ``thin``."""
     height, width = image.shape[:2]
     return (BEYOND if width <= thin else 0), (BEYOND if height <= thin else 0)
 
 
 def continued(image: FloatArray, across: int, down: int) -> FloatArray:
-    """A picture whose outermost pixels go on beyond its borders, by so many columns and rows."""
+    """Return an image whose outermost pixels are repeated beyond its borders, by so many columns and rows."""
+    if not (across or down):
+        return image
     return np.ascontiguousarray(np.pad(image, ((down, down), (across, across), (0, 0)), mode="edge"))
 
 
 def cut(scene: Scene, across: int, down: int) -> Scene:
-    """What the picture shows of a continued one's scene, whose shapes go on beyond its canvas."""
+    """Return the scene of a continued image on the canvas of the image itself, beyond which shapes reach."""
     shift = np.array([across, down], np.float32)
     width, height = scene.canvas.width - 2 * across, scene.canvas.height - 2 * down
     frames = scene.frames.copy()
@@ -48,12 +50,12 @@ def cut(scene: Scene, across: int, down: int) -> Scene:
     )
 
 
-def best_of_thin(ways: list[Callable[[], Fit]]) -> Fit:
-    """What the first of some ways makes that shows the picture; the best of all, where none does."""
-    best = ways[0]()
-    for way in ways[1:]:
+def best_of_thin(first: Fit, others: Sequence[Callable[[], Fit]]) -> Fit:
+    """Return the first of some drawings that shows the image; the best of all if none does."""
+    best = first
+    for draw in others:
         if best.render_psnr >= SEEN:
             break
-        made = way()
+        made = draw()
         best = made if made.render_psnr > best.render_psnr else best
     return best

@@ -1,4 +1,4 @@
-"""How many shapes a file of a given size has room for."""
+"""Estimating how many shapes fit into a file of a given size."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from warpsplat.portable import elementary
 from warpsplat.scene import Basis, Kind
 
 HEAD_BYTES = 150
-"""Of a file, besides its shapes."""
+"""Bytes of a file besides its shapes."""
 
 STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
-"""Of a shape, besides its coordinates."""
+"""Bytes of a shape besides its coordinates."""
 
 SEPARATOR = 1.6
-"""Bytes of a number, besides those of its digits in whole pixels."""
+"""Bytes of a number besides the digits of whole pixels."""
 
 SPARE_CURVES = 1.3
-"""Shapes trained over those expected to fit: what is too many goes with the surplus."""
+"""Trained shapes over those expected to fit: the excess is removed with the surplus."""
 
 LATER = 0.92
-"""Bytes of a shape in the file over those before the last steps: opacities become 1, the grid coarser."""
+"""Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser."""
 
 
 def affordable_curves(settings: Settings, width: int, height: int) -> int:
-    """Shapes that fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
+    """Return how many shapes fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
 
-    Coordinates are relative: each has as many digits before the point as the distance of two shapes.
+    Coordinates are relative: each has as many digits before the point as the distance between shapes.
     """
     assert settings.max_bytes
     numbers = 4 + 2 * settings.density.mean_points
@@ -44,9 +44,9 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
 
 
 def affordable(step: Step) -> Settings:
-    """The settings of a run whose surplus is thinned, with no more shapes than ``max_bytes`` has room for.
+    """Return the settings of a fit whose surplus is being removed, with as many shapes as fit ``max_bytes``.
 
-    Shapes take the bytes that they have now, less those of the points that they are still to lose.
+    A shape counts by its present bytes, less those of the points that it is still to lose.
     """
     settings, state = step.settings, step.state
     assert settings.max_bytes

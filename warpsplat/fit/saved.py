@@ -1,6 +1,4 @@
-"""A fit between two steps as numbers and arrays, and back: with these and its settings the rest follows, bit
-for bit.
-"""
+"""The state of a fit between two steps as numbers and arrays; a resumed fit gives the same bits."""
 
 from __future__ import annotations
 
@@ -23,20 +21,20 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.arrays import Array, between, typed
 
 SPARE_ROOM = 64
-"""Room over what the shapes need, at the most: more than any run keeps of times when it had more shapes."""
+"""Largest capacity over what the shapes need: more than any run keeps from times when it had more shapes."""
 
 FINEST = 1e7
-"""Units a pixel, at the most."""
+"""Most view box units per pixel."""
 
 MOST_RENEWED = 1 << 40
-"""Shapes that were set anew, at the most."""
+"""Largest count of shapes that were reset."""
 
 TARGETS = 10.0
-"""What the target comes to, at the most: the image, less what a viewer shows otherwise."""
+"""Largest value of the target: the image, less the viewer's difference from the render."""
 
 
 def step_content(step: Step) -> Content:
-    """All that ``step`` carries to the next one. Copies it to the host."""
+    """Return everything that ``step`` carries to the next one, copied to the host."""
     state = step.state
     numbers = {
         "step": state.step,
@@ -66,19 +64,19 @@ def step_from(
     begin: int,
     target: Callable[[Settings, int], Target],
 ) -> Step:
-    """The step of which ``step_content`` made ``content``.
+    """Return the step of which ``step_content`` made ``content``.
 
     Args:
-        content: from a file: it is checked.
-        start: what the fit began with.
-        settings: what it began with.
+        content: from a file; it is checked.
+        start: scene that the fit began with.
+        settings: that it began with.
         backend: where to compute.
         base: shapes of earlier levels.
         begin: step that it began at.
-        target: what the step after a number of steps is compared with.
+        target: returns what the step after a number of steps is compared with.
 
     Raises:
-        ValueError, TypeError, KeyError, OverflowError: it is not of such a fit.
+        ValueError, TypeError, KeyError, OverflowError: it is not the state of such a fit.
     """
     numbers = content.numbers
     done = whole(numbers, "step", begin + 1, settings.iterations - 1)
@@ -123,7 +121,7 @@ def _room(renderer: Renderer) -> dict[str, int]:
 
 
 def _take_room(renderer: Renderer, room: Any) -> None:
-    """Where shapes do not fit, some are left out until the next look: that has to be at the same steps."""
+    """Set the capacity: what does not fit is left out until the next check, as in the fit that was saved."""
     if not isinstance(room, dict):
         raise TypeError("room is no table")
     now, _ = renderer.room()

@@ -1,8 +1,8 @@
-"""What a run leaves behind so that another one can go on: the fits that are done, the state of the next one.
+"""State of a run for checkpoints: the results of fits that are done, and the state of the next one.
 
-A run consists of one fit or of several, one after the other (``goals``, ``layered``). They are numbered as
-they begin. A run that goes on takes the same way again: of a fit that was done it takes the result, the next
-one goes on from the state.
+A run consists of one fit or several in a row (``search``, ``fit.layered``), numbered as they begin. A resumed
+run repeats the same sequence: of a fit that was done it takes the result, and the next one continues from the
+state.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from warpsplat.errors import CheckpointError
 from warpsplat.scene.arrays import Array
 
 INTERVAL = 30.0
-"""Between two times that a state is saved [s]."""
+"""Default time from one save to the next [s]."""
 
 SPARE = 100.0
-"""Time from one save to the next over what the save took, at the least: saving costs a hundredth."""
+"""Least time from one save to the next over the duration of a save: saving costs a hundredth."""
 
 MOST_FITS = 1000
-"""Of a run."""
+"""Most fits of a run."""
 
 
 class Content(NamedTuple):
     """Numbers and arrays by name."""
 
     numbers: dict[str, Any]
-    """As JSON has them."""
+    """Of types that JSON knows."""
     arrays: dict[str, Array]
 
 
@@ -43,16 +43,16 @@ class Stages:
         every: float = INTERVAL,
         saved: Content | None = None,
     ) -> None:
-        """Of a new run, or of one that goes on.
+        """Begin a new run, or resume one.
 
         Args:
-            name: how messages call what ``saved`` comes from.
-            write: keeps what ``saved`` is to be.
+            name: of the file of ``saved``, for messages.
+            write: saves the state of the run.
             every: time between two saves [s].
-            saved: of an earlier run.
+            saved: state of the run to resume.
 
         Raises:
-            CheckpointError: ``saved`` is nothing that was written.
+            CheckpointError: ``saved`` is damaged.
         """
         self._name, self._write, self._every = name, write, every
         self._results: list[Content] = []
@@ -66,15 +66,15 @@ class Stages:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to go on from."""
+        """Whether there is nothing to resume from."""
         return not self._results and self._state is None
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Make of what goes wrong with content from a file an error that says so.
+        """Turn errors about saved content into a ``CheckpointError``.
 
         Raises:
-            CheckpointError: the content is none that was saved.
+            CheckpointError: the content is damaged.
         """
         try:
             yield
@@ -82,31 +82,31 @@ class Stages:
             raise CheckpointError(f"{self._name}: the checkpoint is damaged: {error}") from error
 
     def begin(self) -> Stage:
-        """The next fit."""
+        """Return the next fit."""
         self._begun += 1
         return Stage(self, self._begun - 1)
 
     def result(self, number: int) -> Content | None:
-        """Of a fit; None where it is not done."""
+        """Return the result of a fit; None if it is not done."""
         return self._results[number] if number < len(self._results) else None
 
     def state(self, number: int) -> Content | None:
-        """Of a fit that was begun."""
+        """Return the state of a fit; None if it was not begun, or is done."""
         return self._state if number == len(self._results) else None
 
     def is_due(self) -> bool:
-        """Whether it is time to save."""
+        """Return whether it is time to save."""
         return time.monotonic() >= self._due
 
     def keep(self, state: Content | None, result: Content | None = None) -> None:
-        """Have another state to save, or the result of the present fit."""
+        """Set the state that is saved next, and add the result of the current fit."""
         if result:
             self._results.append(result)
         self._state = state
         self._is_saved = False
 
     def save(self) -> None:
-        """Save what there is, if there is anything new."""
+        """Save the state, if it is new."""
         if self._is_saved:
             return
         began = time.monotonic()
@@ -125,30 +125,30 @@ class Stage:
 
     @property
     def result(self) -> Content | None:
-        """Where it was done by an earlier run."""
+        """The result, if an earlier run finished the fit."""
         return self._stages.result(self._number)
 
     @property
     def state(self) -> Content | None:
-        """Where an earlier run had begun it."""
+        """The state, if an earlier run began the fit."""
         return self._stages.state(self._number)
 
     def keep(self, state: Callable[[], Content], *, now: bool) -> None:
-        """Save the state where it is time to, or ``now``."""
+        """Save the state if it is time, or ``now``."""
         if now or self._stages.is_due():
             self._stages.keep(state())
             self._stages.save()
 
     def finish(self, result: Content) -> None:
-        """It is done; it is saved with the next state, or when the run ends."""
+        """Keep the result; it is saved with the next state, or when the run ends."""
         self._stages.keep(None, result)
 
 
 def whole(numbers: Mapping[str, Any], name: str, low: int, high: int) -> int:
-    """A whole number.
+    """Return a whole number by its name.
 
     Raises:
-        ValueError: it is missing, or another thing, or out of range.
+        ValueError: it is missing, of another type, or out of range.
     """
     value = numbers.get(name)
     if type(value) is not int or not low <= value <= high:
@@ -157,7 +157,7 @@ def whole(numbers: Mapping[str, Any], name: str, low: int, high: int) -> int:
 
 
 def real(numbers: Mapping[str, Any], name: str, low: float, high: float) -> float:
-    """A number, see ``whole``."""
+    """Return a number, see ``whole``."""
     value = numbers.get(name)
     if not isinstance(value, (int, float)) or not low <= value <= high:
         raise ValueError(f"{name} is no number from {low:g} to {high:g}")
@@ -165,7 +165,7 @@ def real(numbers: Mapping[str, Any], name: str, low: float, high: float) -> floa
 
 
 def flag(numbers: Mapping[str, Any], name: str) -> bool:
-    """A truth, see ``whole``."""
+    """Return a boolean, see ``whole``."""
     value = numbers.get(name)
     if type(value) is not bool:
         raise ValueError(f"{name} is neither true nor false")
@@ -173,14 +173,14 @@ def flag(numbers: Mapping[str, Any], name: str) -> bool:
 
 
 def _joined(results: list[Content], state: Content | None) -> Content:
-    """All as one: arrays have the number of their fit before their name."""
+    """Return all parts as one: names of arrays begin with the number of their fit."""
     parts = [*results, state] if state else results
     arrays = {f"{i}/{name}": array for i, part in enumerate(parts) for name, array in part.arrays.items()}
     return Content({"fits": [part.numbers for part in parts], "under way": state is not None}, arrays)
 
 
 def _split(content: Content) -> tuple[list[Content], Content | None]:
-    """What ``_joined`` made one."""
+    """Return the results and the state that ``_joined`` put together."""
     fits = content.numbers.get("fits")
     if not isinstance(fits, list) or len(fits) > MOST_FITS or not all(isinstance(fit, dict) for fit in fits):
         raise ValueError("fits are no list of tables")

@@ -1,4 +1,4 @@
-"""All that a run carries from step to step."""
+"""Everything that a fit carries from step to step."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from warpsplat.svg.write import GRIDS
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """What the optimizer knows of shapes. Without it they would begin anew, with steps as large as they can
-    be: that undoes what they had come to (docs/experiments.md).
+    """Optimizer state of shapes. Without it a continued fit starts with the largest steps, which undo much of
+    what was reached (docs/experiments.md).
     """
 
     moments: Moments
-    """Adam's."""
+    """Of Adam."""
     ages: npt.NDArray[np.int32]
-    """Steps since each was placed, shape (shape,)."""
+    """Steps since each shape was placed, shape (shape,)."""
 
 
 @dataclass
 class FitState:
-    """What a run continues from: with this and its settings the rest follows."""
+    """State of a fit: with its settings, all that follows depends on this alone."""
 
     parameters: Parameters
     """Values, moments and ages."""
@@ -39,19 +39,19 @@ class FitState:
     step: int = 0
     """Steps done."""
     per_pixel: float = GRIDS[-1]
-    """Units of the file's view box a pixel."""
+    """View box units per pixel in the file."""
     projection: Projection | None = None
-    """Onto the constraints of the outlines, if they have any."""
+    """The constraints of outlines, if there are any."""
     base: int = 0
-    """Shapes of earlier levels (``fit.layered``), which keep their number: the first ones."""
+    """Number of the first shapes, those of earlier levels (``fit.layered``), which stay."""
     opacities_frozen: bool = False
     """Whether the opacities are rounded and frozen."""
     rounding: bool = False
     """Whether coordinates are being rounded and held, in stages."""
     colored: int = -1
-    """Revision of the parameters at the last choice of colours (``fit.palette``); -1: there was none."""
+    """Revision of the parameters at the last choice of colours (``fit.palette``); -1: none so far."""
     recovered: int = 0
-    """Times that a shape was reset because a number was not finite (``fit.recover``)."""
+    """How often a shape was reset because of a number that was not finite (``fit.recover``)."""
 
     @staticmethod
     def start(
@@ -62,7 +62,7 @@ class FitState:
         base: int = 0,
         past: Past | None = None,
     ) -> FitState:
-        """Before the first step; ``step``: those that count as done. Without a ``past`` shapes are new."""
+        """Return the state before the first step, ``step`` of which count as done."""
         clock = backend.array(wp.int32, 1)
         clock.fill_(step)
         known = (past.moments, past.ages) if past else (None, None)
@@ -70,13 +70,13 @@ class FitState:
 
     @property
     def shape_count(self) -> int:
-        """Shapes that are drawn: pictures which a file keeps are none."""
+        """Number of shapes that are drawn: pictures which a file keeps do not count."""
         return self.parameters.shape_count - len(self.parameters.pictures)
 
     def scene(self) -> Scene:
-        """The current scene, on the host."""
+        """Return the current scene, on the host."""
         return self.parameters.scene()
 
     def past(self) -> Past:
-        """Of the current scene, on the host."""
+        """Return the optimizer state of the current scene, on the host."""
         return Past(self.parameters.moments(), self.parameters.arrays["ages"].numpy().copy())

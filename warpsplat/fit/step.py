@@ -13,12 +13,12 @@ from warpsplat.fit.importance import weights_at
 from warpsplat.fit.levels import level_programs
 from warpsplat.fit.losses import LossInputs, LossTarget
 from warpsplat.fit.optimizer import record_adam
+from warpsplat.fit.progress import Snapshot
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.units import Units
-from warpsplat.fit.work import Snapshot
 from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import Model

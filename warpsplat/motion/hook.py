@@ -16,7 +16,7 @@ from warpsplat.cli.options import FILE
 from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
-    from warpsplat.fit.work import Progress
+    from warpsplat.fit.progress import Progress
     from warpsplat.motion.recorder import Recorder
     from warpsplat.motion.terminal.preview import Preview
     from warpsplat.run.result import Result

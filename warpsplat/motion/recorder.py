@@ -11,7 +11,7 @@ import numpy as np
 
 from warpsplat.errors import UsageError
 from warpsplat.files.output import write_result
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 from warpsplat.motion import drawing, films, training
 from warpsplat.motion.timing import LONGEST, SECONDS, SHORTEST, kept
 from warpsplat.rendering.backend import Backend

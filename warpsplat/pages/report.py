@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from warpsplat.api.run import backend_on
-from warpsplat.api.svg import SvgSource, score, svg_name_of, text_of
 from warpsplat.files.output import write_result
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.pages.reports.several import several_page, versions_of
 from warpsplat.pages.reports.single import Facts, report_page
+from warpsplat.run.backend import backend_on
 from warpsplat.run.result import Result
+from warpsplat.run.svg import SvgSource, score, svg_name_of, text_of
 
 
 def report(

@@ -1,4 +1,4 @@
-"""Checkpoints: files from which an interrupted run goes on."""
+"""Checkpoints: files from which an interrupted run is resumed."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ from warpsplat.errors import OutputError, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.files.packed import is_packed, pack, unpack
+from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import INTERVAL, Content, Stages
+from warpsplat.fit.texts import parse_duration
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
@@ -28,24 +30,24 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class CheckpointFile:
-    """Where a run saves its state, and what it makes of a state that is there."""
+    """The file in which a run saves its state, and what becomes of a file that is there."""
 
     path: Path
     resume: bool = False
-    """Whether to go on from the checkpoint that is there; where there is none, the run starts anew."""
+    """Whether to resume from the checkpoint that is there; without one the run starts from the beginning."""
     overwrite: bool = False
-    """Whether a run that starts anew may replace what is there."""
+    """Whether a run that is not resumed may replace what is there."""
     every: float = INTERVAL
     """Time between two saves [s]."""
 
     def check(self, *others: Path) -> None:
-        """Find out before the work whether it can be written, and may be.
+        """Check before the work whether the file can be written, and may be.
 
         Args:
             others: files that it must not replace.
 
         Raises:
-            UsageError: it cannot, is a file of another kind, or a checkpoint that nobody asked to go on from.
+            UsageError: it cannot, is a file of another kind, or a checkpoint that was not asked for.
         """
         if self.path == STANDARD:
             raise UsageError("a checkpoint is a file, not the standard output")
@@ -70,14 +72,14 @@ class CheckpointFile:
             )
 
     def stages(self, run: Mapping[str, Any], backend: Backend) -> Stages:
-        """What a run keeps here, and goes on from.
+        """Return the stages that a run saves here, and is resumed from.
 
         Args:
-            run: what decides its result (``identity``).
+            run: everything that decides its result (``identity``).
             backend: where it is computed.
 
         Raises:
-            UsageError: the checkpoint is that of a run that is decided otherwise.
+            UsageError: the checkpoint is that of another run.
             CheckpointError: it is damaged, or of another version.
         """
         device = backend.device.name
@@ -111,12 +113,34 @@ class CheckpointFile:
         return Content(header, arrays)
 
     def remove(self) -> None:
-        """The run is done."""
+        """Remove the file, since the run is done."""
         self.path.unlink(missing_ok=True)
 
 
+def open_checkpoint(
+    path: str | os.PathLike[str] | None,
+    every: float | str,
+    others: tuple[object, ...],
+    *,
+    resume: bool,
+    overwrite: bool,
+) -> CheckpointFile | None:
+    """Return the checkpoint of a run, if it is to have one, checked against ``others`` that are paths.
+
+    Raises:
+        UsageError: it is one of these, or there is nothing to resume from.
+    """
+    if path is None:
+        if resume:
+            raise UsageError("to resume, a run needs a checkpoint")
+        return None
+    made = CheckpointFile(Path(path), resume, overwrite, parse_duration(every))
+    made.check(*(Path(other) for other in others if isinstance(other, (str, os.PathLike))))
+    return made
+
+
 DIGESTS = ("image", "mask", "svg")
-"""What a run is given, of which a digest is kept."""
+"""Parts of ``identity`` that are digests."""
 
 SHOWN = 40
 """Characters of a value in a message."""
@@ -125,14 +149,14 @@ SHOWN = 40
 def identity(
     command: str,
     settings: Settings,
-    image: FloatArray,
-    mask: FloatArray | None = None,
+    problem: Problem,
     svg: str | None = None,
 ) -> dict[str, Any]:
-    """What decides a run's result, as JSON has it."""
+    """Return everything that decides a run's result, as JSON has it."""
+    mask = problem.importance
     return {
         "command": command,
-        "image": _digest(image),
+        "image": _digest(problem.target),
         "mask": "" if mask is None else _digest(mask),
         "svg": "" if svg is None else hashlib.sha256(svg.encode()).hexdigest(),
         "settings": json.loads(json.dumps(asdict(settings))),
@@ -140,14 +164,14 @@ def identity(
 
 
 def _digest(image: FloatArray) -> str:
-    """Of pixels and size."""
+    """Return a digest of pixels and size."""
     found = hashlib.sha256(f"{image.shape} ".encode())
     found.update(np.ascontiguousarray(image, np.float32).data.cast("B"))
     return found.hexdigest()
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Names of the values that differ, and both, for people."""
+    """Yield the names of the values that differ, and both values, for people."""
     for name in {**now, **before}:
         old, new = before.get(name), now.get(name)
         if isinstance(old, dict) and isinstance(new, dict):

@@ -1,61 +1,65 @@
-"""What is measured of a run's file, and of its render."""
+"""Figures of a run's file, and of its render."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
 from warpsplat.errors import Stopped
 from warpsplat.fit.export import export
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.memory import has_room_for_eyes
+from warpsplat.run.memory import has_memory_for_ssimulacra2
 from warpsplat.run.reduction import Reduction
 from warpsplat.run.result import LevelScore
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
 
 QUICK_PIXELS = 1_000_000
-"""Of an image up to this size, an interrupted run is still scored, and a score that has begun goes on: it
+"""Size up to which an interrupted run is still scored, and a score that has begun is finished [pixels]: it
 takes about a second."""
 
 
 def pixels_of(target: FloatArray) -> int:
-    """Of an image, shape (height, width, channels)."""
+    """Return the number of pixels of an image, shape (height, width, channels)."""
     return target.shape[0] * target.shape[1]
 
 
-def has_time_for_eyes(settings: Settings, target: FloatArray) -> bool:
-    """Whether a run's report has SSIMULACRA2, where it is installed: up to ``QUICK_PIXELS`` it takes a
-    twentieth of a run of the default effort; within a time budget other things are worth more, and it takes
-    much memory.
+def has_time_for_ssimulacra2(settings: Settings, target: FloatArray) -> bool:
+    """Return whether a run measures SSIMULACRA2, if it is installed.
+
+    Up to ``QUICK_PIXELS`` it takes a twentieth of a run of the default effort, and much memory. Within a time
+    budget other things are worth more.
     """
     pixels = pixels_of(target)
-    return pixels <= QUICK_PIXELS and settings.time_budget is None and has_room_for_eyes(settings, pixels)
+    return (
+        pixels <= QUICK_PIXELS
+        and settings.time_budget is None
+        and has_memory_for_ssimulacra2(settings, pixels)
+    )
 
 
 def scored(
     svg: str,
     target: FloatArray,
     settings: Settings,
-    stop: Callable[[], bool] | None,
+    run: Run,
     reduction: Reduction | None,
     *,
     interrupted: bool,
 ) -> Score | None:
-    """The score of a file, or None where there is no time for it."""
+    """Return the score of a file; None if there is no time for it, or the run was stopped."""
     quick = pixels_of(target) <= QUICK_PIXELS
-    eyes = has_time_for_eyes(settings, target) and not interrupted
-    if (interrupted and not quick) or (not interrupted and stop and stop()):
+    eyes = has_time_for_ssimulacra2(settings, target) and not interrupted
+    if (interrupted and not quick) or (not interrupted and run.stopped()):
         return None
     try:
         if reduction:
-            return reduction.score(svg, target, stop)
-        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else stop)
+            return reduction.score(svg, target, run.stopped)
+        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else run.stopped)
     except Stopped:
         return None
 
@@ -63,9 +67,9 @@ def scored(
 def level_scores(
     scene: Scene, settings: Settings, per_pixel: float, target: FloatArray, reduction: Reduction | None
 ) -> tuple[LevelScore, ...]:
-    """Of the files that the first layers alone make."""
+    """Return the scores of the files that the first layers of a layered scene make."""
     found = []
-    for end in (*level_ends(scene), len(scene)):
+    for end in (*level_ends(scene), len(scene)) if settings.levels else ():
         text = export(scene.take(np.arange(end)), settings, per_pixel)
         if reduction:
             score = reduction.score(text, target, None)
@@ -78,9 +82,9 @@ def level_scores(
 def render_figures(
     scene: Scene, target: FloatArray, settings: Settings, backend: Backend, *, scale: int = 1
 ) -> tuple[float, float | None]:
-    """PSNR [dB] and SSIM of the settings' own render of ``scene`` against ``target``, both in 8 bits.
+    """Return PSNR [dB] and SSIM of the settings' own render of ``scene`` against ``target``, both in 8 bits.
 
-    ``scale``: of the render, which is reduced by area to the image's size before it is compared.
+    ``scale``: of the render, which is reduced by area to the image's size for the comparison.
     """
     shown = render(scene, scale=scale, model=model_for(settings, 0), backend=backend)
     levels = np.round(255 * np.clip(shown, 0, 1))
@@ -92,7 +96,7 @@ def render_figures(
 
 
 def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:
-    """The goals of ``settings`` that a run did not reach; without a score nobody knows."""
+    """Return the goals of ``settings`` that a run missed; without a score none is known."""
     missed: list[str] = []
     if score is None:
         return ()

@@ -1,4 +1,4 @@
-"""Results as what their names say: SVG, gzipped SVG, PNG, PDF."""
+"""File formats of results, by the endings of their names: SVG, gzipped SVG, PNG, PDF."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from warpsplat.files.output import SVG_ENDINGS, svg_bytes, write_result
 from warpsplat.svg.viewer import draw_pdf, draw_png
 
 PICTURE_ENDINGS = (".png", ".pdf")
-"""Of names of an SVG's pictures: pixels as a viewer shows it, and the same shapes for printers."""
+"""Endings of an SVG's pictures: pixels as a viewer shows it, and the same shapes for printers."""
 
 ENDINGS = (*SVG_ENDINGS, *PICTURE_ENDINGS)
-"""Of names of results."""
+"""Endings of results."""
 
 PDF_PACKAGE = "typst"
-"""Makes PDFs of SVGs, which it reads with resvg's parser."""
+"""Package that makes PDFs of SVGs, which it reads with resvg's parser."""
 
 
 def check_format(path: Path) -> None:
-    """Whether what makes a file of this name is installed.
+    """Check that what makes a file of this name is installed.
 
     Raises:
         UsageError: it is not; the message says how it is.
@@ -34,17 +34,17 @@ def check_format(path: Path) -> None:
 
 
 def is_picture(path: Path) -> bool:
-    """Whether a result of this name is an SVG's picture."""
+    """Return whether a result of this name is an SVG's picture."""
     return path.suffix.lower() in PICTURE_ENDINGS
 
 
 def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> bytes:
-    """What a result's file holds, as the name of ``path`` says.
+    """Return the bytes of a result's file, in the format of the name.
 
     Args:
         path: the file.
         text: the SVG.
-        key: of the job that made it, which a picture bears; an SVG's text has its own.
+        key: of the job that made it, for pictures; an SVG's text contains its own.
         zoom: magnification of a picture.
 
     Raises:
@@ -61,8 +61,9 @@ def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> b
 
 
 def write_named(path: Path, text: str, *, zoom: float = 1.0) -> None:
-    """Write an SVG, or its picture, as the name of ``path`` says; ``-``, the standard output, takes an SVG.
-    The file is replaced in one step; arguments are those of ``named_bytes``.
+    """Write an SVG, or its picture, atomically in the format of the name; ``-`` is the standard output.
+
+    Arguments are those of ``named_bytes``.
 
     Raises:
         UsageError, ImageError: see ``named_bytes``.

@@ -1,7 +1,7 @@
-"""How much memory a run takes, and how much smaller an image is worked on to stay below a limit.
+"""Estimate the memory of a run, and how much an image must be reduced to stay below a limit.
 
-Figures are upper bounds that were measured (docs/benchmarks.md); what a run holds at its highest is the most
-of what its parts hold beside the image: reading it, fitting or tracing, and measuring the file.
+The constants are measured upper bounds (docs/benchmarks.md). The peak of a run is that of its parts, each
+beside the image: reading it, fitting or tracing, and measuring the file.
 """
 
 from __future__ import annotations
@@ -23,73 +23,76 @@ from warpsplat.scene import Kind
 from warpsplat.svg.strips import WHOLE_PIXELS
 
 PROGRAM = 280 << 20
-"""Of Python, the libraries and compiled kernels."""
+"""Bytes of Python, the libraries and compiled kernels."""
 
 STRIPS = 96 << 20
-"""Of what is done strip by strip."""
+"""Bytes of work that is done strip by strip."""
 
 DRAWN = 96 << 20
-"""Of the strips of a file that are drawn side by side."""
+"""Bytes of the strips of a file that are drawn side by side."""
 
 TRAINED = 160
-"""Of a pixel of the finest size: target, render, gradient, weights, maps of the error, a look at the file."""
+"""Bytes per pixel of the finest size: target, render, gradient, weights, error maps, the file's render."""
 
 SLOT = 1500
 SLOT_STROKE = 1100
 SLOT_PAINT = 4200
-"""Of a slot (``rendering.renderer``): of any, and what strokes and gradients add."""
+"""Bytes per slot (``rendering.renderer``), and what strokes and gradients add."""
 
 SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
-"""Slots of a fit: of each tile, of the root of tiles times shapes, of each shape."""
+"""Slots of a fit per tile, per root of tiles times shapes, and per shape."""
 
 SHAPE = 24 << 10
-"""Of a shape: its samples, surgery, its text."""
+"""Bytes per shape: its samples, surgery, its text."""
 
 TRACED = {"drawing": 420, "line": 420, "pixel": 260}
-"""Of a pixel, by subject."""
+"""Bytes per pixel of tracing, by subject."""
 
 MASK_READ, MASK = 12, 4
-"""Of a pixel of a mask: while it is read, and then."""
+"""Bytes per pixel of a mask: while it is read, and afterwards."""
 
 SHOWN, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
-"""Of a pixel, to measure a file: its picture, both images at half the size, the same where a side is odd, and
+"""Bytes per pixel of measuring a file: its picture, both images at half size, the same if a side is odd, and
 what a file adds that is not drawn in strips."""
 
-EYES = 500
-"""Of a pixel, to measure SSIMULACRA2."""
+SSIMULACRA2 = 500
+"""Bytes per pixel of measuring SSIMULACRA2."""
 
 REFINED = 40
-"""Of a pixel of the image that an SVG is refined against, besides: pictures of what was given and of what was
-read, a file that is not drawn in strips, and the image on a colour."""
+"""Additional bytes per pixel of refining an SVG: pictures of the SVG and of the scene that was read, a file
+that is not drawn in strips, and the image on a colour."""
 
 CLEARED = 150
-"""Of a pixel of an image with opacity that an SVG is refined against, of whose size is what finds pixels that
-should be empty (``fit.clear``)."""
+"""Bytes per pixel of finding pixels that should be empty (``fit.clear``), where an SVG is refined against an
+image with opacity."""
 
 LEAST_SIDE = 32
-"""Of an image that is worked on smaller [px]."""
+"""Least side of a reduced image [px]."""
 
 
 @dataclass(frozen=True)
 class Need:
-    """What a run at one size needs [bytes]."""
+    """Memory that a run at one size needs [bytes]."""
 
     reading: int
     working: int
-    """Fitting, or tracing."""
+    """For fitting or tracing."""
     scoring: int
 
     @property
     def most(self) -> int:
-        """At its highest."""
+        """The peak."""
         return PROGRAM + max(self.reading, self.working, self.scoring)
 
 
 def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None) -> Need:
-    """What a run takes whose image is ``factor`` times smaller in each direction than it is, with a ``mask``
-    of how much errors count.
+    """Estimate the memory of a run from above: within a quarter for photographs, more roughly for drawings.
 
-    An estimate from above: of photographs within a quarter, of drawings by the most that their kind took.
+    Args:
+        facts: of the image.
+        settings: of the run.
+        factor: how many times smaller the image is read, in each direction.
+        mask: of importance.
     """
     pixels = facts.width * facts.height
     worked = pixels / factor**2
@@ -109,8 +112,9 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
 
 
 def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
-    """How many times smaller the mask of an image is read that is worked on ``factor`` times smaller: none of
-    the detail that is left there is lost.
+    """Return how many times smaller the mask of an image that is reduced ``factor`` times is read.
+
+    It keeps the detail that the reduced image has.
     """
     found = factor
     while found > 1 and mask.width // found < facts.width // factor:
@@ -119,7 +123,7 @@ def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
 
 
 def _fitting(facts: ImageFacts, settings: Settings, factor: int) -> float:
-    """Of the finest phase, which is the largest; the surplus has gone by then."""
+    """Return the bytes of the finest phase, which is the largest; the surplus of shapes is gone by then."""
     phase = phases(settings, -(-facts.width // factor), -(-facts.height // factor))[-1]
     pixels, curves = phase.width * phase.height, settings.curves
     tiles = pixels / 256
@@ -132,7 +136,7 @@ def _fitting(facts: ImageFacts, settings: Settings, factor: int) -> float:
 
 
 def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
-    """Of a picture of so many ``pixels``, without the image itself."""
+    """Return the bytes of measuring a picture of so many ``pixels``, without the image itself."""
     if pixels <= WHOLE_PIXELS:
         per_pixel: float = SHOWN + 16
     else:
@@ -142,21 +146,21 @@ def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
     return strips + per_pixel * pixels
 
 
-def has_room_for_eyes(settings: Settings, pixels: int) -> bool:
-    """Whether SSIMULACRA2 of so many ``pixels`` can be measured within the limit."""
+def has_memory_for_ssimulacra2(settings: Settings, pixels: int) -> bool:
+    """Return whether SSIMULACRA2 of so many ``pixels`` can be measured within the limit."""
     limit = memory_limit(settings)
-    return limit is None or PROGRAM + (EYES + 16) * pixels <= limit
+    return limit is None or PROGRAM + (SSIMULACRA2 + 16) * pixels <= limit
 
 
 def whole_score(facts: ImageFacts, settings: Settings, factor: int) -> int:
-    """Of measuring a file at the image's own size after a run on a smaller one [bytes]."""
+    """Return the bytes of measuring a file at the image's own size after a run on a reduced one."""
     pixels = facts.width * facts.height
     held = 4 * facts.channels * pixels / factor**2 + (facts.decoded + facts.kept) * pixels
     return round(PROGRAM + held + _scoring(facts, settings, pixels))
 
 
 def facts_of(source: ImageSource) -> ImageFacts | None:
-    """Of bytes of a file, a Pillow image or an array; None where they cannot be told."""
+    """Return the facts of an image file's bytes, a Pillow image or an array; None if they are unknown."""
     if isinstance(source, bytes):
         return image_facts(source)
     if isinstance(source, np.ndarray) and source.ndim in {2, 3}:
@@ -168,9 +172,7 @@ def facts_of(source: ImageSource) -> ImageFacts | None:
 
 
 def memory_limit(settings: Settings) -> int | None:
-    """What a run may take [bytes]: the settings' limit, else this process's part of ``SHARE`` of what the
-    machine has.
-    """
+    """Return the bytes that a run may take: by the settings, or by the machine and its processes."""
     if settings.max_memory:
         return settings.max_memory
     found = machine_memory()
@@ -178,22 +180,23 @@ def memory_limit(settings: Settings) -> int | None:
 
 
 class _Process:
-    """What this process knows of the machine."""
+    """State of this process."""
 
     sharers = 1
-    """Processes that do images here at the same time."""
+    """Number of processes that vectorize images on this machine at the same time."""
 
 
 def share_machine(processes: int) -> None:
-    """Tell this process that it is one of so many that do images on this machine at the same time."""
+    """Set the number of processes that vectorize images on this machine at the same time."""
     _Process.sharers = processes
 
 
 def factor_for(
     facts: ImageFacts, settings: Settings, name: str, least: int = 1, mask: ImageFacts | None = None
 ) -> int:
-    """How many times smaller an image is to be worked on: a power of two, from ``least`` on. Arguments are
-    those of ``need``.
+    """Return how many times an image has to be reduced: a power of two, at least ``least``.
+
+    Other arguments are those of ``need``.
 
     Raises:
         ResourceError: the limit is too small for any size; the message begins with ``name``.
@@ -209,15 +212,14 @@ def factor_for(
 
 
 def need_refined(facts: ImageFacts, settings: Settings) -> int:
-    """What refining an SVG of as many shapes as usual takes [bytes]."""
+    """Return the bytes of refining an SVG of as many shapes as usual."""
     pixels = facts.width * facts.height
     cleared = PROGRAM + CLEARED * pixels if facts.channels == 4 else 0
     return max(need(facts, settings).most + REFINED * pixels, cleared)
 
 
 def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
-    """Whether there is memory to refine an SVG against an image. That is done at the image's own size:
-    whether a result is better is for all of its pixels to say.
+    """Check that there is memory to refine an SVG against an image at full size.
 
     Raises:
         ResourceError: there is not; the message begins with ``name``.

@@ -1,4 +1,4 @@
-"""An image read, at a size that memory has room for, and looked at."""
+"""Read an image at a size that memory allows, and inspect it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.drawing.subjects import decided
+from warpsplat.drawing.subjects import choose_subject
 from warpsplat.files.importance import load_importance
 from warpsplat.files.sources import ImageSource, held, image_of, source_name
+from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.run.keys import job_key
@@ -17,28 +18,21 @@ from warpsplat.scene import FloatArray
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """An image that was read, and all that a run on it needs to know."""
+class PreparedImage:
+    """An image that was read and inspected, and the problem that it poses."""
 
-    target: FloatArray
-    """What shapes are fitted to, see ``vectorize``."""
-    settings: Settings
-    """With a subject."""
-    why: str
-    """The subject; empty where it was given."""
-    importance: FloatArray | None
-    reduction: Reduction | None
-    key: str = ""
-    """Of the job, where the file is to name it."""
+    problem: Problem
+    why: str = ""
+    """Why it has its subject; empty if that was given."""
+    reduction: Reduction | None = None
+    """To the size that memory allows, if that is smaller."""
     name: str = "the image"
-    """How messages call it."""
+    """Its name in messages."""
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of the image [px]."""
-        if self.reduction:
-            return self.reduction.width, self.reduction.height
-        return self.target.shape[1], self.target.shape[0]
+        return (self.reduction.width, self.reduction.height) if self.reduction else self.problem.size
 
 
 def prepare(
@@ -48,10 +42,20 @@ def prepare(
     name: str | None = None,
     importance: ImageSource | None = None,
     keyed: bool = False,
-) -> Prepared:
-    """Read an image and its mask, at a size that memory has room for, and see what it shows.
+) -> PreparedImage:
+    """Read an image and its mask, at a size that memory allows, and find out what it shows.
 
-    Arguments and errors are those of ``vectorize_image``.
+    Args:
+        source: the image.
+        settings: everything that decides the result.
+        name: of the image in messages; default: its file's name.
+        importance: a mask, see ``load_importance``.
+        keyed: whether the file names the job that made it (``job_key``), by which batches know it; image and
+            mask are files then.
+
+    Raises:
+        ImageError: the image or the mask cannot be read, or their proportions differ.
+        ResourceError: the limit of memory is too low for any size.
     """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
@@ -64,18 +68,19 @@ def prepare(
     memory = Memory.of(source, settings, importance)
     factor = memory.factor(name, settings)
     target = load_target(source, name, settings.background, factor)
-    chosen, why = decided(target, settings)
+    chosen, why = choose_subject(target, settings)
     target, factor = memory.smaller(target, name, chosen, factor)
     release_memory()
-    work = Prepared(target, chosen, why, None, memory.reduction(factor, target, chosen), key, name)
+    reduction = memory.reduction(factor, target, chosen)
+    prepared = PreparedImage(Problem(target, chosen, metadata=key), why, reduction, name)
     if importance is None:
-        return work
-    mask = load_importance(importance, *work.size, mask_name, memory.mask_factor(factor))
-    return replace(work, importance=mask)
+        return prepared
+    mask = load_importance(importance, *prepared.size, mask_name, memory.mask_factor(factor))
+    return replace(prepared, problem=replace(prepared.problem, importance=mask))
 
 
 def load_target(source: ImageSource, name: str | None, background: str, factor: int = 1) -> FloatArray:
-    """An image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
+    """Read an image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
 
     ``factor``: how many times smaller to read it.
 

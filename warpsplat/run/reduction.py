@@ -1,4 +1,4 @@
-"""A run on a smaller image than the one asked for, and a file of the size of that one all the same."""
+"""Work on a reduced image, to stay below a limit of memory; the file has the size of the image itself."""
 
 from __future__ import annotations
 
@@ -29,57 +29,57 @@ from warpsplat.svg.write import resized
 
 @dataclass(frozen=True)
 class Reduction:
-    """What was worked on, and what is to be made of it."""
+    """The reduction of an image, and how results are brought to its own size."""
 
     factor: int
-    """How many times smaller the image is that was worked on; a pixel of it stands for a square."""
+    """How many times smaller the reduced image is; its pixels are means of squares."""
     width: int
-    """Of the file [px]."""
+    """Width of the file [px]."""
     height: int
+    """Height of the file [px]."""
     whole: Callable[[], Rows] | None
-    """The image itself, where there is memory to measure the file against it."""
+    """Reads the image itself, if there is memory to measure the file against it."""
     why: str
-    """What the image would take, and the limit, for people."""
+    """Memory that the image would take, and the limit, for people."""
 
     def enlarged(self, made: Fit) -> Fit:
-        """A fit of the smaller image as one of the image itself."""
+        """Return a fit to the reduced image as one to the image itself."""
         scene = enlarged(made.scene, self.factor, self.width, self.height)
         return replace(made, scene=scene, per_pixel=made.per_pixel / self.factor)
 
     def settings(self, settings: Settings) -> Settings:
-        """Those of the file: what is counted in pixels of the canvas grows as that does."""
-        return replace(
-            settings, softness=min(settings.softness * self.factor, limits_of(Settings, "softness")[1])
-        )
+        """Return the settings of the file: what is counted in pixels of the canvas grows with it."""
+        most = limits_of(Settings, "softness")[1]
+        return replace(settings, softness=min(settings.softness * self.factor, most))
 
     def score(self, svg: str, target: FloatArray, stop: Callable[[], bool] | None) -> Score:
-        """Of the file against the image itself, else against the smaller one (``target``)."""
+        """Score the file against the image itself, else against the reduced one (``target``)."""
         if self.whole:
             return score_svg(svg, self.whole(), own=True, eyes=False, stop=stop)
-        # Of the pixels whose squares lie in the picture wholly.
+        # Only pixels whose squares lie within the image.
         wide, tall = self.width // self.factor, self.height // self.factor
         small = resized(svg, wide, tall, 1 / self.factor)
         return score_svg(small, target[:tall, :wide], own=True, eyes=False, stop=stop).of_file(svg)
 
     def words(self) -> str:
-        """What was done, for people."""
+        """Return a message about the reduction."""
         small = f"{-(-self.width // self.factor)}x{-(-self.height // self.factor)}"
         return f"{self.why}: worked on at {small}, measured at {'full' if self.whole else 'that'} size"
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What is known of an image before it is read, and how small it has to be worked on."""
+    """Facts of an image before it is read, and how much it has to be reduced."""
 
     facts: ImageFacts | None
-    """None where nothing can be told: it is worked on as it is."""
+    """None if they are unknown: then the image is not reduced."""
     source: ImageSource
     mask: ImageFacts | None = None
-    """Of the mask, if there is one."""
+    """ImageFacts of the mask, if there is one."""
 
     @staticmethod
     def of(source: ImageSource, settings: Settings, importance: ImageSource | None = None) -> Memory:
-        """``source`` and the mask: bytes of a file, a Pillow image or an array."""
+        """Inspect ``source`` and the mask: bytes of a file, a Pillow image or an array."""
         facts = facts_of(source)
         if facts:
             channels = {"none": 4, "auto": facts.channels}.get(settings.background, 3)
@@ -87,26 +87,26 @@ class Memory:
         return Memory(facts, source, None if importance is None else facts_of(importance))
 
     def factor(self, name: str, settings: Settings, least: int = 1) -> int:
-        """How many times smaller the image is to be worked on with ``settings``; from ``least`` on.
+        """Return how many times the image has to be reduced with ``settings``; at least ``least``.
 
         Raises:
-            ResourceError: there is too little memory at any size; the message names the image.
+            ResourceError: there is too little memory at any size; the message begins with ``name``.
         """
         return factor_for(self.facts, settings, name, least, self.mask) if self.facts else 1
 
     def mask_factor(self, factor: int) -> int:
-        """How many times smaller to read the mask of an image that is worked on ``factor`` times smaller."""
+        """Return how many times smaller to read the mask of an image that is reduced ``factor`` times."""
         return mask_factor(self.facts, self.mask, factor) if self.facts and self.mask else 1
 
     def smaller(
         self, target: FloatArray, name: str, settings: Settings, factor: int
     ) -> tuple[FloatArray, int]:
-        """``target``, which was read ``factor`` times smaller, as ``settings`` ask for; and its factor."""
+        """Reduce ``target``, read ``factor`` times smaller, further if need be; return its factor too."""
         wanted = self.factor(name, settings, factor)
         return (target if wanted == factor else boxed(target, wanted // factor)), wanted
 
     def reduction(self, factor: int, target: FloatArray, settings: Settings) -> Reduction | None:
-        """What is to be made of a run on ``target``; None: nothing, as it has the image's own size."""
+        """Return the reduction to ``target``; None if that has the image's own size."""
         facts, source, limit = self.facts, self.source, memory_limit(settings)
         if facts is None or factor == 1 or limit is None:
             return None

@@ -1,28 +1,39 @@
-"""An SVG improved against an image."""
+"""Improve an SVG against an image."""
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
 from warpsplat.errors import ImageError
+from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.clear import clear_empty
-from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.export import show
-from warpsplat.fit.loop import fit
-from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.fit.work import Meter, Progress
+from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.progress import Callback, Progress
+from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
+from warpsplat.fit.stages import INTERVAL
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
-from warpsplat.rendering.backend import Backend
-from warpsplat.run.checkpoint import CheckpointFile, identity
-from warpsplat.run.figures import has_time_for_eyes, missed_goals
+from warpsplat.run.backend import backend_on
+from warpsplat.run.checkpoint import identity, open_checkpoint
+from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
+from warpsplat.run.formats import write_named
+from warpsplat.run.keywords import takes
+from warpsplat.run.memory import check_refined
+from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
-from warpsplat.run.training import noting, training_seconds
+from warpsplat.run.svg import SvgSource, svg_name_of, text_of
+from warpsplat.run.typed import RefineOptions
+from warpsplat.run.vectorize import recorded, timed
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
 from warpsplat.svg.read import load_scene
@@ -31,87 +42,113 @@ from warpsplat.svg.strips import rows_of
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import minified, shortened, write_svg
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+MIN_ALIKE = 25.0
+"""Least PSNR [dB] of the scene that was read against the SVG; one that was read in full has over 40."""
+
+REFINE_RATE = 0.5
+"""Learning rate of points [px]: the shapes are nearly where they should be."""
+
+
+@takes(RefineOptions)
 def refine(
-    text: str,
-    target: FloatArray,
-    settings: Settings,
-    backend: Backend,
+    svg: SvgSource,
+    image: ImageSource,
     *,
-    name: str,
+    iterations: int = 200,
+    max_memory: int | str | None = None,
     keep: bool = False,
-    report: Callable[[Progress], None] | None = None,
+    settings: Settings | None = None,
+    output: str | os.PathLike[str] | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
     stop: Callable[[], bool] | None = None,
-    checkpoint: CheckpointFile | None = None,
+    name: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    checkpoint_every: float | str = INTERVAL,
+    overwrite: bool = False,
+    **options: Unpack[RefineOptions],
 ) -> Result:
-    """Improve the SVG ``text`` against ``target``; its shapes stay, none is added or removed.
-
-    A result that is no better is the SVG unchanged. A picture on a sheet (``svg.page``) stays on it.
+    """Improve the paths of any SVG against an image by gradient descent; none is added.
 
     Args:
-        text: the SVG.
-        target: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width,
-            4), an SVG without a background stays without one.
-        settings: how long, and what file.
-        backend: where to compute.
+        svg: a string with a ``<`` in it is the SVG's text, any other its path; or bytes, or an open file.
+        image: as for ``vectorize``.
+        iterations: steps.
+        keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
         name: how messages call the SVG.
-        keep: keep elements that the scene cannot hold as they are, in their place, instead of refusing them.
-        report: called every few steps.
-        stop: asked after every step; once true, the shapes as they are make the file.
-        checkpoint: where the state of the run is kept; it is for the caller to remove.
+        max_memory: bytes, or ``"4GB"``; without, what the machine has. An image that takes more is refused:
+            whether a result is better is for all of its pixels to say.
+        settings: in place of all options.
+        output: as for ``vectorize``, as is all that follows.
+        device: see there.
+        threads: see there.
+        callback: see there.
+        stop: see there.
+        checkpoint: see there.
+        resume: see there.
+        checkpoint_every: see there.
+        overwrite: see there.
+        options: see ``RefineOptions``.
+
+    Returns:
+        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better
+        was found.
 
     Raises:
-        ImageError: the SVG cannot be read, or held.
-        CheckpointError, UsageError: see ``CheckpointFile``.
+        UsageError, ImageError, CheckpointError, OutputError, ResourceError, TypeError: as for
+            ``vectorize``; an SVG that cannot be read, or held, is an ``ImageError``.
     """
-    started = time.monotonic()
-    stages = (
-        checkpoint.stages(identity("refine", settings, target, svg=text), backend) if checkpoint else None
-    )
+    settings = settings or make_settings(iterations=iterations, max_memory=max_memory, **options)
+    name = name or svg_name_of(svg)
+    text, image_name = text_of(svg, name), source_name(image)
+    pixels = held(image)
+    check_refined(pixels, settings, image_name)
+    problem = Problem(load_target(pixels, image_name, settings.background), settings)
+    kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
+    with backend_on(device, threads) as backend:
+        stages = kept.stages(identity("refine", settings, problem, text), backend) if kept else None
+        run = Run(backend, callback, stop, stages=stages)
+        result = refine_svg(text, problem, run, name, keep=keep)
+    if output is not None:
+        write_named(Path(output), result.svg)
+    if kept and not result.stopped:
+        kept.remove()
+    return result
+
+
+def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool = False) -> Result:
+    """Improve an SVG's text; a result that is no better is the SVG unchanged.
+
+    A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
+    """
+    begun, history, stages = time.monotonic(), list[Progress](), run.stages
     given, view = text, None
     if OUR_VIEW.match(text):
-        view = picture_view(text, target.shape[1], target.shape[0])
+        view = picture_view(text, *problem.size)
     if view:
-        text = with_view(text, view, target.shape[1], target.shape[0])
-    base, target, has_background = _load(text, target, settings, name, keep=keep)
+        text = with_view(text, view, *problem.size)
+    base, target, has_background = _load(text, problem, name, keep=keep)
     scene = base.scene
     before = score_svg(text, target, eyes=False)
-    settings = replace(
-        settings,
-        curves=min(len(scene), 100_000),
-        coarse=0.0,
-        density=Density(interval=0),
-        rates={**settings.rates, "points": REFINE_RATE},
-        renderer="exact",
-        texture=0.0,  # whether a result is better is for the PSNR to say
-    )
-    seconds = training_seconds(settings, target, started)
-    history: list[Progress] = []
-    height, width = target.shape[:2]
-    eyes = has_time_for_eyes(settings, target)
-    after = score_cost(width * height, settings.curves, backend, eyes=eyes)
-    cost = Course.of(settings, width, height, backend).cost()
-    made = fit(
-        target,
-        settings,
-        backend,
-        scene=scene,
-        seconds=seconds,
-        report=Meter(noting(history, report), after).stage(cost, 0),
-        stop=stop,
-        stages=None if settings.time_budget else stages,
-    )
+    settings = _settings(problem.settings, len(scene))
+    run = timed(recorded(run, history), settings, target)
+    made = fit(Problem(target, settings), run, Start(scene=scene))
     if stages and made.interrupted:
         stages.save()
     release_memory()
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
-        refined = clear_empty(refined, target, settings, backend, made.per_pixel)
+        refined = clear_empty(refined, target, settings, run.backend, made.per_pixel)
     svg = write_svg(
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
     svg = minified(svg) if settings.minify else svg if view else shortened(svg)
-    eyes = eyes and not made.interrupted
+    eyes = has_time_for_ssimulacra2(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
     better = score.psnr > before.psnr
     if eyes and not better:
@@ -119,7 +156,7 @@ def refine(
     if view:
         svg = on_sheet_of(given, view, svg)
         score, before = score.of_file(svg), before.of_file(given)
-    seconds = time.monotonic() - started
+    seconds = time.monotonic() - begun
     return Result(
         svg=svg if better else given,
         scene=refined if better else scene,
@@ -137,15 +174,27 @@ def refine(
     )
 
 
-def _load(
-    text: str, target: FloatArray, settings: Settings, name: str, *, keep: bool
-) -> tuple[KeptScene, FloatArray, bool]:
-    """The SVG's scene, what it is to show, and whether the file has a background.
+def _settings(settings: Settings, count: int) -> Settings:
+    """Return the settings of a fit of ``count`` shapes that all stay."""
+    return replace(
+        settings,
+        curves=min(count, 100_000),
+        coarse=0.0,
+        density=Density(interval=0),
+        rates={**settings.rates, "points": REFINE_RATE},
+        renderer="exact",
+        texture=0.0,  # the PSNR decides whether a result is better
+    )
 
-    One that the SVG has lies behind a transparent image as well; ``Settings.background`` may ask for another
-    one, or for none, which makes it a shape as any other.
+
+def _load(text: str, problem: Problem, name: str, *, keep: bool) -> tuple[KeptScene, FloatArray, bool]:
+    """Return the SVG's scene, the image it is fitted to, and whether the file has a background.
+
+    The SVG's own background lies behind a transparent image as well; ``Settings.background`` may ask for
+    another one, or for none, which makes it a shape as any other.
     """
-    height, width = target.shape[:2]
+    target, settings = problem.target, problem.settings
+    width, height = problem.size
     apart = settings.background != "none"
     if keep:
         base = load_kept(text, width, height, name, background_apart=apart)
@@ -168,7 +217,7 @@ def _load(
 
 
 def _check_read(text: str, scene: Scene, has_background: bool) -> None:
-    """Compare pictures of the SVG and of what was read of it: nothing may be lost that no rule thought of.
+    """Compare pictures of the SVG and of the scene that was read: nothing may be lost unnoticed.
 
     Raises:
         ImageError: they differ.
@@ -183,17 +232,10 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
 
 
 def likeness(one: Image.Image, other: Image.Image) -> float:
-    """PSNR of pictures of one size, on white [dB]; strip by strip, as each has 24 bytes a pixel there."""
+    """Return the PSNR of two pictures of one size, on white [dB]; strip by strip to save memory."""
     width, height = one.size
     error = 0.0
     for rows in rows_of(width, height):
         a, b = (on_white(picture.crop((0, rows.start, width, rows.stop))) for picture in (one, other))
         error += float(np.square(a - b).sum())
     return decibels(error / (3 * width * height))
-
-
-MIN_ALIKE = 25.0
-"""Least PSNR [dB] of the scene read against the SVG; what is read in full has over 40."""
-
-REFINE_RATE = 0.5
-"""Learning rate of points [px]: the shapes are nearly where they should be."""

@@ -1,4 +1,4 @@
-"""An SVG drawn by the program's own renderers."""
+"""Draw scenes and SVGs by the program's own renderers, or by the viewer."""
 
 from __future__ import annotations
 
@@ -10,19 +10,94 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import ImageError, UsageError, shown
 from warpsplat.fit.renderers import renderer_of
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.renderer import render as render_scene
+from warpsplat.rendering.renderer import render_into
+from warpsplat.rendering.room import MOST_SIDE
+from warpsplat.run.backend import backend_on
+from warpsplat.run.svg import SvgSource, save_svg, svg_name_of, text_of
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 from warpsplat.svg.read import scene_of
 from warpsplat.svg.structure import read_shapes
 from warpsplat.svg.viewer import premultiplied, render_svg
 
 
+def render(
+    scene: Scene | SvgSource,
+    width: int | None = None,
+    height: int | None = None,
+    *,
+    scale: float | None = None,
+    renderer: str = "exact",
+    device: str = "auto",
+    threads: int | None = None,
+) -> FloatArray:
+    """Draw a scene or an SVG.
+
+    Args:
+        scene: what to draw.
+        width: [px]; the canvas, or the SVG's own size, is scaled to it.
+        height: [px]; without one of the two the other says the size.
+        scale: magnification, in place of both.
+        renderer: ``exact`` coverage, ``splat`` or (scenes only) ``gaussian``; ``viewer`` is resvg.
+        device: where to compute, see ``vectorize``.
+        threads: see there.
+
+    Returns:
+        sRGB in [0, 1] premultiplied by opacity, and opacity, shape (height, width, 4). ``to_pillow`` makes an
+        image of 8 bits of it.
+
+    Raises:
+        UsageError: sizes of other proportions than the scene's, or of no pixel.
+        ImageError: an SVG that cannot be read, or not by this renderer.
+        ResourceError: the picture takes more memory than there is.
+    """
+    if not isinstance(scene, Scene):
+        text = text_of(scene, svg_name_of(scene))
+        own = svg_size(inspect_svg(text).root)
+        if own is None:
+            raise ImageError(f"{svg_name_of(scene)}: says neither its size nor a viewBox")
+        zoom = _zoom(own, width, height, scale)
+        with backend_on(device, threads) as backend:
+            return _with_opacity(drawn(text, renderer, zoom, backend))
+    size = (scene.canvas.width, scene.canvas.height)
+    zoom = _zoom(size, width, height, scale)
+    if renderer == "viewer":
+        return render(save_svg(scene), scale=zoom, renderer="viewer")
+    viewport = Viewport(width or max(1, round(size[0] * zoom)), height or max(1, round(size[1] * zoom)), zoom)
+    with backend_on(device, threads) as backend:
+        model = renderer_of(renderer).default_model
+        return _with_opacity(render_into(scene, viewport, model=model, backend=backend))
+
+
+def _zoom(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:
+    """Return the pixels per unit of a picture of ``size`` that is drawn with this width, height or scale."""
+    if scale is not None and (width is not None or height is not None):
+        raise UsageError("a scale, and a width or height besides")
+    for what, side in (("width", width), ("height", height)):
+        if side is not None and (isinstance(side, bool) or not 1 <= side <= MOST_SIDE or int(side) != side):
+            raise UsageError(f"{what} must be a whole number from 1 to {MOST_SIDE}, not {shown(side)}")
+    if scale is not None:
+        if not (math.isfinite(scale) and scale > 0):
+            raise UsageError(f"scale must be a positive number, not {scale}")
+        return scale
+    if width is None and height is None:
+        return 1.0
+    zoom = width / size[0] if width is not None else (height or 1) / size[1]
+    if width is not None and height is not None and abs(size[1] * zoom - height) >= 1:
+        raise UsageError(f"{width}x{height} px have not the proportions of {size[0]:g}x{size[1]:g}")
+    return zoom
+
+
+def _with_opacity(image: npt.NDArray[np.float32]) -> FloatArray:
+    return image if image.shape[2] == 4 else np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
+
+
 def drawn(text: str, renderer: str, scale: float, backend: Backend) -> FloatArray:
-    """The SVG ``text`` at the size that resvg gives it, as ``Renderer.read_image`` has it.
+    """Draw the SVG ``text`` at the size that resvg gives it, as ``Renderer.read_image`` returns images.
 
     Raises:
         ImageError: not an SVG, or with something that the model cannot show.
@@ -46,7 +121,7 @@ def drawn(text: str, renderer: str, scale: float, backend: Backend) -> FloatArra
     except ValueError as error:
         raise ImageError(f"{error}, not supported by the {renderer} renderer") from None
     if len(scene):
-        return render(scene, model=own.default_model, backend=backend)
+        return render_scene(scene, model=own.default_model, backend=backend)
     background = scene.canvas.background
     image = np.zeros((height, width, 4), np.float32)
     return image if background is None else np.asarray(image[..., :3] + background, np.float32)
@@ -63,10 +138,10 @@ def check_draws_files(renderer: str) -> None:
 
 
 def check_scale(size: tuple[float, float], scale: float) -> None:
-    """Whether a picture of ``size``, magnified, has pixels, and not too many.
+    """Check that a picture of ``size``, magnified, has pixels, and not too many.
 
     Raises:
-        UsageError: it has not.
+        UsageError: it does not.
         ImageError: it has too many by itself.
     """
     if not (math.isfinite(scale) and scale > 0):
@@ -83,21 +158,21 @@ def check_scale(size: tuple[float, float], scale: float) -> None:
 
 
 def to_png(image: FloatArray) -> bytes:
-    """A rendered image as a PNG."""
+    """Return a rendered image as a PNG."""
     packed = io.BytesIO()
     to_pillow(image).save(packed, "PNG")
     return packed.getvalue()
 
 
 def to_pillow(image: FloatArray) -> Image.Image:
-    """What ``render`` returns in 8 bits: RGB where all is opaque, else RGBA with straight opacity."""
+    """Convert what ``render`` returns to 8 bits: RGB if all is opaque, else RGBA with straight opacity."""
     pixels = to_bytes(image)
     opaque = (pixels[..., 3:] == 255).all()
     return Image.fromarray(pixels[..., :3] if opaque else pixels)
 
 
 def to_bytes(image: FloatArray) -> npt.NDArray[np.uint8]:
-    """A rendered image in 8 bits; a transparent one, which is premultiplied, as PNGs have it."""
+    """Return a rendered image in 8 bits, with straight opacity as in a PNG if it is transparent."""
     color, alpha = image[..., :3], image[..., 3:]
     if alpha.shape[2]:
         image = np.concatenate([np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0), alpha], 2)

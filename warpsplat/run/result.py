@@ -1,4 +1,4 @@
-"""What a run made."""
+"""The result of a run."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Subject
-from warpsplat.fit.work import Progress
 from warpsplat.metrics import Score
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
@@ -16,59 +16,61 @@ from warpsplat.scene import Scene
 
 @dataclass(frozen=True)
 class LevelScore:
-    """What a layered file shows without the layers above a level."""
+    """PSNR of a layered file without the layers above a level."""
 
     shapes: int
     psnr: float | None
-    """As a viewer shows it [dB]; None where it is the image itself."""
+    """As a viewer shows it [dB]; None if it equals the image."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a run made."""
+    """The result of a run."""
 
     svg: str
     scene: Scene
-    """What the file shows; of soft Gaussians, the shapes as they were trained: a file holds less of them."""
+    """The shapes of the file; with soft Gaussians the trained ones, which a file cannot show as they are."""
     score: Score | None
-    """Of the SVG as resvg shows it; None where the run was stopped before it was measured."""
+    """Score of the SVG as resvg shows it; None if the run was stopped before that."""
     render_psnr: float
-    """Of the last training render against the image, at its size [dB]. Of soft Gaussians, where the image is
-    no larger than that size: of the finished scene in 8 bits, as the file's is.
+    """PSNR of the last training render against the image, at its size [dB]. With soft Gaussians, if the image
+    is no larger than that size: of the finished scene in 8 bits, like the file's.
     """
     estimated_psnr: float
-    """Of the file at that size, as the training saw it: the last look at it may be 25 steps old [dB]."""
+    """PSNR of the file at that size, as estimated by the training [dB]."""
     iterations: int
     """Steps done; fewer than asked for when stopped."""
     seconds: float
     stopped: bool
-    """Whether it was interrupted."""
+    """Whether the run was interrupted."""
     renderer: str = "exact"
-    """Of the training."""
+    """Coverage model of the training."""
     render_ssim: float | None = None
-    """Of soft Gaussians' own render."""
+    """SSIM of the render of soft Gaussians."""
     missed: tuple[str, ...] = ()
-    """Goals that were not reached, each as a sentence."""
+    """Goals that were missed, each as a sentence."""
     levels: tuple[LevelScore, ...] = ()
-    """Of a layered file, of each level's picture."""
+    """Scores of each level of a layered file."""
     subject: Subject = "photo"
-    """What the image was taken for ..."""
+    """What the image was taken for."""
     why: str = ""
-    """... and why; empty where it was given."""
+    """The reason for the subject; empty if it was given."""
     history: tuple[Progress, ...] = field(default=(), repr=False)
-    """What was reported of the training, in order."""
+    """The progress reports of the training, in order."""
     before: float | None = None
-    """Of a refined SVG, its own PSNR [dB]."""
+    """PSNR of an SVG before it was refined [dB]."""
     renewed: int = 0
-    """Times that a shape was set anew in training since a number of its was not finite."""
+    """How often a shape was reset in training because of a number that was not finite."""
     reduced: str = ""
-    """What was done to stay below the limit of memory, for people; empty: nothing."""
+    """How the image was reduced to stay below the limit of memory, for people; empty: not at all."""
     kept: str = ""
-    """Of a refined SVG, what was kept as it is, for people; empty: nothing."""
+    """Elements that a refined SVG keeps as they are, for people; empty: none."""
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the SVG, or as the name ends: ``.svgz`` gzipped, ``.png`` as a viewer shows it, ``.pdf`` (the
-        extra ``pdf``) its paths. An existing file is replaced in one step: it is there as it was, or whole.
+        """Write the result; an existing file is replaced atomically.
+
+        The ending decides the format: ``.svg``, ``.svgz`` gzipped, ``.png`` as a viewer shows it, or ``.pdf``
+        (the extra ``pdf``) its paths.
 
         Raises:
             UsageError: the package that makes PDFs is not installed.
@@ -77,7 +79,7 @@ class Result:
         write_named(Path(path), self.svg)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON. Figures that were not measured are None."""
+        """Return the figures for JSON; those that were not measured are None."""
         shapes = len(self.scene) - len(self.scene.pictures)
         figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
         return {

@@ -1,31 +1,40 @@
-"""One image in several numbers of shapes, in one run: what does not depend on the number is done once."""
+"""One image with several numbers of shapes: work that does not depend on the number is done once."""
 
 from __future__ import annotations
 
+import functools
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
 from warpsplat.files.output import make_folder
 from warpsplat.files.sources import ImageSource
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.work import Report
-from warpsplat.rendering.backend import Backend
+from warpsplat.run.backend import backend_on
 from warpsplat.run.formats import write_named
-from warpsplat.run.prepare import Prepared, prepare
+from warpsplat.run.keywords import settings_given, takes
+from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import make
+from warpsplat.run.typed import Options
+from warpsplat.run.vectorize import make_result
 from warpsplat.scene import FloatArray
-from warpsplat.search.several import Series
+from warpsplat.search.series import Series
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 MOST_NUMBERS = 16
-"""Of shapes, in one run."""
+"""Most numbers of shapes in one run."""
 
 
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
-    """Find out before the work whether there can be a run with several numbers of shapes.
+    """Check before the work whether there can be a run with several numbers of shapes.
 
     Raises:
         UsageError: a number is given twice or out of range, or other settings say how many shapes there are.
@@ -40,101 +49,110 @@ def check_several(settings: Settings, numbers: Sequence[int]) -> None:
         raise UsageError(f"several numbers of shapes and {settings.counting[0]} do not go together")
 
 
-def vectorize_several(
-    source: ImageSource,
-    numbers: Sequence[int],
-    settings: Settings,
-    backend: Backend,
-    *,
-    outputs: Sequence[Path] | None = None,
-    name: str | None = None,
-    importance: ImageSource | None = None,
-    report: Report | None = None,
-    stop: Callable[[], bool] | None = None,
-    ready: Callable[[Result], None] | None = None,
-) -> tuple[Result, ...]:
-    """Vectorize an image once with each of several numbers of shapes, from few to many.
-
-    Args:
-        source: the image.
-        numbers: of shapes; of a drawing, the most.
-        settings: all else that decides the results.
-        backend: where to compute.
-        outputs: a file for each number, each written as soon as it is made, see ``vectorize_image``; folders
-            that are missing are made once nothing is left to refuse.
-        name: how messages call the image.
-        importance: a mask.
-        report: called every few steps; ``work`` is the share of all that is to be done.
-        stop: asked after every step; once true, the shapes as they are make the file of the number that it
-            was about, and no other is begun.
-        ready: called with each result, once it is measured.
-
-    Returns:
-        the results, as the numbers were given; fewer where it was stopped.
-
-    Raises:
-        UsageError: see ``check_several``; or the image shows what has a number of shapes of its own.
-        ImageError, OutputError, ResourceError: see ``vectorize_image``.
-    """
-    check_several(settings, numbers)
-    settings = replace(settings, simplify=False)
-    work = prepare(source, replace(settings, curves=max(numbers)), name=name, importance=importance)
-    subject = work.settings.subject
-    if subject in OWN_NUMBER:
-        raise UsageError(
-            f"{work.name}: a {OWN_NUMBER[subject]} has a number of shapes of its own: one file is all there "
-            "is of it; --subject photo fits shapes"
-        )
-    for folder in sorted({path.parent for path in outputs or ()}):
-        make_folder(folder)
-    series = Series(work.settings, numbers, *work.size, backend, shares=can_share(work.target))
-    results: dict[int, Result] = {}
-    for number in sorted(numbers):
-        output = outputs[numbers.index(number)] if outputs else None
-        result = _made(work, series, number, results, backend, output, report, stop)
-        results[number] = result
-        if ready:
-            ready(result)
-        if result.stopped or (stop and stop()):
-            break
-    return tuple(results[number] for number in numbers if number in results)
-
-
 OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
-"""Subjects whose pictures say how many shapes there are, as messages call them."""
+"""Subjects whose images decide how many shapes there are, as messages call them."""
 
 
 def can_share(image: FloatArray) -> bool:
-    """Whether fits to ``image`` lose nothing where they go on from fits with fewer shapes.
+    """Return whether fits to ``image`` lose nothing by continuing from fits with fewer shapes.
 
-    Those to drawings lose half a decibel and more, from wherever in their schedule (docs/experiments.md).
+    Those to drawings lose half a decibel and more, wherever they begin (docs/experiments.md).
     """
     return guess_subject(image).subject == "photo"
 
 
-def _made(
-    work: Prepared,
-    series: Series,
-    number: int,
-    earlier: dict[int, Result],
-    backend: Backend,
-    output: Path | None,
-    report: Report | None,
-    stop: Callable[[], bool] | None,
-) -> Result:
-    """The result with ``number`` shapes, after those with fewer."""
-    if work.settings.subject == "drawing" and earlier:
-        most, last = max(earlier.items())
-        if len(last.scene) < most:  # there are no more regions
-            if output is not None:
-                write_named(output, last.svg)
-            return last
-    settings, start = series.next(number)
-    return make(
-        replace(work, settings=settings),
-        backend,
-        start=start,
-        output=output,
-        report=series.watch(number, report),
-        stop=stop,
-    )
+@takes(Options)
+def vectorize_several(
+    image: ImageSource,
+    curves: Sequence[int],
+    *,
+    settings: Settings | None = None,
+    importance: ImageSource | None = None,
+    outputs: Sequence[str | os.PathLike[str]] | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
+    stop: Callable[[], bool] | None = None,
+    ready: Callable[[Result], None] | None = None,
+    name: str | None = None,
+    **options: Unpack[Options],
+) -> tuple[Result, ...]:
+    """Turn an image into SVGs of several numbers of shapes, which share what work they can.
+
+    Args:
+        image: as for ``vectorize``.
+        curves: numbers of shapes; of a drawing, the most. They are made from few to many.
+        settings: all that decides the results but their numbers, made by ``make_settings``; in place of
+            ``options``.
+        importance: as for ``vectorize``.
+        outputs: a file for each number, written as soon as it is made; missing folders are made.
+        device: as for ``vectorize``.
+        threads: see there.
+        callback: see there; ``Progress.work`` is the share of all that is to be done. One that returns True
+            ends the run.
+        stop: see there.
+        ready: called with each result as soon as there is one.
+        name: see ``vectorize``.
+        options: see there.
+
+    Returns:
+        a result for each number, in the order of ``curves``; where the run was stopped, of the smallest ones
+        alone, and that of most shapes may be ``stopped``.
+
+    Raises:
+        UsageError: a number that is out of range or there twice; settings that say how many shapes there
+            are, as goals and levels do; line art and pixel art, which say so themselves.
+        ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``.
+    """
+    if outputs is not None and len(outputs) != len(curves):
+        raise UsageError(f"{len(curves)} numbers of shapes and {len(outputs)} outputs")
+    settings = replace(settings_given(settings, **options), simplify=False)
+    check_several(settings, curves)
+    with backend_on(device, threads) as backend:
+        most = replace(settings, curves=max(curves))
+        prepared = prepare(image, most, name=name, importance=importance)
+        subject = prepared.problem.settings.subject
+        if subject in OWN_NUMBER:
+            raise UsageError(
+                f"{prepared.name}: a {OWN_NUMBER[subject]} has a number of shapes of its own: one file is "
+                "all there is of it; --subject photo fits shapes"
+            )
+        paths = {number: Path(output) for number, output in zip(curves, outputs or (), strict=False)}
+        for folder in sorted({path.parent for path in paths.values()}):
+            make_folder(folder)
+        results = _results(prepared, curves, Run(backend, callback, stop), paths, ready)
+    return tuple(results[number] for number in curves if number in results)
+
+
+def _results(
+    image: PreparedImage,
+    numbers: Sequence[int],
+    run: Run,
+    outputs: dict[int, Path],
+    ready: Callable[[Result], None] | None,
+) -> dict[int, Result]:
+    """Return the results by their numbers of shapes; only the smaller ones if the run was stopped."""
+    series = Series(image.problem.settings, numbers, shares=can_share(image.problem.target))
+    results: dict[int, Result] = {}
+    for number in sorted(numbers):
+        write = functools.partial(write_named, outputs[number]) if number in outputs else None
+        if _has_no_more(image, results):
+            result = results[max(results)]
+            if write:
+                write(result.svg)
+        else:
+            settings, start = series.next(number)
+            problem = replace(image.problem, settings=settings)
+            result = make_result(replace(image, problem=problem), series.part(number, run), write, start)
+        results[number] = result
+        if ready:
+            ready(result)
+        if result.stopped or run.stopped():
+            break
+    return results
+
+
+def _has_no_more(image: PreparedImage, results: dict[int, Result]) -> bool:
+    """Return whether the last result of a drawing has all of its regions."""
+    most = max(results, default=0)
+    return image.problem.settings.subject == "drawing" and most > 0 and len(results[most].scene) < most

@@ -1,52 +1,59 @@
-"""How many shapes an image is worth: as many as still buy what can be seen, with their bytes."""
+"""Suggest how many shapes an image is worth: as many as still gain what can be seen for their bytes."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import Settings, Subject
-from warpsplat.fit.work import Report
 from warpsplat.portable import elementary
-from warpsplat.rendering.backend import Backend
+from warpsplat.run.backend import backend_on
+from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.prepare import prepare
 from warpsplat.run.several import OWN_NUMBER
+from warpsplat.run.typed import Options
 from warpsplat.search.survey import Worth, survey
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 CALLED = {"drawing": "drawing", **OWN_NUMBER}
 """Subjects that are traced, as messages call them."""
 
 TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Shapes of the rows of a table, over those suggested."""
+"""Shapes of the rows of a table, over the suggested number."""
 
 SAMPLES = 513
-"""Numbers of shapes among which the knee is looked for."""
+"""Numbers of shapes at which the gain is evaluated."""
 
 SEEN = 0.5
-"""Decibels from which on an eye tells two pictures apart: a rule of thumb of image coding."""
+"""Least gain that can be seen [dB]: a rule of thumb of image coding."""
 
 MORE_SHAPES, MORE_BYTES = 100, 10_000
-"""That are to buy as much. It is one price for all pictures: their quality grows about evenly with doublings,
-and by the mean slope of each one's own curve (Satopää et al. 2011) all would get the same number.
+"""Shapes, and bytes, that have to gain as much. The threshold is the same for all images: their quality grows
+about evenly with doublings, so by the mean slope of each one's curve (Satopää et al. 2011) all would get the
+same number.
 """
 
 EXACT = 58.0
-"""Decibels at which a picture of 8 bits a channel has no error but that of rounding."""
+"""PSNR at which an image of 8 bits a channel has no error but that of rounding [dB]."""
 
 FINE = 0.05
-"""Steps that a suggestion is rounded to, at the most, over itself: it is no more exact than that."""
+"""Largest step to which a suggestion is rounded, as a share of it: it is no more exact than that."""
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What a number of shapes is expected to give."""
+    """Expected quality and size of a number of shapes."""
 
     shapes: int
     psnr: float
@@ -54,31 +61,31 @@ class Expected:
     bytes: int
 
     def __str__(self) -> str:
-        """As the beginning of a sentence."""
+        """Return the beginning of a sentence."""
         size = f"{self.bytes / 1000:.0f} kB" if self.bytes >= 10_000 else f"{self.bytes / 1000:.1f} kB"
         return f"{self.shapes} shapes are expected to give {self.psnr:.1f} dB in {size}"
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A number of shapes, and why."""
+    """A suggested number of shapes, and the reason."""
 
     curves: int | None
     """Shapes; None where the image itself says how many there are."""
     subject: Subject
-    """What the image was taken for ..."""
+    """Subject that the image was taken for."""
     why: str
     """The reason, in sentences."""
     expected: tuple[Expected, ...]
-    """Of the suggested number and of others around it, ascending, of runs of the default effort."""
+    """For the suggested number and others around it, ascending, by runs of the default effort."""
     by_shapes: int | None
-    """The knee of quality against shapes ..."""
+    """Most shapes of which 100 more gain what can be seen."""
     by_bytes: int | None
-    """... and against bytes, in shapes."""
+    """Most shapes of which 10 kB more gain what can be seen."""
     seconds: float
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the values for JSON."""
         return {
             **{name: value for name, value in vars(self).items() if name != "expected"},
             "expected": [asdict(one) for one in self.expected],
@@ -87,7 +94,7 @@ class Suggestion:
 
 
 def check_suggesting(settings: Settings) -> None:
-    """Find out whether there is anything to suggest.
+    """Check whether there is anything to suggest.
 
     Raises:
         UsageError: the settings say how many shapes there are to be.
@@ -98,48 +105,70 @@ def check_suggesting(settings: Settings) -> None:
         )
 
 
-def suggest_curves(
-    source: ImageSource,
-    settings: Settings,
-    backend: Backend,
+@takes(Options)
+def suggest(
+    image: ImageSource,
     *,
-    name: str | None = None,
+    settings: Settings | None = None,
     importance: ImageSource | None = None,
-    report: Report | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
     stop: Callable[[], bool] | None = None,
+    name: str | None = None,
+    **options: Unpack[Options],
 ) -> Suggestion | None:
-    """Suggest a number of shapes for an image; None where it was stopped. Arguments are those of
-    ``run.vectorize.vectorize_image``.
+    """Suggest how many shapes an image is worth: as many as still gain what can be seen for their bytes.
+
+    A short fit on a reduced image, whose shapes grow from few to many, says what each number is expected to
+    give; it takes a fraction of what a run takes.
+
+    Args:
+        image: as for ``vectorize``.
+        settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
+        importance: as for ``vectorize``, as is all that follows.
+        device: see there.
+        threads: see there.
+        callback: see there.
+        stop: see there.
+        name: see there.
+        options: see there.
+
+    Returns:
+        the number, the reason, and what it and others are expected to give at the default effort; None where
+        it was stopped. Of images that are traced there is no number to choose, which the reason says.
 
     Raises:
-        UsageError: see ``check_suggesting``.
-        ImageError, ResourceError: see ``vectorize_image``.
+        UsageError: settings that say how many shapes there are.
+        ImageError, ResourceError, TypeError: as for ``vectorize``.
     """
+    settings = settings_given(settings, **options)
     check_suggesting(settings)
-    started = time.monotonic()
-    work = prepare(source, settings, name=name, importance=importance)
-    subject = work.settings.subject
-    if subject != "photo":
-        seen = f" ({work.why})" if work.why else ""
-        why = (
-            f"A {CALLED[subject]}{seen}, which is traced: the picture says how many shapes there are. "
-            "--subject photo fits a number of shapes to it."
-        )
-        return Suggestion(None, subject, why, (), None, None, time.monotonic() - started)
-    worth = survey(work.target, work.settings, backend, importance=work.importance, report=report, stop=stop)
+    with backend_on(device, threads) as backend:
+        run = Run(backend, callback, stop)
+        prepared = prepare(image, settings, name=name, importance=importance)
+        subject = prepared.problem.settings.subject
+        if subject != "photo":
+            seen = f" ({prepared.why})" if prepared.why else ""
+            why = (
+                f"A {CALLED[subject]}{seen}, which is traced: the picture says how many shapes there are. "
+                "--subject photo fits a number of shapes to it."
+            )
+            return Suggestion(None, subject, why, (), None, None, time.monotonic() - run.started)
+        worth = survey(prepared.problem, run)
     if worth is None:
         return None
     made = suggestion(worth)
-    guess = guess_subject(work.target)
+    guess = guess_subject(prepared.problem.target)
     if guess.subject != "photo":
         rough = f"It looks like a {CALLED[guess.subject]} ({guess.why}), of which this is a rough guess."
         made = replace(made, why=f"{made.why} {rough}")
-    return replace(made, seconds=time.monotonic() - started)
+    return replace(made, seconds=time.monotonic() - run.started)
 
 
 def suggestion(worth: Worth) -> Suggestion:
-    """What is suggested: the fewer shapes of its two knees, or the fewest where more are worth nothing."""
-    by_shapes, by_bytes = knee(worth, MORE_SHAPES), knee(worth, MORE_BYTES / worth.bytes_each)
+    """Return the suggestion: the smaller of the numbers that shapes and bytes allow."""
+    by_shapes, by_bytes = most_worth(worth, MORE_SHAPES), most_worth(worth, MORE_BYTES / worth.bytes_each)
     chosen = min(by_shapes, by_bytes)
     why = reason(worth, chosen, "100 more" if by_shapes <= by_bytes else "10 kB more")
     rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in TABLE})
@@ -147,8 +176,8 @@ def suggestion(worth: Worth) -> Suggestion:
     return Suggestion(chosen, "photo", why, expected, by_shapes, by_bytes, 0.0)
 
 
-def knee(worth: Worth, more: float) -> int:
-    """The most shapes at which ``more`` of them buy ``SEEN``, at the rate there; the fewest if none do."""
+def most_worth(worth: Worth, more: float) -> int:
+    """Return the most shapes at which ``more`` of them gain ``SEEN``; the fewest if none do."""
     low, high = elementary.log([worth.fewest, worth.most])
     shapes = elementary.exp(np.linspace(low, high, SAMPLES))
     shapes[[0, -1]] = worth.fewest, worth.most
@@ -160,12 +189,12 @@ def knee(worth: Worth, more: float) -> int:
 
 
 def expect(worth: Worth, shapes: int) -> Expected:
-    """What ``shapes`` are expected to give."""
+    """Return the expected quality and size of ``shapes``."""
     return Expected(shapes, round(float(worth.psnr(shapes)), 2), round(float(worth.size(shapes))))
 
 
 def reason(worth: Worth, chosen: int, more: str) -> str:
-    """Why it is this number; ``more``: what buys less from there on."""
+    """Return the reason for a number, from which on ``more`` gains less."""
     if worth.fewest == worth.most:
         return f"The picture is so small that there is no room for more than {worth.most} shapes."
     one, two = expect(worth, chosen), expect(worth, 2 * chosen)
@@ -186,7 +215,7 @@ def reason(worth: Worth, chosen: int, more: str) -> str:
 
 
 def rounded(number: float) -> int:
-    """A number that is easily said, near another one."""
+    """Return a round number near another one."""
     most = max(FINE * number, 1.0)
     unit = elementary.power_of_ten(len(str(int(most))) - 1)
     step = max(unit * factor for factor in (1, 2, 5) if unit * factor <= most)

@@ -1,215 +1,245 @@
-"""Image in, SVG file and its score out."""
+"""An image becomes an SVG file: the whole way, from top to bottom.
+
+``vectorize`` reads and inspects the image; ``make_result`` makes the shapes by a strategy, puts them in
+order, and writes and scores the file.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.export import finished
-from warpsplat.fit.place import simple_curves
+from warpsplat.fit.loop import Fit, Start, fit
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Callback, Progress, Snapshot
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import Stages
-from warpsplat.fit.work import Progress
+from warpsplat.fit.stages import INTERVAL
 from warpsplat.native import release_memory
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.checkpoint import CheckpointFile, identity
+from warpsplat.rendering.renderer import render
+from warpsplat.run.backend import backend_on
+from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import level_scores, missed_goals, pixels_of, render_figures, scored
 from warpsplat.run.formats import write_named
 from warpsplat.run.keys import STOPPED
-from warpsplat.run.prepare import Prepared, prepare
-from warpsplat.run.reduction import Reduction
+from warpsplat.run.keywords import settings_given, takes
+from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import Result
-from warpsplat.run.training import Training, arranged, cost_after, noting, trained, training_seconds, way_of
+from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
+from warpsplat.run.typed import Options
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import areas
-from warpsplat.search.several import Start
 from warpsplat.svg.page import placed
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-def vectorize_image(
-    source: ImageSource,
-    settings: Settings,
-    backend: Backend,
+
+@takes(Options)
+def vectorize(
+    image: ImageSource,
+    curves: int | None = None,
     *,
-    output: Path | None = None,
-    name: str | None = None,
+    settings: Settings | None = None,
     importance: ImageSource | None = None,
-    keyed: bool = False,
-    report: Callable[[Progress], None] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    callback: Callback | None = None,
     stop: Callable[[], bool] | None = None,
-    checkpoint: CheckpointFile | None = None,
+    name: str | None = None,
+    keyed: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    checkpoint_every: float | str = INTERVAL,
+    overwrite: bool = False,
+    **options: Unpack[Options],
 ) -> Result:
-    """Read an image, vectorize it, write ``output`` atomically, and score it.
+    """Turn an image into an SVG, and measure how good it is.
+
+    The options are those of the command line; one that is None is chosen as the command line chooses it.
 
     Args:
-        source: the image.
-        settings: all that decides the result.
-        backend: where to compute.
-        output: the SVG, or its picture (``run.formats``); ``-`` is the standard output; None: it is not
-            written.
+        image: a path, the bytes of an image file, a file open for reading, a Pillow image, or an array of
+            shape (height, width[, channels]) of uint8, uint16, bool, or floats in [0, 1].
+        curves: number of shapes; of drawings and with a goal, the most.
+        settings: all options at once, made by ``make_settings``; none may be given besides.
+        importance: mask of the image's proportions, in any of the image's forms: how much errors count.
+        output: file to write the SVG to, before it is measured, or what its name ends with (``Result.save``);
+            ``-`` is the standard output.
+        device: ``auto``, ``cpu``, ``cuda`` or ``cuda:N``.
+        threads: of a CPU, default one a core; they do not change the result.
+        callback: see ``Callback``.
+        stop: asked after every step; once true, the shapes as they are make the file.
         name: how messages call the image; default: its file's name.
-        importance: a mask, see ``load_importance``.
-        keyed: whether the file names the job that made it (``job_key``), for batches to go on from; image and
-            mask are files then.
-        report: called every few steps.
-        stop: asked after every step, see ``vectorize``.
-        checkpoint: where the state of the run is kept until it is done.
+        keyed: mark the file with what it was made of, by which batches know it.
+        checkpoint: file in which the state of the run is kept until it is done, every ``checkpoint_every``
+            and when it is stopped.
+        resume: go on from the checkpoint, to the bytes of an uninterrupted run; where there is none, start.
+        checkpoint_every: seconds, or ``"2m"``.
+        overwrite: let a run that starts anew replace a checkpoint, or any other file, of that name.
+        options: see ``Options`` and the documentation's table.
+
+    Returns:
+        the SVG, its scene, its score and the run's history.
 
     Raises:
-        ImageError: ``source`` or the mask cannot be read, or their proportions differ.
+        UsageError: a setting or device that cannot be used as given.
+        ImageError: an image or mask that cannot be read.
+        CheckpointError: a checkpoint that cannot be read; one of another run is a ``UsageError``.
         OutputError: ``output`` cannot be written.
-        CheckpointError, UsageError: see ``CheckpointFile``.
-        ResourceError: the limit of memory is too low for any size.
+        ResourceError: memory, threads, or a place for compiled kernels are missing.
+        TypeError: an image of none of these forms, or an unknown keyword.
     """
-    work = prepare(source, settings, name=name, importance=importance, keyed=keyed)
-    stages = None
-    if checkpoint:
-        identified = identity("vectorize", settings, work.target, work.importance)
-        stages = checkpoint.stages(identified, backend)
-    result = make(work, backend, output=output, report=report, stop=stop, stages=stages)
-    if checkpoint and not result.stopped:
-        checkpoint.remove()
+    if isinstance(curves, (list, tuple)):
+        raise UsageError(f"several numbers of shapes: vectorize_several(image, {list(curves)})")
+    settings = settings_given(settings, curves=curves, **options)
+    given_files = (image, importance, output)
+    kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
+    write = None if output is None else functools.partial(write_named, Path(output))
+    with backend_on(device, threads) as backend:
+        prepared = prepare(image, settings, name=name, importance=importance, keyed=keyed)
+        stages = kept.stages(identity("vectorize", settings, prepared.problem), backend) if kept else None
+        result = make_result(prepared, Run(backend, callback, stop, stages=stages), write)
+    if kept and not result.stopped:
+        kept.remove()
     return result
 
 
-def make(
-    work: Prepared,
-    backend: Backend,
-    *,
-    start: Start | None = None,
-    output: Path | None = None,
-    report: Callable[[Progress], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-    stages: Stages | None = None,
+def make_result(
+    image: PreparedImage, run: Run, write: Callable[[str], None] | None = None, start: Start | None = None
 ) -> Result:
-    """A run on what was prepared, and its file; arguments are those of ``vectorize_image``, ``start`` that of
-    ``vectorize``.
-    """
-    settings, history = work.settings, list[Progress]()
-
-    try:
-        result = vectorize(
-            work.target,
-            settings,
-            backend,
-            metadata=work.key,
-            start=start,
-            importance=work.importance,
-            report=noting(history, report),
-            stop=stop,
-            write=None if output is None else lambda file: write_named(output, file),
-            stages=stages,
-            reduction=work.reduction,
-        )
-    except ImageError as error:  # of what only the work itself finds out
-        raise ImageError(f"{work.name}: {error}") from error
-    release_memory()
-    return replace(result, subject=settings.subject, why=work.why, history=tuple(history))
-
-
-def vectorize(
-    target: FloatArray,
-    settings: Settings,
-    backend: Backend,
-    *,
-    metadata: str = "",
-    start: Start | None = None,
-    importance: FloatArray | None = None,
-    report: Callable[[Progress], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-    write: Callable[[str], None] | None = None,
-    stages: Stages | None = None,
-    reduction: Reduction | None = None,
-) -> Result:
-    """Fit shapes to ``target`` and score the file they make.
+    """Vectorize a prepared image, and score the file.
 
     Args:
-        target: the image, sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape
-            (height, width, 4), it makes a file without a background.
-        settings: all that decides the result; a subject ``auto`` is fitted as a photograph is.
-        backend: where to compute; does not change the result.
-        metadata: text for the file's metadata; that of a run that was stopped says so instead.
-        start: how to begin, in place of with new shapes.
-        importance: how much the error of a pixel counts: grey mask in [0, 1], of any size. The figures are
-            those of the whole image all the same.
-        report: called every few steps.
-        stop: asked after every step; once true, the shapes as they are make the file. True later, the score
-            is given up.
+        image: the image, and the problem that it poses.
+        run: how the work is carried out.
         write: called with the file before it is scored, so that nothing that goes wrong then can lose it.
-        stages: what the run goes on from, and is told of its state. A run within a time budget, and tracing,
-            begin again: the one has no two runs alike, the other has no state but its beginning.
-        reduction: of a larger image to ``target``; the file is of that one's size.
+        start: shapes to start a plain fit from, in place of the settings' strategy.
+
+    Raises:
+        ImageError: something about the image that only the work itself finds out.
     """
-    started = time.monotonic()
-    way = way_of(settings, start)
-    training = Training(
-        target,
-        settings,
-        backend,
-        metadata=metadata,
-        start=start,
-        importance=importance,
-        seconds=training_seconds(settings, target, started),
-        watching={
-            "report": report,
-            "after": cost_after(settings, target, backend, way),
-            "stop": stop,
-            "stages": None if settings.time_budget else stages,
-        },
-    )
-    if way == "fit" and settings.simplify and start is None:
-        settings = replace(settings, curves=min(settings.curves, simple_curves(target)))
-        training = replace(training, settings=settings)
-    made = trained(training, way)
-    if stages and made.interrupted:
-        stages.save()
-    made = arranged(made, training, way)
-    if reduction:
-        made, settings = reduction.enlarged(made), reduction.settings(settings)
+    begun, history, stages = time.monotonic(), list[Progress](), run.stages
+    problem, reduction = image.problem, image.reduction
+    target, settings = problem.target, problem.settings
+    run = timed(recorded(run, history), settings, target)
+    strategy = choose_strategy(settings) if start is None else STRATEGIES["fit"]
+    with naming(image.name):
+        made = strategy.make(problem, run) if start is None else fit(problem, run, start)
+        report_end(made, run, history)
+        if stages and made.interrupted:
+            stages.save()
+        made = arranged(made, problem, strategy, run.backend)
+        if reduction:
+            made, settings = reduction.enlarged(made), reduction.settings(settings)
+        release_memory()
+        # A file that was cut short must not pass for a finished one.
+        metadata = STOPPED if made.interrupted else problem.metadata
+        svg, scene = export_within(made.scene, settings, made.per_pixel, metadata)
+        file = on_paper(svg, settings)
+        if write:
+            write(file)
+        score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
+        score = score.of_file(file) if score else None
+        render_psnr, render_ssim = render_score(made, image, settings, run.backend)
+        seconds = time.monotonic() - begun
+        result = Result(
+            svg=file,
+            scene=scene,
+            score=score,
+            render_psnr=render_psnr,
+            estimated_psnr=made.estimated_psnr,
+            iterations=made.iterations,
+            seconds=seconds,
+            stopped=made.interrupted,
+            renewed=made.renewed,
+            renderer=settings.renderer,
+            render_ssim=render_ssim,
+            missed=missed_goals(settings, score, seconds),
+            levels=level_scores(scene, settings, made.per_pixel, target, reduction) if score else (),
+            reduced=reduction.words() if reduction else "",
+            subject=settings.subject,
+            why=image.why,
+            history=tuple(history),
+        )
     release_memory()
-    # A file that was cut short must not pass for a finished one.
-    svg, scene = export_within(
-        made.scene, settings, made.per_pixel, STOPPED if made.interrupted else metadata
-    )
-    file = on_paper(svg, settings)
-    if write:
-        write(file)
-    score = scored(svg, target, settings, stop, reduction, interrupted=made.interrupted)
-    if score:
-        score = score.of_file(file)
-    render_psnr, render_ssim = made.render_psnr, None
-    soft = renderer_of(settings.renderer).soft
-    if soft and not reduction and pixels_of(target) <= settings.fine_pixels:
-        render_psnr, render_ssim = render_figures(made.scene, target, settings, backend)
-    seconds = time.monotonic() - started
-    levels = bool(score and settings.levels)
-    return Result(
-        svg=file,
-        scene=scene,
-        score=score,
-        render_psnr=render_psnr,
-        estimated_psnr=made.estimated_psnr,
-        iterations=made.iterations,
-        seconds=seconds,
-        stopped=made.interrupted,
-        renewed=made.renewed,
-        renderer=settings.renderer,
-        render_ssim=render_ssim,
-        missed=missed_goals(settings, score, seconds),
-        levels=level_scores(scene, settings, made.per_pixel, target, reduction) if levels else (),
-        reduced=reduction.words() if reduction else "",
-    )
+    return result
+
+
+@contextlib.contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Name the image in errors about it."""
+    try:
+        yield
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+
+
+RELEASE_INTERVAL = 10
+"""Progress reports from one release of free memory to the next: a release takes as long as a step does."""
+
+
+def recorded(run: Run, history: list[Progress]) -> Run:
+    """Return a run whose progress is recorded and never falls, and which releases memory now and then."""
+
+    def record(now: Progress) -> Progress:
+        now = replace(now, work=max(now.work, history[-1].work) if history else now.work)
+        history.append(replace(now, snapshot=None))  # which holds a run's arrays
+        if len(history) % RELEASE_INTERVAL == 0:
+            release_memory()
+        return now
+
+    return run.mapped(record)
+
+
+def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
+    """Report that the training is done, where the last report could not know."""
+    if history and history[-1].work < 1 and not made.interrupted:
+        scene = made.scene
+        snapshot = Snapshot(lambda: scene, lambda: render(scene, backend=run.backend))
+        last = replace(history[-1], work=1.0, fine=True, psnr=made.estimated_psnr, shapes=len(scene))
+        run.report(replace(last, seconds=time.monotonic() - run.started, snapshot=snapshot))
+
+
+TAIL_SECONDS = 0.3
+TAIL_PER_PIXEL = 3e-7
+"""Part of a time budget that the last step, exporting and scoring take [s]."""
+
+
+def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
+    """Return the run with the deadline that ``time_budget`` sets, which leaves time to write and score."""
+    if settings.time_budget is None:
+        return run
+    tail = TAIL_SECONDS + TAIL_PER_PIXEL * pixels_of(target)
+    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, stages=None)
+
+
+def render_score(
+    made: Fit, image: PreparedImage, settings: Settings, backend: Backend
+) -> tuple[float, float | None]:
+    """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
+    target = image.problem.target
+    small = not image.reduction and pixels_of(target) <= settings.fine_pixels
+    if renderer_of(settings.renderer).soft and small:
+        return render_figures(made.scene, target, settings, backend)
+    return made.render_psnr, None
 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
-    """The SVG, and the shapes in it: all, or those that show most where ``max_bytes`` has room for few."""
+    """Return the SVG and its shapes: all, or those that show most if ``max_bytes`` allows no more."""
 
     def made() -> tuple[str, int]:
         text = finished(scene, settings, per_pixel, metadata)
@@ -226,5 +256,5 @@ def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: 
 
 
 def on_paper(svg: str, settings: Settings) -> str:
-    """The file that is delivered: ``svg`` on the sheet that ``settings`` ask for, if they do."""
+    """Return ``svg`` on the sheet that ``settings`` ask for, if any."""
     return placed(svg, settings.size, settings.page, settings.units)

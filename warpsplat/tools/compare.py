@@ -13,18 +13,20 @@ from PIL import Image
 
 from warpsplat._version import __version__
 from warpsplat.errors import ImageError, Stopped, printable
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import Score, score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_eyes
+from warpsplat.run.figures import has_time_for_ssimulacra2
+from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize
+from warpsplat.run.vectorize import make_result
 from warpsplat.scene import FloatArray
 from warpsplat.tools.tracer import Tracer
 
 OURS = "warpsplat"
 
-Run = Callable[[FloatArray, Settings, Callable[[str], None]], Result]
+Maker = Callable[[FloatArray, Settings, Callable[[str], None]], Result]
 """Vectorizes an image by settings, and hands over the SVG before it is scored (``vectorize``)."""
 
 
@@ -83,7 +85,7 @@ class Comparison:
 
 
 def compare(
-    image: str, target: FloatArray, settings: Sequence[Settings], tracer: Tracer, run: Run
+    image: str, target: FloatArray, settings: Sequence[Settings], tracer: Tracer, make: Maker
 ) -> Iterator[Row]:
     """Vectorize an image by each of our settings, then by each of the tracer's.
 
@@ -92,14 +94,14 @@ def compare(
         target: sRGB in [0, 1], (height, width, 3); the tracer gets its 8 bits.
         settings: ours.
         tracer: the other program.
-        run: makes our files.
+        make: makes our files.
 
     Raises:
         Stopped: a run of ours was interrupted: its file says nothing.
     """
     for ours in settings:
-        yield our_row(image, target, ours, run)
-    eyes = all(has_time_for_eyes(ours, target) for ours in settings)
+        yield our_row(image, target, ours, make)
+    eyes = all(has_time_for_ssimulacra2(ours, target) for ours in settings)
     file = io.BytesIO()
     Image.fromarray(np.round(255 * target).astype(np.uint8)).save(file, "PNG", compress_level=1)
     for setting in tracer.settings:
@@ -117,7 +119,7 @@ class Watch:
         return time.monotonic() - self.begin[0], time.process_time() - self.begin[1]
 
 
-def our_row(image: str, target: FloatArray, settings: Settings, run: Run) -> Row:
+def our_row(image: str, target: FloatArray, settings: Settings, make: Maker) -> Row:
     """Our file, of at most ``settings.curves`` shapes.
 
     Raises:
@@ -130,7 +132,7 @@ def our_row(image: str, target: FloatArray, settings: Settings, run: Run) -> Row
         nonlocal spent
         spent = watch.read()
 
-    result = run(target, settings, note_end)
+    result = make(target, settings, note_end)
     if result.stopped or result.score is None:
         raise Stopped
     return Row(image, OURS, str(settings.curves), result.svg, *spent, result.score)
@@ -163,4 +165,4 @@ def warm_up(settings: Settings, backend: Backend) -> None:
     y, x = np.mgrid[:64, :64].astype(np.float32) / 64
     target = np.stack([y, x, x * y], axis=2)
     quick = make_settings(kind=settings.kind, renderer=settings.renderer, curves=8, iterations=60)
-    vectorize(target, quick, backend)
+    make_result(PreparedImage(Problem(target, quick)), Run(backend))

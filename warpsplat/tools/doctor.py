@@ -246,7 +246,7 @@ def check_itself(device: str) -> Check:
     import numpy as np
     import warp as wp
 
-    from warpsplat.api.vectorize import vectorize
+    from warpsplat.run.vectorize import vectorize
 
     y, x = np.mgrid[:48, :48] / np.float32(48)
     image = np.stack([x, y, 0.5 + 0.4 * np.sin(6 * x) * np.cos(5 * y)], axis=2).astype(np.float32)
@@ -274,11 +274,11 @@ def check_adjoint(device: str) -> Check:
     """Check a derivative of an image against a difference of images."""
     import numpy as np
 
-    from warpsplat.api.images import starting_scene
     from warpsplat.rendering.backend import Backend, Viewport
     from warpsplat.rendering.device import choose_device
     from warpsplat.rendering.parameters import Parameters
     from warpsplat.rendering.renderer import Renderer
+    from warpsplat.run.images import starting_scene
 
     rng = np.random.default_rng(0)
     y, x = np.mgrid[:32, :32] / np.float32(32)

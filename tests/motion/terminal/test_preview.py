@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene
-from warpsplat.fit.work import Progress, Snapshot
+from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.motion.terminal.detect import Terminal
 from warpsplat.motion.terminal.preview import SHARE, Preview
 from warpsplat.scene import FloatArray

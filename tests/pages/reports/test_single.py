@@ -16,7 +16,7 @@ from PIL import Image
 
 import warpsplat
 from tests.pages.helpers import NASTY, Tags, data_of
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 from warpsplat.pages.reports.pictures import (
     PAGE_PIXELS,
     Shown,

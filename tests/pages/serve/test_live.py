@@ -11,7 +11,7 @@ import pytest
 
 import warpsplat
 from tests.pages.serve.helpers import picture
-from warpsplat.fit.work import Progress, Snapshot
+from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.pages.serve.form import settings_of
 from warpsplat.pages.serve.live import LEAST_PAUSE, SHARE, Live
 

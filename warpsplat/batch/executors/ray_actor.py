@@ -54,7 +54,7 @@ class Actor:
         if unseen:
             return unseen
         from warpsplat.batch.executors.work import do
-        from warpsplat.fit.work import Progress  # in here, as all that is heavy: hello is quick
+        from warpsplat.fit.progress import Progress  # in here, as all that is heavy: hello is quick
 
         self._stop.clear()
         self._done = 0.0

@@ -8,7 +8,7 @@ from types import TracebackType
 
 from warpsplat.batch.executors.tasks import Advance, Outcome, Stop, Task
 from warpsplat.batch.executors.work import do
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 
 
 class Serial:

@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +14,18 @@ from warpsplat.batch.executors.tasks import Outcome, Source, Stop, Task
 from warpsplat.errors import WarpsplatError, explain, printable
 from warpsplat.files.inputs import read_input
 from warpsplat.files.output import make_folder
-from warpsplat.fit.work import Progress
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Progress
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.turns import turn
 from warpsplat.run.command_line import vectorize_command
-from warpsplat.run.formats import named_bytes
+from warpsplat.run.formats import named_bytes, write_named
 from warpsplat.run.keys import STOPPED, job_key
-from warpsplat.run.prepare import load_target
+from warpsplat.run.prepare import load_target, prepare
 from warpsplat.run.result import Result
-from warpsplat.run.vectorize import vectorize_image
+from warpsplat.run.vectorize import make_result
 from warpsplat.svg.inspect import svg_text
 
 OnProgress = Callable[[Progress], None]
@@ -77,17 +79,9 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, on_progress: On
     if not task.bring:
         make_folder(output.parent)
     with turn(backend.device):
-        result = vectorize_image(
-            image,
-            task.settings,
-            backend,
-            output=None if task.bring else output,
-            name=task.name,
-            importance=task.mask,
-            keyed=True,
-            report=on_progress,
-            stop=stop,
-        )
+        prepared = prepare(image, task.settings, name=task.name, importance=task.mask, keyed=True)
+        write = None if task.bring else partial(write_named, output)
+        result = make_result(prepared, Run(backend, on_progress, stop), write)
         made = Outcome(task.number, "made")
         if task.report and not result.stopped:
             made = _with_report(task, image, result.svg, result, backend)

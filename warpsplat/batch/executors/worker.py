@@ -75,7 +75,9 @@ def main(channel: Connection, parent: int, level: int, workers: int) -> None:
 
 def _serve(channel: Connection, task: Task, workers: int) -> None:
     from warpsplat.batch.executors.work import do
-    from warpsplat.fit.work import Progress  # in here, as all that is heavy: the process must first be safe
+    from warpsplat.fit.progress import (
+        Progress,
+    )  # in here, as all that is heavy: the process must first be safe
     from warpsplat.run.memory import share_machine
 
     share_machine(workers)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from typing import IO
 
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 from warpsplat.motion.terminal.detect import Terminal
 from warpsplat.motion.terminal.layout import Place, beside, drawing, joined, place, resized
 from warpsplat.scene import FloatArray

@@ -14,10 +14,10 @@ from warpsplat.errors import printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.pages import page
 from warpsplat.pages.plot import Mark, Plot, plot
+from warpsplat.pages.reports.knee import knee
 from warpsplat.pages.reports.pictures import ROOM, ROOM_SHARE, encoded, shown_image
 from warpsplat.pages.reports.single import Facts, headline, notes
 from warpsplat.run.result import Result
-from warpsplat.search.marginal_gain import knee
 from warpsplat.svg.page import picture_view, with_view
 
 ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "copy.js", "several.js")

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from warpsplat.errors import ImageError, printable
 from warpsplat.files.sources import ImageSource, held
-from warpsplat.fit.work import Progress
+from warpsplat.fit.progress import Progress
 from warpsplat.pages import page
 from warpsplat.pages.embed import image_uri
 from warpsplat.pages.plot import Plot, plot

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from warpsplat.api.svg import save_svg
-from warpsplat.fit.work import Progress, Snapshot, TimeLeft
+from warpsplat.fit.progress import Progress, Snapshot, TimeLeft
+from warpsplat.run.svg import save_svg
 
 SHARE = 0.07
 """Of a run's time that pictures of it may take: with all the rest a page costs less than a tenth."""

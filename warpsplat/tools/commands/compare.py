@@ -142,9 +142,11 @@ def command(
     from warpsplat.cli.signals import Interrupt
     from warpsplat.files.image import load_image
     from warpsplat.files.output import write_result
+    from warpsplat.fit.problem import Problem, Run
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
-    from warpsplat.run.vectorize import vectorize
+    from warpsplat.run.prepare import PreparedImage
+    from warpsplat.run.vectorize import make_result
     from warpsplat.tools.compare import Comparison, compare, warm_up
 
     start_warp()
@@ -153,7 +155,7 @@ def command(
 
     def run(path: Path, target: FloatArray, ours: Settings, write: Callable[[str], None]) -> Result:
         with interrupt.watching(), progress_bar(path, ours, quiet=quiet, verbose=verbose) as report:
-            return vectorize(target, ours, backend, report=report, stop=interrupt, write=write)
+            return make_result(PreparedImage(Problem(target, ours)), Run(backend, report, interrupt), write)
 
     rows: list[Row] = []
     try:

@@ -1,4 +1,4 @@
-"""SVGs as users give them; scenes from them and to them; their score."""
+"""Read SVGs as scenes, write scenes as SVGs, and score SVGs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ gzipped or not."""
 
 
 def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
-    """The paths of any SVG as a scene, at the SVG's own size.
+    """Read the paths of any SVG as a scene, at the SVG's own size.
 
     Args:
         svg: as for ``refine``.
@@ -62,11 +62,11 @@ def save_svg(
     ids: bool = False,
     minify: bool = False,
 ) -> str:
-    """The SVG of a scene, written to ``path`` where one is given, which is replaced in one step.
+    """Return the SVG of a scene, and write it to ``path`` atomically if that is given.
 
     Args:
         scene: what to write.
-        path: says by its ending what is written, see ``Result.save``.
+        path: its ending decides the format, see ``Result.save``.
         precision: decimals of a pixel in coordinates; default: two.
         title: as for ``vectorize``, as are ``ids`` and ``minify``.
         ids: see there.
@@ -85,9 +85,9 @@ def save_svg(
 
 
 def score(svg: SvgSource, image: ImageSource) -> Score:
-    """How well an SVG, as a viewer shows it at the image's size, shows the image, and what it is made of.
+    """Measure how well an SVG shows an image, as a viewer draws it at the image's size, and count its parts.
 
-    Where the image has opacity, on black and on white, and the lower figures count.
+    If the image has opacity, it is measured on black and on white, and the lower figures count.
 
     Raises:
         ImageError: either cannot be read, or their proportions differ.
@@ -101,13 +101,13 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
 
 
 def svg_name_of(svg: object) -> str:
-    """How messages call an SVG."""
+    """Return the name of an SVG in messages."""
     is_text = isinstance(svg, str) and ("<" in svg or not svg.strip())
     return "the SVG" if is_text else source_name(svg, "the SVG")
 
 
 def text_of(svg: SvgSource, name: str) -> str:
-    """The text of an SVG, which messages call ``name``.
+    """Return the text of an SVG, which messages call ``name``.
 
     Raises:
         ImageError: it cannot be read.

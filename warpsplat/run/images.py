@@ -1,4 +1,4 @@
-"""Images as a fit of one's own begins with them."""
+"""Images and shapes for fits of one's own."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from warpsplat.scene import FloatArray, Kind, Scene
 
 
 def load_image(image: ImageSource) -> FloatArray:
-    """An image as it is fitted: upright, sRGB in [0, 1], shape (height, width, 3), float32; with opacity
-    premultiplied by it, shape (height, width, 4).
+    """Read an image as it is fitted: upright, sRGB in [0, 1], shape (height, width, 3), float32; with opacity
+    premultiplied, shape (height, width, 4).
 
     Args:
         image: as for ``vectorize``.
@@ -27,12 +27,12 @@ def load_image(image: ImageSource) -> FloatArray:
 def starting_scene(
     image: ImageSource, curves: int = 128, *, open: bool = False, seed: int = 0, background: str = "auto"
 ) -> Scene:
-    """Shapes to begin a fit of your own with: a loose grid over the canvas, in the colours of the image.
+    """Return shapes to start a fit of your own from: a loose grid over the canvas, in the image's colours.
 
     Args:
         image: as for ``vectorize``.
         curves: number of shapes.
-        open: strokes of three cubics in place of filled rings of quadratics.
+        open: strokes of three cubics instead of filled rings of quadratics.
         seed: of random numbers.
         background: as for ``vectorize``.
 

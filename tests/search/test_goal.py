@@ -7,23 +7,23 @@ import pytest
 
 from tests.fit.pictures import picture
 from warpsplat.fit.export import export
-from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.loop import Fit, Rounding, Start, fit
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Scene
-from warpsplat.search.goals import AIM_FULL, _next
-from warpsplat.search.probes import curves_for
-from warpsplat.search.search import Change, Made
+from warpsplat.search.candidate import Candidate, Change
+from warpsplat.search.goal import AIM_FULL, curves_for, next_change
 from warpsplat.svg.write import path_sizes
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return fit(picture(), make_settings(curves=8, iterations=10), Backend.on("cpu")).scene
+    return fit(Problem(picture(), make_settings(curves=8, iterations=10)), Run(Backend.on("cpu"))).scene
 
 
-def made(scene: Scene, size: int, psnr: float, per_pixel: float = 2.0) -> Made:
-    return Made(Fit(scene, per_pixel, psnr, psnr, 10, interrupted=False), size, psnr)
+def made(scene: Scene, size: int, psnr: float, per_pixel: float = 2.0) -> Candidate:
+    return Candidate(Fit(scene, per_pixel, psnr, psnr, 10, interrupted=False), size, psnr)
 
 
 def goal(**given: object) -> Settings:
@@ -37,43 +37,43 @@ def size_of(change: Change | None) -> float:
 
 def test_a_file_with_a_surplus_is_cut_and_one_that_lacks_grows(scene: Scene) -> None:
     settings = goal(target_psnr=27.0)
-    small = size_of(_next([made(scene, 10_000, 27.1)], settings))
-    smaller = size_of(_next([made(scene, 10_000, 27.2)], settings))
+    small = size_of(next_change([made(scene, 10_000, 27.1)], settings))
+    smaller = size_of(next_change([made(scene, 10_000, 27.2)], settings))
     assert smaller < small < 10_000
-    assert size_of(_next([made(scene, 10_000, 26.9)], settings)) > 10_000
-    assert _next([made(scene, 10_000, 27.02)], settings) is None
+    assert size_of(next_change([made(scene, 10_000, 26.9)], settings)) > 10_000
+    assert next_change([made(scene, 10_000, 27.02)], settings) is None
 
 
-def test_a_cut_that_failed_bounds_the_next(scene: Scene) -> None:
+def test_a_cut_that_failed_bounds_thenext_change(scene: Scene) -> None:
     tried = [made(scene, 10_000, 27.2), made(scene, 9_000, 26.9)]
-    change = _next(tried, goal(target_psnr=27.0))
+    change = next_change(tried, goal(target_psnr=27.0))
     assert change
     assert change.base is tried[0]
     assert 9_000 < change.size < 10_000
     tried.append(made(scene, 9_970, 26.99))
-    assert _next(tried, goal(target_psnr=27.0)) is None, "nothing is left between"
+    assert next_change(tried, goal(target_psnr=27.0)) is None, "nothing is left between"
 
 
 def test_a_file_within_a_size_is_filled_or_cut_to_it(scene: Scene) -> None:
     settings = goal(max_bytes=10_000)
-    assert size_of(_next([made(scene, 9_500, 27)], settings)) == AIM_FULL * 10_000
-    assert size_of(_next([made(scene, 10_500, 27)], settings)) == AIM_FULL * 10_000
-    assert _next([made(scene, 9_900, 27)], settings) is None
+    assert size_of(next_change([made(scene, 9_500, 27)], settings)) == AIM_FULL * 10_000
+    assert size_of(next_change([made(scene, 10_500, 27)], settings)) == AIM_FULL * 10_000
+    assert next_change([made(scene, 9_900, 27)], settings) is None
     both = [made(scene, 9_000, 27), made(scene, 10_100, 28)]
-    change = _next(both, settings)
+    change = next_change(both, settings)
     assert change
     assert change.base is both[1], "what is too large by little is nearer"
 
 
 def test_without_more_shapes_the_grid_gets_finer(scene: Scene) -> None:
     few = make_settings(curves=8, target_psnr=27.0)
-    change = _next([made(scene, 1000, 26.0, 2.0)], few)
+    change = next_change([made(scene, 1000, 26.0, 2.0)], few)
     assert change
     assert change.per_pixel == 4.0
-    assert _next([made(scene, 1000, 26.0, 100.0)], few) is None
+    assert next_change([made(scene, 1000, 26.0, 100.0)], few) is None
 
 
-def test_shapes_that_a_pilot_needs() -> None:
+def test_shapes_that_a_probe_run_needs() -> None:
     assert curves_for(26.8, {256: 25.0}, 10_000) == 512, "twice the shapes for 1.8 dB"
     assert curves_for(24.0, {256: 25.0, 128: 23.0}, 10_000) in {181, 182}, "between two, by those"
     assert curves_for(60.0, {256: 25.0}, 1000) == 1000
@@ -81,7 +81,8 @@ def test_shapes_that_a_pilot_needs() -> None:
 
 def test_a_run_can_be_entered_late(scene: Scene) -> None:
     settings = make_settings(curves=8, iterations=100)
-    late = fit(picture(), settings, Backend.on("cpu"), scene=scene, begin=90, per_pixel=4.0)
+    start = Start(scene=scene, begin=90)
+    late = fit(Problem(picture(), settings), Run(Backend.on("cpu")), start, Rounding(4.0))
     assert late.iterations == 10
     assert late.per_pixel == 4.0
     half = late.scene.points * 2

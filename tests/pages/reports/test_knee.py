@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpsplat.search.marginal_gain import knee
+from warpsplat.pages.reports.knee import knee
 
 
 def test_a_corner_is_the_knee() -> None:

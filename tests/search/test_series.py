@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
-from warpsplat.fit.loop import fit
+from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import shapes_at
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.fit.work import Progress
 from warpsplat.rendering.backend import Backend
-from warpsplat.search.several import Series, begin_of, growing
+from warpsplat.search.series import Series, begin_of, growing
 
 
 @pytest.mark.parametrize(("few", "share"), [(10, 0.25), (128, 0.275), (180, 0.35), (250, 0.375)])
@@ -47,55 +48,38 @@ def quick() -> Settings:
 
 def test_shapes_go_on_with_their_past() -> None:
     """The first step of another fit is the next one of the first: the optimizer forgot nothing."""
-    image, backend = picture(), Backend.on("cpu", 1)
-    settings = quick()
-    series = Series(settings, (4, 8), image.shape[1], image.shape[0], backend)
-    seen: list[Progress] = []
+    settings, seen = quick(), list[Progress]()
+    run, series = Run(Backend.on("cpu", 1), seen.append), Series(quick(), (4, 8))
     first, none = series.next(4)
     assert none is None
-    fit(image, first, backend, report=series.watch(4, seen.append))
-    assert [p.work for p in seen] == sorted(p.work for p in seen) and seen[-1].work < 0.7
+    fit(Problem(picture(), first), series.part(4, run))
+    assert [p.work for p in seen] == sorted(p.work for p in seen)
+    assert seen[-1].work == pytest.approx(1 / 3)
     second, start = series.next(8)
-    assert start is not None and start.past is not None
+    assert start is not None and start.past is not None and start.scene is not None
     assert start.begin == begin_of(second, 6) > 0
     assert len(start.scene) == round(1.5 * 4), "the surplus, before it is thinned"
     assert start.past.ages.max() >= 0.6 * settings.iterations
     moments = start.past.moments[1]["points"]
     assert moments.shape == start.scene.points.shape and (moments > 0).any()
-    made = fit(
-        image,
-        second,
-        backend,
-        scene=start.scene,
-        past=start.past,
-        begin=start.begin,
-        report=series.watch(8, seen.append),
-    )
+    made = fit(Problem(picture(), second), series.part(8, run), start)
     assert len(made.scene) == 8
     assert made.iterations == settings.iterations - start.begin
-    assert seen[-1].work == pytest.approx(1, abs=0.35)
+    assert seen[-1].work == 1
 
 
 def test_without_a_past_shapes_take_large_steps() -> None:
     """What is handed on is what keeps the shapes in place."""
-    image, backend = picture(), Backend.on("cpu", 1)
-    settings = quick()
-    series = Series(settings, (4, 8), image.shape[1], image.shape[0], backend)
-    fit(image, series.next(4)[0], backend, report=series.watch(4, None))
+    run, series = Run(Backend.on("cpu", 1)), Series(quick(), (4, 8))
+    fit(Problem(picture(), series.next(4)[0]), series.part(4, run))
     _, start = series.next(8)
-    assert start is not None and start.past is not None
+    assert start is not None and start.scene is not None
+    scene, past = start.scene, start.past
 
     def moved(known: bool) -> float:
         chosen = make_settings(curves=6, iterations=60, density={"interval": 0}, coarse_pixels=400)
-        made = fit(
-            image,
-            chosen,
-            backend,
-            scene=start.scene,
-            past=start.past if known else None,
-            begin=59,
-            finish=False,
-        )
-        return float(np.abs(made.scene.points - start.scene.points).mean())
+        again = Start(scene, past if known else None, begin=59)
+        made = fit(Problem(picture(), chosen), run, again, rounding=None)
+        return float(np.abs(made.scene.points - scene.points).mean())
 
     assert moved(known=True) < 0.5 * moved(known=False)

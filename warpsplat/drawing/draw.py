@@ -1,0 +1,137 @@
+"""Drawings and pixel art: traced, and drawings then fitted and tidied."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.fit_outlines import matching
+from warpsplat.drawing.thin import THIN, best_of_thin, continued, cut, margins
+from warpsplat.drawing.tidy import Finished, finish_drawing
+from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.fit.constraints import Drawing
+from warpsplat.fit.export import finished
+from warpsplat.fit.loop import Fit
+from warpsplat.fit.palette import Palette, solid_shapes
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.rounding import finest
+from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.metrics import psnr
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.geometry import enlarged
+
+LEAST_SIDE = 96
+"""Least side of an image before it was enlarged [px]: what is smaller says little of outlines."""
+
+
+def draw_regions(problem: Problem, run: Run) -> Fit:
+    """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes."""
+    settings, limit = problem.settings, problem.settings.max_bytes
+    most = None if settings.simplify else settings.curves
+    parts = run.open_parts(share=0.5 if limit else 1.0)
+    finish = partial(finish_drawing, original(problem.target), finest=finest(settings))
+
+    def sketch_of(done: Finished, most: int | None) -> Sketch:
+        sketch = _sketch(problem, run, done)
+        best = _best_if_thin(problem, next(parts), sketch.fit, most)
+        return sketch if best is sketch.fit else Sketch(best, _size(best, settings), None)
+
+    def fewer(count: int) -> Sketch:
+        return sketch_of(finish(trace_regions(problem, count), next(parts), tidy=settings.tidy), count)
+
+    def simpler(drawing: Drawing, price: float) -> Sketch:
+        return _sketch(problem, run, finish(drawing, next(parts), price=price))
+
+    first = sketch_of(finish(trace_regions(problem, most), next(parts), tidy=settings.tidy), most)
+    if not limit or first.size <= limit:
+        return first.fit
+    return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
+
+
+def draw_pixels(problem: Problem, run: Run) -> Fit:
+    """Trace pixel art, a shape for each area of cells of one colour."""
+    scene, per_pixel = trace_pixels(problem.target, solid_color(problem.settings.background))
+    if problem.settings.is_limited:
+        scene = limited(scene.take(solid_shapes(scene)), problem.settings)
+    return replace(_made(scene, per_pixel, problem, run), interrupted=False)
+
+
+def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:
+    """Return a drawing; of an image of few rows or columns, another one if that shows more."""
+    across, down = margins(problem.target, THIN)
+    if not (across or down):
+        return made
+    others = [lambda: _drawn_beyond(problem, run, most)]
+    return best_of_thin(made, others if most is not None else [*others, lambda: draw_pixels(problem, run)])
+
+
+def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
+    """Draw the image continued beyond its borders, and cut the drawing."""
+    across, down = margins(problem.target, THIN)
+    wide = replace(problem, target=continued(problem.target, across, down))
+    settings = problem.settings
+    drawing, grid = trace_regions(wide, most), finest(settings)
+    done = finish_drawing(original(wide.target), drawing, run, finest=grid, tidy=settings.tidy)
+    made = _sketch(wide, run, done).fit
+    return _made(cut(made.scene, across, down), made.per_pixel, problem, run)
+
+
+def trace_regions(problem: Problem, most: int | None) -> Drawing:
+    """Trace an image as it was before it was enlarged, in the colours that are allowed.
+
+    ``most``: regions.
+    """
+    settings = problem.settings
+    traced = trace(original(problem.target), most=most)
+    drawing = Drawing(traced.scene, traced.joints, traced.same)
+    if settings.is_limited:
+        drawing = drawing.take(solid_shapes(drawing.scene))
+        drawing = replace(drawing, scene=limited(drawing.scene, settings))
+    return drawing
+
+
+def enlargement(image: FloatArray) -> int:
+    """Return how many times an image was enlarged by repeating its pixels.
+
+    Its antialiasing is that of the smaller image, and the steps of its pixels are not part of what it shows.
+    """
+    size, side = cell_size(image), min(image.shape[:2])
+    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_SIDE)
+    return max(fits, default=1)
+
+
+def original(target: FloatArray) -> FloatArray:
+    """Return an image as it was before it was enlarged."""
+    size = enlargement(target)
+    return np.ascontiguousarray(target[::size, ::size])
+
+
+def limited(scene: Scene, settings: Settings) -> Scene:
+    """Return ``scene`` in the colours that the settings allow."""
+    palette = Palette.of_scene(settings, scene)
+    return palette.limited(scene) if palette else scene
+
+
+def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
+    """Return a finished drawing at the size of the whole image."""
+    size = enlargement(problem.target)
+    scene = enlarged(done.drawing.scene, size, *problem.size)
+    made = _made(scene, done.per_pixel / size, problem, run)
+    return Sketch(made, _size(made, problem.settings), done.drawing)
+
+
+def _size(made: Fit, settings: Settings) -> int:
+    """Return the bytes of the file."""
+    return len(finished(made.scene, settings, made.per_pixel).encode())
+
+
+def _made(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> Fit:
+    """Return a traced scene as a fit: its PSNR is that of its render."""
+    shown = 255 * render(scene, backend=run.backend)
+    figure = psnr(shown, 255 * matching(problem.target, scene.canvas))
+    return Fit(scene, per_pixel, figure, figure, 0, run.stopped())

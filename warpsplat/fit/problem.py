@@ -1,0 +1,104 @@
+"""The two things that every fit takes: what is fitted, and how the work is carried out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from warpsplat.fit.progress import Callback, Progress
+from warpsplat.fit.settings import Settings
+from warpsplat.fit.stages import Stages
+from warpsplat.rendering.backend import Backend
+from warpsplat.scene import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted: everything that decides the result."""
+
+    target: FloatArray
+    """The image, sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
+    width, 4), which makes a file without a background.
+    """
+    settings: Settings
+    importance: FloatArray | None = None
+    """How much the error of a pixel counts: grey mask in [0, 1], of any size."""
+    metadata: str = ""
+    """Text for the file's metadata, which names the job."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image [px]."""
+        return self.target.shape[1], self.target.shape[0]
+
+    def having(self, **settings: Any) -> Problem:
+        """Return the problem with some settings changed."""
+        return replace(self, settings=replace(self.settings, **settings))
+
+
+@dataclass(eq=False)
+class Run:
+    """How a problem is worked on: where, who is told of the progress, and when it ends.
+
+    Work that consists of several fits gives each of them a run of its own, made by one of the methods below;
+    whatever such a run is told reaches the run that it was made from.
+    """
+
+    backend: Backend
+    on_progress: Callback | None = None
+    stop: Callable[[], bool] | None = None
+    """Asked after every step; once true, the shapes as they are make the result."""
+    deadline: float = math.inf
+    """When a fit has to end (``time.monotonic``): it takes as many steps as there is time for."""
+    stages: Stages | None = None
+    """Where the state is kept, for the run to be resumed; None with a deadline, which no two runs reach by
+    the same steps.
+    """
+    started: float = field(default_factory=time.monotonic)
+    _ended: bool = field(default=False, init=False)
+    """Whether ``on_progress`` asked for the end."""
+
+    def stopped(self) -> bool:
+        """Return whether the user wants the run to end."""
+        return self._ended or bool(self.stop and self.stop())
+
+    def over(self) -> bool:
+        """Return whether the run has to end, since it was stopped or its time is up."""
+        return time.monotonic() > self.deadline or self.stopped()
+
+    def report(self, progress: Progress) -> None:
+        """Pass a progress report on."""
+        if self.on_progress and self.on_progress(progress) is True:
+            self._ended = True
+
+    def derived(self, **changes: Any) -> Run:
+        """Return a run with some fields changed that reports to this one, and ends when this one does."""
+        return replace(self, **{"on_progress": self.report, "stop": self.stopped, **changes})
+
+    def mapped(self, change: Callable[[Progress], Progress]) -> Run:
+        """Return a run whose progress reports are changed by a function before they come here."""
+        return self.derived(on_progress=lambda progress: self.report(change(progress)))
+
+    def part(self, begin: float, end: float) -> Run:
+        """Return a run for the part of this one's work between two shares in [0, 1]."""
+        return self.mapped(lambda now: replace(now, work=begin + (end - begin) * now.work))
+
+    def open_parts(self, begin: float = 0.0, share: float = 0.5) -> Iterator[Run]:
+        """Yield runs for parts of unknown number: each covers a share of the work that is left."""
+        while True:
+            end = begin + share * (1 - begin)
+            yield self.part(begin, end)
+            begin = end
+
+    def within(self, share: float) -> Run:
+        """Return a run that may take a share of the time that is left."""
+        now = time.monotonic()
+        left = max(self.deadline - now, 0.0)
+        return self.derived(deadline=now + share * left if left < math.inf else math.inf)
+
+    def unsized(self) -> Run:
+        """Return a run that ends at the deadline, but whose number of steps does not depend on it."""
+        return self.derived(deadline=math.inf, stop=self.over)

@@ -1,0 +1,72 @@
+"""The strategies by which the shapes of a file are made. A further one is a row in ``STRATEGIES``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from warpsplat.drawing.draw import draw_pixels, draw_regions
+from warpsplat.drawing.line_art import draw_lines
+from warpsplat.fit.clear import clear_empty
+from warpsplat.fit.layered import fit_layered
+from warpsplat.fit.loop import Fit, fit
+from warpsplat.fit.place import simple_curves
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.renderers import renderer_of
+from warpsplat.fit.settings import Settings
+from warpsplat.rendering.backend import Backend
+from warpsplat.search.goal import search_goal
+from warpsplat.svg.order import by_color, by_opacity
+
+
+class Strategy(NamedTuple):
+    """A way to make shapes."""
+
+    make: Callable[[Problem, Run], Fit]
+    sorts: bool = False
+    """Whether the order of its shapes is final; else it is changed to make the file small."""
+    traces: bool = False
+    """Whether it leaves transparent pixels empty."""
+
+
+def fit_shapes(problem: Problem, run: Run) -> Fit:
+    """Fit shapes to an image, fewer than asked for to a simple one."""
+    settings = problem.settings
+    if settings.simplify:
+        problem = problem.having(curves=min(settings.curves, simple_curves(problem.target)))
+    return fit(problem, run)
+
+
+STRATEGIES = {
+    "fit": Strategy(fit_shapes),
+    "layers": Strategy(fit_layered),
+    "goal": Strategy(search_goal, sorts=True),
+    "drawing": Strategy(draw_regions, sorts=True, traces=True),
+    "line": Strategy(draw_lines, sorts=True, traces=True),
+    "pixel": Strategy(draw_pixels, sorts=True, traces=True),
+}
+
+
+def choose_strategy(settings: Settings) -> Strategy:
+    """Return the strategy for some settings; a subject ``auto`` is fitted as a photograph is."""
+    if settings.subject in STRATEGIES:
+        return STRATEGIES[settings.subject]
+    if settings.target_psnr or settings.max_bytes:
+        return STRATEGIES["goal"]
+    return STRATEGIES["layers" if settings.levels else "fit"]
+
+
+def arranged(made: Fit, problem: Problem, strategy: Strategy, backend: Backend) -> Fit:
+    """Return a fit with its shapes in the order of the file, without those that show nothing."""
+    settings = problem.settings
+    # Soft Gaussians reach beyond the outlines that decide which shapes may change places.
+    soft = renderer_of(settings.renderer).soft
+    if not strategy.sorts and not soft:
+        made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
+    if problem.target.shape[2] == 4 and not strategy.traces and not made.interrupted:
+        clear = clear_empty(made.scene, problem.target, settings, backend, made.per_pixel)
+        made = replace(made, scene=clear)
+    if settings.ids and settings.subject != "line" and not soft:
+        made = replace(made, scene=made.scene.take(by_color(made.scene)))
+    return made
