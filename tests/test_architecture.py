@@ -38,12 +38,6 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "drawing": ("alpha", "fit", "metrics", "rendering", "svg", *CORE),
     "search": ("alpha", "fit", "metrics", "rendering", "svg", *CORE),
     "run": ("alpha", "drawing", "files", "fit", "metrics", "rendering", "search", "svg", *CORE),
-    "pages": ("run", "files", "fit", "metrics", "rendering", "svg", "warpsplat", *CORE),
-    "batch": ("pages", "run", "files", "fit", "metrics", "rendering", "svg", *CORE),
-    "tools": ("run", "torch", "files", "fit", "metrics", "rendering", "svg", *CORE),
-    "motion": ("run", "files", "fit", "rendering", "svg", *CORE),
-    "torch": ("fit", "rendering", "svg", *CORE),
-    "pydiffvg": ("torch", "files", "rendering", "svg", *CORE),
 }
 """What each folder or module of the core may import; a name stands for all that is in it."""
 
