@@ -18,13 +18,23 @@ from tests.scenes import (
     with_two_stops,
 )
 from tests.torch.helpers import compare, compare_straight
-from warpsplat.scene import Canvas, Cap, Join, Kind, Rule, Scene
+from warpsplat.scene import Cap, Join, Kind, Rule, Scene
 from warpsplat.torch import SceneTensors, render
+
+
+def clear(scene: Scene) -> Scene:
+    return replace(scene, canvas=replace(scene.canvas, background=None))
+
+
+def mixed() -> Scene:
+    return mixed_scene(seed=1).take(np.arange(6))
+
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "fills": lambda: random_scene(Kind.FILL),
     "strokes": lambda: random_scene(Kind.STROKE),
-    "mixed": lambda: mixed_scene(seed=1).take(np.arange(6)),
+    "mixed": mixed,
+    "transparent": lambda: clear(mixed()),
     "holes": lambda: contours_scene(Kind.FILL, Rule.EVENODD),
     "styled": lambda: styled_scene(Cap.SQUARE, Join.MITER),
     "dashed": lambda: styled_scene(Cap.BUTT, Join.BEVEL, 1),
@@ -33,17 +43,10 @@ SCENES: dict[str, Callable[[], Scene]] = {
 }
 
 
-def clear(scene: Scene) -> Scene:
-    return replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_exact(name: str) -> None:
-    compare(SCENES[name](), tolerance=3e-3 if name in ("styled", "dashed") else 1e-3)
-
-
-def test_transparent_canvas() -> None:
-    compare(clear(SCENES["mixed"]()), scale=1.2)
+    tolerance = 3e-3 if name in ("styled", "dashed") else 1e-3
+    compare(SCENES[name](), scale=1.2 if name == "transparent" else 1.0, tolerance=tolerance)
 
 
 @pytest.mark.parametrize(("name", "transparent"), [("mixed", False), ("holes", False), ("gradients", True)])
@@ -59,10 +62,9 @@ def test_opacities_of_one(name: str, transparent: bool) -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 def test_colors_that_are_not_premultiplied(name: str, threads: int) -> None:
     """Opaque shapes hide others, some of which are faint or invisible."""
-    scene = random_scene(Kind.FILL, 6, seed=4) if name == "opaque" else SCENES[name]()
-    if name == "opaque":
-        scene = replace(scene, opacities=np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32))
-    compare_straight(clear(scene), threads)
+    opacities = np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32)
+    opaque = replace(random_scene(Kind.FILL, 6, seed=4), opacities=opacities)
+    compare_straight(clear(opaque if name == "opaque" else SCENES[name]()), threads)
 
 
 @pytest.mark.parametrize("opaque", [False, True])
@@ -92,16 +94,22 @@ def test_soft_gaussians(kind: Kind) -> None:
     compare(replace(scene, fades=fades.astype(np.float32)), "gaussian", tolerance=2e-3)
 
 
+def whole(scene: Scene) -> dict[str, torch.Tensor | None]:
+    """Return the gradients of all attributes."""
+    tensors = SceneTensors.of(scene, requires_grad=True)
+    render(tensors).square().sum().backward()
+    return {name: value.grad for name, value in tensors.values.items()}
+
+
 def test_some_gradients_are_those_of_all() -> None:
     scene = with_gradients(mixed_scene(seed=2))
-    whole = SceneTensors.of(scene, requires_grad=True)
-    render(whole).square().sum().backward()
+    wanted = whole(scene)
     for name in ("points", "frames", "stop_colors"):
         some = SceneTensors.of(scene)
         some.values[name].requires_grad_()
         render(some).square().sum().backward()
         assert [key for key, value in some.values.items() if value.grad is not None] == [name]
-        torch.testing.assert_close(some.values[name].grad, whole.values[name].grad, rtol=0, atol=0)
+        torch.testing.assert_close(some.values[name].grad, wanted[name], rtol=0, atol=0)
 
 
 def test_gradients_flow_on_to_the_leaves() -> None:
@@ -111,9 +119,7 @@ def test_gradients_flow_on_to_the_leaves() -> None:
     colors = torch.tensor(scene.colors.T.copy(), requires_grad=True)
     values = {"points": torch.tensor(scene.points) + shift, "colors": colors.T}
     render(SceneTensors(scene, values)).square().sum().backward()
-    whole = SceneTensors.of(scene, requires_grad=True)
-    render(whole).square().sum().backward()
-    points = whole.values["points"].grad
-    assert points is not None and shift.grad is not None and colors.grad is not None
+    points = whole(scene)["points"]
+    assert points is not None and colors.grad is not None
     torch.testing.assert_close(shift.grad, points.sum(dim=0), rtol=1e-4, atol=1e-3)
-    torch.testing.assert_close(colors.grad.T, whole.values["colors"].grad, rtol=0, atol=0)
+    torch.testing.assert_close(colors.grad.T, whole(scene)["colors"], rtol=0, atol=0)

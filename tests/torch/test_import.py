@@ -16,15 +16,16 @@ MODULES = (
 )
 
 
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
 def test_nothing_else_imports_torch() -> None:
-    code = f"import sys, {', '.join(MODULES)}; print('torch' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = run(f"import sys, {', '.join(MODULES)}; print('torch' in sys.modules)")
     assert done.stdout.split()[-1] == "False"
 
 
 def test_without_torch_one_line_says_what_to_do() -> None:
-    code = "import sys; sys.modules['torch'] = None; import warpsplat.torch"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.stderr.splitlines()[-1] == (
-        "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
-    )
+    done = run("import sys; sys.modules['torch'] = None; import warpsplat.torch")
+    message = "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
+    assert done.stderr.splitlines()[-1] == message

@@ -33,11 +33,9 @@ def _objects(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[obje
 
 
 def _numbers(objects: list[object]) -> list[object]:
-    found: list[object] = []
+    found: list[object] = [each.shape for each in objects if isinstance(each, torch.Tensor)]
     for each in objects:
-        if isinstance(each, torch.Tensor):
-            found.append(each.shape)
-        elif isinstance(each, Path):
+        if isinstance(each, Path):
             found.append(each.num_control_points.tolist())
         elif isinstance(each, ShapeGroup):
             matrix = each.shape_to_canvas

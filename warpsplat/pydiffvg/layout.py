@@ -210,19 +210,20 @@ def _rows(structure: Structure, uniform: bool) -> list[Row]:
     return rows
 
 
-def _segments(shape: ShapeStructure, closes: bool = False) -> Terms:
-    """Return the control points of segments as cubics, as sums of the shape's points, shape (segment, 4, 2).
+@functools.lru_cache(maxsize=1024)
+def _segments(counts: tuple[int, ...], points: int) -> Terms:
+    """Return the control points of segments as cubics, as sums of a shape's points, shape (segment, 4, 2).
 
-    ``closes``: whether a line to the first point follows.
+    ``counts``: see ``ShapeStructure``; a closed shape's last segment ends at the first of its ``points``.
     """
-    counts = np.array(shape.counts + (0,) * closes)
-    first = starts_of(counts + 1)[:-1]
-    return Terms((first[:, None, None] + ENDS[counts]) % shape.points, SHARES[counts])
+    kinds = np.array(counts)
+    first = starts_of(kinds + 1)[:-1]
+    return Terms((first[:, None, None] + ENDS[kinds]) % points, SHARES[kinds])
 
 
 def _contour(shape: ShapeStructure, is_closed: bool) -> Terms:
     """Return the control points of a contour as sums of the shape's points, shape (point, 2)."""
-    terms = _segments(shape, is_closed and not shape.closed)
+    terms = _segments(shape.counts + (0,) * (is_closed and not shape.closed), shape.points)
     kept = np.arange(4 * len(terms.indices)) % 4 < 3  # a segment's end is the next one's start
     kept[-1] = not is_closed
     return terms.map(lambda each: each.reshape(-1, 2)[kept])
@@ -268,7 +269,7 @@ def _areas(rows: list[Row], scene: Scene, device: torch.device) -> tuple[tuple[A
 
 def _area(shapes: list[ShapeStructure], is_closed: bool, device: torch.device) -> Area:
     """Return strokes of equally many segments, all closed or all open."""
-    pairs = [(shape, _segments(shape)) for shape in shapes]
+    pairs = [(shape, _segments(shape.counts, shape.points)) for shape in shapes]
     points = [_coordinates(shape, line) for shape, line in pairs]
     # A stroke of one width has it at each point.
     radii = [Terms(shape.width + line.indices * shape.tapers, line.weights) for shape, line in pairs]

@@ -187,4 +187,5 @@ class OptimizableGradient:
     def element(self, identity: str) -> ElementTree.Element:
         """Return the gradient as an element of a document."""
         eye = torch.eye(3)
-        return gradient_element(identity, self.color(torch.ones(1), eye.to(self._colors)), eye.numpy())
+        color = self.color(torch.ones_like(self._alphas[:1]), eye.to(self._colors))
+        return gradient_element(identity, color, eye.numpy())
