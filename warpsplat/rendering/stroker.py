@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels import corners, stroker
+from warpsplat.kernels import corners
+from warpsplat.kernels.stroker.walk import walk_strokes
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -73,7 +74,7 @@ class Stroker:
     def forward(self, program: Program) -> None:
         """Record centre lines, widths -> corners; and how far these reach."""
         b, shapes = self.buffers, self._parameters.shape_count
-        program.launch(stroker.walk_strokes, shapes, *self._sources, write=0, split=True)
+        program.launch(walk_strokes, shapes, *self._sources, write=0, split=True)
         record_ranges(
             program,
             b.corner_count,
@@ -83,7 +84,7 @@ class Stroker:
             self._needed,
             capacity=self._capacity,
         )
-        program.launch(stroker.walk_strokes, shapes, *self._sources, write=1, split=True)
+        program.launch(walk_strokes, shapes, *self._sources, write=1, split=True)
         program.launch(corners.place_corners, self._capacity, *self._sources, split=True)
 
     def backward(self, program: Program) -> None:
