@@ -17,7 +17,7 @@ ARC_PIECES_MAX = wp.constant(256)
 
 @wp.struct
 class Polygons:
-    """Where corners go; ``corners`` says what their numbers mean."""
+    """Arrays that corners are written to; see ``corners`` for what their numbers mean."""
 
     write: wp.int32  # 0: they are only counted
     segments: wp.array[wp.vec2i]  # [vertex_capacity]
@@ -27,7 +27,7 @@ class Polygons:
 
 @wp.struct
 class Style:
-    """How a stroke is drawn."""
+    """Width, caps and joins of a stroke."""
 
     half: wp.float32  # of its width [px]
     cap: wp.int32

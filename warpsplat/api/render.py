@@ -14,8 +14,8 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
 from warpsplat.jobs.render import RendererName, drawn
 from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.renderer import render_into
-from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size
 

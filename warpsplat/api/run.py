@@ -13,7 +13,7 @@ from warpsplat.fit.work import Progress
 from warpsplat.jobs.checkpoint import CheckpointFile
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.turns import turn
+from warpsplat.rendering.device_lock import device_lock
 
 Callback = Callable[[Progress], bool | None]
 """Called with each report of a run; one that returns True ends it with the shapes as they are."""
@@ -68,5 +68,5 @@ def backend_on(device: str, threads: int | None) -> Iterator[Backend]:
         raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
     start_warp()
     backend = Backend.on(choose_device(device), threads)
-    with turn(backend.device):
+    with device_lock(backend.device):
         yield backend

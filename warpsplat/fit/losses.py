@@ -98,7 +98,7 @@ def record_error(program: Program, inputs: LossInputs) -> None:
         inputs.aim,
         inputs.aim.buffers,
         viewport,
-        tile_still=inputs.renderer.bins.buffers.tile_still,
+        tile_cache=inputs.renderer.bins.buffers.tile_cache,
         clock=inputs.clock,
         similarity_weight=inputs.settings.ssim,
         split=True,
@@ -115,7 +115,7 @@ def record_alpha(program: Program, inputs: LossInputs) -> None:
         inputs.renderer.film.buffers,
         inputs.aim,
         inputs.aim.buffers,
-        tile_still=inputs.renderer.bins.buffers.tile_still,
+        tile_cache=inputs.renderer.bins.buffers.tile_cache,
         split=True,
     )
 

@@ -155,7 +155,7 @@ class Step:
 
     def make_room(self) -> None:
         """Where the last steps ran out of capacity, go on with larger arrays."""
-        grown = [renderer.make_room() for renderer in self.renderers]
+        grown = [renderer.grow() for renderer in self.renderers]
         if any(grown):
             self.record()
 

@@ -20,7 +20,7 @@ from warpsplat.jobs.memory import (
     whole_score,
 )
 from warpsplat.metrics import Rows, Score, score_svg
-from warpsplat.rendering.room import in_words
+from warpsplat.rendering.memory import in_words
 from warpsplat.scene import FloatArray
 from warpsplat.scene.geometry import enlarged
 from warpsplat.svg.write import resized

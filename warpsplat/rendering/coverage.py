@@ -23,7 +23,9 @@ from warpsplat.rendering.program import Program
 
 @dataclass
 class CoverageBuffers:
-    """What every model owns: a tile of floats a slot, as columns and, in the same memory, as pixels."""
+    """Arrays that every model owns: a tile of floats a slot, as columns and, in the same memory, as
+    pixels.
+    """
 
     coverage: wp.array = buffer(column, "slots", constants.TILE)
     """After the adjoint of compositing, the gradient of the sum that the coverage came from."""
@@ -32,15 +34,15 @@ class CoverageBuffers:
 
 @dataclass
 class FillBuffers:
-    """What fills need besides."""
+    """Further arrays for fills."""
 
     slot_winding: wp.array = buffer(wp.int32, "slots")
-    """Of slots that no edge touches."""
+    """Winding number of slots that no edge touches."""
 
 
 @dataclass
 class StrokeBuffers:
-    """What strokes need besides."""
+    """Further arrays for strokes."""
 
     slot_near: wp.array = buffer(wp.int32, "slots", "lanes")
     segment: wp.array = buffer(wp.int32, "slots", constants.TILE_PIXELS)
@@ -48,7 +50,7 @@ class StrokeBuffers:
 
 
 class Coverage(Protocol):
-    """What compositing asks of a model."""
+    """Interface of a coverage model."""
 
     buffers: CoverageBuffers
     mapping: int
@@ -66,7 +68,7 @@ class Coverage(Protocol):
 
 @dataclass(frozen=True)
 class Stages:
-    """What the parts of a coverage read and write."""
+    """Stages that the parts of a coverage read and write."""
 
     backend: Backend
     parameters: Parameters
@@ -78,7 +80,7 @@ class Stages:
 
     @property
     def sources(self) -> tuple[object, ...]:
-        """Where launches find their arrays."""
+        """Return the objects in which launches find their arrays."""
         arrays = self.coverage, self.bins.buffers, self.outline.buffers, self.parameters.arrays
         return (*arrays, self.viewport)
 
@@ -170,7 +172,7 @@ class StrokeCoverage:
         )
 
     def values(self, program: Program) -> None:
-        """See ``Coverage``: all are there."""
+        """Do nothing: all values are there."""
 
     def backward(self, program: Program) -> None:
         """Record gradients in the coverages' place -> gradients of the segments' ends and of the widths."""
@@ -191,11 +193,11 @@ EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
     constants.STROKE: StrokeCoverage,
     constants.STYLED: StyledCoverage,
 }
-"""What covers the shapes of each of ``Parameters.parts``."""
+"""Coverage of the shapes of each of ``Parameters.parts``."""
 
 
 class ExactCoverage:
-    """The area that a viewer computes, of polylines: a part for each kind of shape that there is."""
+    """The area that a viewer computes, from polylines: a part for each kind of shape in the scene."""
 
     mapping = constants.AREA
 
@@ -224,7 +226,7 @@ class ExactCoverage:
             part.values(program)
 
     def backward(self, program: Program) -> None:
-        """See ``Coverage``: from the edges on to the points."""
+        """Record gradients in the coverages' place -> gradients of the points."""
         for part in self.parts:
             part.backward(program)
         self._outline.backward(program)
@@ -253,10 +255,10 @@ class SplatCoverage:
         )
 
     def values(self, program: Program) -> None:
-        """See ``Coverage``: all are there."""
+        """Do nothing: all values are there."""
 
     def backward(self, program: Program) -> None:
-        """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
+        """Record gradients in the coverages' place -> gradients of the shapes' attributes."""
         program.launch(
             self.kernels[1],
             self._grid.buffers.mean.shape[0],

@@ -16,7 +16,7 @@ from warpsplat.scene import Kind
 
 @dataclass
 class GridBuffers:
-    """What the stage owns."""
+    """Arrays that the stage owns."""
 
     shape_stations: wp.array = buffer(wp.int32, "shapes")
     """Gaussians along each shape."""
@@ -54,7 +54,7 @@ class GridBuffers:
 
 @dataclass(frozen=True)
 class GridKernels:
-    """What puts one kind of shape on a grid, and the adjoint."""
+    """Kernels that put one kind of shape on a grid, and the adjoint."""
 
     plan: wp.Kernel
     forward: wp.Kernel
@@ -79,7 +79,7 @@ class Grid:
     """Puts a grid of Gaussians along and across each shape."""
 
     owned: type[GridBuffers] = GridBuffers
-    """Of which kind its buffers are."""
+    """Class of its buffers."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class Grid:
         self.buffers = backend.allocate(self.owned, {"shapes": parameters.shape_count, "gaussians": capacity})
 
     def samples(self) -> dict[str, wp.array]:
-        """What tiles are found by: ``bins.rectangles``'s parameters."""
+        """Return the samples that tiles are found from, as ``bins.rectangles`` takes them."""
         b = self.buffers
         return {
             "sample_first": b.gaussian_first,

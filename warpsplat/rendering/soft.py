@@ -18,7 +18,7 @@ from warpsplat.scene import GRADIENTS, Kind
 
 @dataclass
 class SoftBuffers(GridBuffers):
-    """What the stage owns."""
+    """Arrays that the stage owns."""
 
     strength: wp.array = buffer(wp.float32, "gaussians")
     """Opacity of each Gaussian."""

@@ -17,12 +17,12 @@ from warpsplat.errors import UsageError
 from warpsplat.kernels import constants, pixels
 from warpsplat.rendering.backend import Backend, Viewport, view
 from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.device_lock import device_lock
+from warpsplat.rendering.memory import check_memory
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Renderer
-from warpsplat.rendering.room import check_room
-from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
 from warpsplat.torch.tensors import attributes_of
 
@@ -129,7 +129,7 @@ class Engine:
             if name in SENSIBLE:
                 own.clamp_(*SENSIBLE[name])
         self._replay(self._renderer.forward_program)
-        if self._renderer.make_room():
+        if self._renderer.grow():
             self._graphs.clear()
             self._renderer.forward_complete()
             self.bytes = self._renderer.bytes()
@@ -216,14 +216,14 @@ def check_pictures(pictures: Sequence[Picture]) -> None:
         UsageError: the device is neither a CPU nor CUDA.
         ResourceError: there is not.
     """
-    check_room(pictures[0].viewport, _device_of(pictures[0]), len(pictures))
+    check_memory(pictures[0].viewport, _device_of(pictures[0]), len(pictures))
 
 
 @contextlib.contextmanager
 def engine_of(picture: Picture) -> Iterator[Engine]:
     """The engine of ``picture``, for this thread alone and on torch's current stream."""
     device = _device_of(picture)
-    with turn(device), _on_stream(picture.device):
+    with device_lock(device), _on_stream(picture.device):
         engine = ENGINES.get(picture)
         with engine.lock:
             engine.follow(picture.device)

@@ -9,8 +9,8 @@ import torch
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.models import EXACT, GaussianModel, Model, SplatModel
-from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import Picture, check_pictures, engine_of

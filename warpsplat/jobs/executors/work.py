@@ -22,7 +22,7 @@ from warpsplat.jobs.vectorize import vectorize_image
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.turns import turn
+from warpsplat.rendering.device_lock import device_lock
 from warpsplat.svg.inspect import svg_text
 
 Report = Callable[[Progress], None]
@@ -75,7 +75,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, report: Report 
     backend = Backend.on(choose_device(task.device), task.threads)
     if not task.bring:
         make_folder(output.parent)
-    with turn(backend.device):
+    with device_lock(backend.device):
         result = vectorize_image(
             image,
             task.settings,
@@ -112,7 +112,7 @@ def _measured(task: Task, key: str, image: bytes) -> Outcome:
         facts = Facts(task.report.figures or score.as_dict(), command=line)
         start_warp()
         backend = Backend.on(choose_device(task.device), task.threads)
-        with turn(backend.device):
+        with device_lock(backend.device):
             made = _reported(task, image, svg_text(data, task.output), facts, backend, own=False)
     return replace(made, key=key, digest=digest(data), figures=score.as_dict())
 
