@@ -6,12 +6,12 @@ Conventions and glossary, here once:
   (column j, row i) lies at (j + 0.5, i + 0.5), as in SVG. The scene itself is in canvas units (pixels of
   the input image); ``scale`` takes it to render pixels.
 * Colours are sRGB values in [0, 1], not linearised (SVG composites so), straight, not premultiplied.
-* A **shape** is what is composited once, a path of the file. Row 0 is painted first (furthest back).
+* A **shape** is a path of the file, which is composited once. Row 0 is painted first (furthest back).
   Its **kind** is FILL (a ring of Béziers) or STROKE (a chain), its **basis** CUBIC or SPLINE
   (``constants``). Shapes are ragged: the control **points** of shape ``i`` are those from ``point_first[i]``
-  to ``point_first[i + 1]``, its **Béziers** those from ``bezier_first[i]`` on; ``point_shape`` and
-  ``bezier_shape`` say whose a point or Bézier is.
-* A **sample** is a point by which a shape's tiles are found: a **vertex** of its polyline (exact coverage),
+  to ``point_first[i + 1]``, its **Béziers** those from ``bezier_first[i]`` on; ``point_shape`` is the shape
+  of each point.
+* A **sample** is a point from which a shape's tiles are found: a **vertex** of its polyline (exact coverage),
   or a **Gaussian** (splats). A shape's samples are the range [``*_first``, ``*_last``), empty where they did
   not fit into the capacity.
 * A **corner** is a vertex of the polygons that a styled stroke is drawn as; they lie one after the other as
@@ -23,18 +23,19 @@ Conventions and glossary, here once:
 * A **slot** is one (shape, tile) pair. The slots of a shape are the tiles of its bounding rectangle, row by
   row, shapes from the front to the back, so that the slot of a pixel is found by arithmetic. Its **state**
   says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there is a coverage to
-  read; HIDDEN ones are on no list.
+  read; slots that are HIDDEN are on no list.
 * Pixels lie by tiles, and in a tile by **columns**: an image is [tile, channel, column], a coverage [slot,
   column], each element a vector of the 16 pixels from top to bottom (``tile.column``). Kernels that go pixel
   by pixel have the same memory as [slot, 16 x column + row].
 * A **lane** is a thread's share of a tile: a CPU gives a thread a whole tile (one lane), a GPU has 16 lanes a
   tile, each a row or a column.
-* A **law** says how a coverage follows from the sum s that a model makes: AREA, |s| clamped at 1, or PRODUCT,
-  1 - exp(-s).
+* A **coverage mapping** turns the sum s that a model computes into a coverage: AREA, |s| clamped at 1, or
+  PRODUCT, 1 - exp(-s).
+* The **transmittance** of a slot is the part of the light that the slots in front let through.
 * Gradients are named after their value with ``_grad``. No kernel adds floats atomically: each output
   element has one writer, so results are the same bits on every run of one device, and a launch may be cut
   into pieces (``offset`` is the index of a piece's first thread) that run on different CPU threads.
-* A parameter has the name of the array that it is bound to (``rendering.program.bind``).
+* Parameters are bound to arrays by name (``rendering.program.bind``). ``constants`` are used by their names.
 
 Data flow of a step (forward, then its adjoint in reverse order)::
 

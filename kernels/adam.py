@@ -22,7 +22,7 @@ def advance(
     # Out:
     ages: wp.array[wp.int32],  # [shape_count] steps since the shape was placed, this one included
     clock: wp.array[wp.int32],  # [1] steps since the start, this one included
-    bias1: wp.array[wp.float32],  # [shape_count] what the moments fall short of at that age
+    bias1: wp.array[wp.float32],  # [shape_count] bias correction of the moments at that age
     bias2: wp.array[wp.float32],  # [shape_count]
     decay: wp.array[wp.float32],  # [1] fraction of the learning rates at this step
 ):
@@ -49,7 +49,7 @@ def tie_twins(
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] updated
 ):
-    """Two rows that are one point get the gradient of both, and move as one."""
+    """Give two rows that are one point their total gradient, so that they move as one."""
     i = offset + wp.tid()
     j = point_twin[i]
     if j != constants.NONE:
@@ -81,7 +81,7 @@ def adam_update(
     moment2: wp.array2d[wp.float32],  # [row_count, size] updated
     broken: wp.array[wp.int32],  # [shape_count] 1 where a number was not finite; every writer writes the same
 ):
-    """A step of Adam, one thread a number; bounds are kept by projection.
+    """Make a step of Adam, with bounds kept by projection. One thread a number.
 
     Where the gradient, the moments or the value are not finite nothing is updated, so that they stay as they
     are for ``fit.recover`` to find.
@@ -98,7 +98,7 @@ def adam_update(
     m1_hat = m1 / bias1[shape]
     m2_hat = m2 / bias2[shape]
     new = value[row, j] - current * m1_hat / (wp.sqrt(m2_hat) + EPSILON)
-    # Whatever is not finite makes one of the two so: of an infinite moment2 alone the update would be 0.
+    # Any number that is not finite makes one of these so: moment2 alone, infinite, would make the update 0.
     if not (wp.isfinite(new) and wp.isfinite(m2)):
         broken[shape] = 1
         return

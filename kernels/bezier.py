@@ -15,21 +15,21 @@ control_points: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float32)
 
 @wp.func
 def cubic_weights(t: wp.float32) -> wp.vec4:
-    """The four cubic Bernstein weights at ``t`` in [0, 1] (paper eq. 2, M = 3); they sum to 1."""
+    """Return the four cubic Bernstein weights at ``t`` in [0, 1] (paper eq. 2, M = 3); they sum to 1."""
     s = 1.0 - t
     return wp.vec4(s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t)
 
 
 @wp.func
 def cubic_tangent_weights(t: wp.float32) -> wp.vec4:
-    """Derivatives of ``cubic_weights`` by ``t``; they sum to 0."""
+    """Return the derivatives of ``cubic_weights`` by ``t``; they sum to 0."""
     s = 1.0 - t
     return wp.vec4(-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t)
 
 
 @wp.func
 def fair_weights(t: wp.float32, pieces: wp.int32) -> wp.vec4:
-    """Weights of the vertex at ``t`` of a cubic flattened to ``pieces`` chords of equal steps h of t.
+    """Return weights of the vertex at ``t`` of a cubic flattened to ``pieces`` chords of equal steps h of t.
 
     A chord with both ends on the curve lies h^2/8 |B''| inside at most, h^2/12 |B''| in the mean. Vertices
     moved out by that mean, B - h^2/12 B'', leave a polyline that is off by it at its vertices and by half of
@@ -43,8 +43,8 @@ def fair_weights(t: wp.float32, pieces: wp.int32) -> wp.vec4:
 
 @wp.func
 def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
-    """Place of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from point 0,
-    chain 1 backwards; both end in the middle of the ring.
+    """Return the index of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from
+    point 0, chain 1 backwards; both end in the middle of the ring.
     """
     if chain == 0:
         return i
@@ -53,7 +53,9 @@ def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
 
 @wp.func
 def chain_end(at_end: wp.bool) -> wp.float32:
-    """Share of the outer point in an end of a spline's quadratic: half, or all of it at a stroke's end."""
+    """Return the share of the outer point in an end of a spline's quadratic: half, or all of it at a stroke's
+    end.
+    """
     if at_end:
         return 1.0
     return 0.5
@@ -68,8 +70,8 @@ def bezier_points(
     count: wp.int32,
     local: wp.int32,
 ) -> control_points:
-    """Bézier ``local`` of a contour with ``count`` points from ``first`` on, as a cubic: of a spline, its
-    quadratic with the degree elevated.
+    """Return Bézier ``local`` of a contour with ``count`` points from ``first`` on, as a cubic: of a spline,
+    its quadratic with the degree elevated.
     """
     if basis == constants.CUBIC:
         i = first + 3 * local
@@ -127,8 +129,8 @@ def add_bezier_grad(
 def point_weight(
     closed: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, w: wp.vec4
 ) -> wp.float32:
-    """Weight of control point ``j`` of Bézier ``local`` where its cubic's have the weights ``w``, which sum
-    to 1: the adjoint of ``bezier_points``.
+    """Return the weight of control point ``j`` of Bézier ``local`` where its cubic's have the weights ``w``,
+    which sum to 1: the adjoint of ``bezier_points``.
     """
     if basis == constants.CUBIC:
         return w[j]
@@ -143,19 +145,21 @@ def point_weight(
 
 @wp.func
 def cross(a: wp.vec2, b: wp.vec2) -> wp.float32:
-    """Signed area of the parallelogram of ``a`` and ``b``."""
+    """Return the signed area of the parallelogram of ``a`` and ``b``."""
     return a[0] * b[1] - a[1] * b[0]
 
 
 @wp.func
 def segment_at(t: wp.float32, segment_count: wp.int32) -> wp.int32:
-    """Segment that holds parameter ``t`` in [0, segment_count] of a chain."""
+    """Return the segment that holds parameter ``t`` in [0, segment_count] of a chain."""
     return wp.clamp(int(wp.floor(t)), 0, segment_count - 1)
 
 
 @wp.func
 def local_weight(weights: wp.vec4, segment: wp.int32, i: wp.int32) -> wp.float32:
-    """Weight of chain control point ``i`` where the chain is in ``segment``; 0 outside its support."""
+    """Return the weight of chain control point ``i`` where the chain is in ``segment``; 0 outside its
+    support.
+    """
     j = i - 3 * segment
     if j < 0 or j > 3:
         return 0.0

@@ -27,7 +27,7 @@ def rectangles(
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4] tile rectangle x0, y0, x1, y1, ends excluded
     front_slots: wp.array[wp.int32],  # [shape_count] tiles in it, indexed from the front
 ):
-    """Tiles that the boxes of a shape's samples reach, clamped to the canvas."""
+    """Find the tiles that the boxes of a shape's samples reach, clamped to the canvas."""
     shape = offset + wp.tid()
     low = wp.vec2(1.0e9, 1.0e9)
     high = wp.vec2(-1.0e9, -1.0e9)
@@ -72,7 +72,7 @@ def fill_slots(
     sort_keys: wp.array[wp.int32],  # [2 x slot_capacity] the tile; the second half is the sort's scratch
     sort_slots: wp.array[wp.int32],  # [2 x slot_capacity]
 ):
-    """One thread a slot: its shape and tile, as sort key and value."""
+    """Write the shape and tile of a slot, and its sort key and value. One thread a slot."""
     slot = offset + wp.tid()
     shape_count = front_ends.shape[0]
     front = find_range(front_ends, shape_count, slot)
@@ -100,7 +100,7 @@ def clear_ranges(
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_last: wp.array[wp.int32],  # [tile_count]
 ):
-    """Tiles that nothing reaches keep an empty range."""
+    """Give every tile an empty range, which tiles that nothing reaches keep."""
     tile = offset + wp.tid()
     tile_first[tile] = 0
     tile_last[tile] = 0
@@ -116,7 +116,7 @@ def tile_ranges(
     tile_first: wp.array[wp.int32],  # [tile_count] range of each tile in the sorted list
     tile_last: wp.array[wp.int32],  # [tile_count]
 ):
-    """A thread at each border between two keys writes the one's end and the other's start."""
+    """Write the end of one tile's range and the start of the next at each border between two keys."""
     i = offset + wp.tid()
     tile = sort_keys[i]
     if tile == constants.INT_MAX:
@@ -144,28 +144,28 @@ def list_visible(
     opacities: wp.array[wp.float32],  # [shape_count]
     tile_first: wp.array[wp.int32],  # [tile_count]
     tile_last: wp.array[wp.int32],  # [tile_count]
-    most: wp.float32,  # of an opacity, for what lies behind; below 1, the lists go further back
+    opacity_limit: wp.float32,  # below 1, lists go on behind opaque shapes, which count as less opaque
     keeps_colors: wp.int32,  # 1 where no gradient of colours and opacities is asked for
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] HIDDEN added
     tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
     list_slot: wp.array[wp.int32],  # [slot_capacity] slot, or -1 - slot of a FULL one
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
-    tile_shapes: wp.array[wp.int32],  # [tile_count] of a tile that is still: which they are, as a number
-    tile_still: wp.array[wp.int32],  # [tile_count] 0, STILL or SAME
+    tile_shapes: wp.array[wp.int32],  # [tile_count] hash of a cacheable tile's shapes
+    tile_cache: wp.array[wp.int32],  # [tile_count] 0, CACHEABLE or CACHED
 ):
-    """Each tile's slots that can be seen: covered, and not behind so many FULL ones that no light is left.
-    And whether the tile is still.
+    """List each tile's visible slots: covered, and not behind so many FULL ones that no light is left. Find
+    out whether the tile is cached.
     """
     tile = offset + wp.tid()
-    light = float(1.0)
+    transmittance = float(1.0)
     n = tile_first[tile]
     shapes = int(1)
-    is_still = keeps_colors
+    is_cacheable = keeps_colors
     for k in range(tile_first[tile], tile_last[tile]):
         slot = sort_slots[k]
         state = slot_state[slot]
-        if light <= constants.TRANSMITTANCE_MIN:
+        if transmittance <= constants.TRANSMITTANCE_MIN:
             slot_state[slot] = state | constants.HIDDEN
         elif state & constants.COVERED != 0:
             shape = slot_shape[slot]
@@ -175,13 +175,13 @@ def list_visible(
                 list_slot[n] = -1 - slot
                 shapes = 31 * shapes + shape + 1
                 if paint[shape] == constants.FLAT:
-                    light *= 1.0 - wp.min(opacities[shape], most)
+                    transmittance *= 1.0 - wp.min(opacities[shape], opacity_limit)
             if state != constants.FULL or paint[shape] != constants.FLAT:
-                is_still = 0
+                is_cacheable = 0
             n += 1
     tile_stop[tile] = n
-    still = int(0)
-    if is_still == 1:
-        still = wp.where(shapes == tile_shapes[tile], constants.SAME, constants.STILL)
-    tile_shapes[tile] = is_still * shapes
-    tile_still[tile] = still
+    cache = int(0)
+    if is_cacheable == 1:
+        cache = wp.where(shapes == tile_shapes[tile], constants.CACHED, constants.CACHEABLE)
+    tile_shapes[tile] = is_cacheable * shapes
+    tile_cache[tile] = cache

@@ -45,7 +45,7 @@ def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kern
         lane_columns: wp.int32,  # columns of a tile that a thread handles
         tile_first: wp.array[wp.int32],  # [tile_count]
         tile_stop: wp.array[wp.int32],  # [tile_count]
-        tile_still: wp.array[wp.int32],  # [tile_count]
+        tile_cache: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
         list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: see paint_columns
         coverage: wp.array2d[column],  # [slot_capacity, TILE]
@@ -55,16 +55,16 @@ def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kern
         image: wp.array3d[column],  # [tile_count, planes, TILE] colour, and opacity of a transparent canvas
         hit: wp.array2d[column],  # [tile_count, TILE] part of a pixel that shapes lie on; straight only
     ):
-        """One thread a tile and lane. A tile that is the same as in the last pass stays as it is."""
+        """One thread a tile and lane. Cached tiles stay as they are."""
         i, lane = wp.tid()
         tile = offset + i
         if skips_cached:
-            if tile_still[tile] == constants.SAME:
+            if tile_cache[tile] == constants.CACHED:
                 return
         start = tile_first[tile]
         stop = tile_stop[tile]
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-            t = column(1.0)
+            transmittance = column(1.0)
             red = column(0.0)
             green = column(0.0)
             blue = column(0.0)
@@ -80,9 +80,9 @@ def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kern
                         covered = wp.abs(coverage[slot, x])
                     if opacity > constants.SEEN:
                         touched = touched + covered
-                    share = opacity * wp.cw_mul(covered, t)
+                    share = opacity * wp.cw_mul(covered, transmittance)
                 else:
-                    share = wp.abs(paint[3]) * t
+                    share = wp.abs(paint[3]) * transmittance
                     if slot >= 0:
                         share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
                 if painted:
@@ -100,22 +100,22 @@ def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kern
                     red = red + paint_times(paint, 0, share)
                     green = green + paint_times(paint, 1, share)
                     blue = blue + paint_times(paint, 2, share)
-                t = t - share
+                transmittance = transmittance - share
             if straight:
                 one = column(1.0)
                 touched = wp.min(touched, one)
-                factor = wp.cw_div(touched, wp.max(one - t, constants.NOTHING * one))
+                factor = wp.cw_div(touched, wp.max(one - transmittance, constants.NOTHING * one))
                 image[tile, 0, x] = wp.cw_mul(red, factor)
                 image[tile, 1, x] = wp.cw_mul(green, factor)
                 image[tile, 2, x] = wp.cw_mul(blue, factor)
                 hit[tile, x] = touched
             else:
-                image[tile, 0, x] = red + background[0] * t
-                image[tile, 1, x] = green + background[1] * t
-                image[tile, 2, x] = blue + background[2] * t
+                image[tile, 0, x] = red + background[0] * transmittance
+                image[tile, 1, x] = green + background[1] * transmittance
+                image[tile, 2, x] = blue + background[2] * transmittance
             if painted:
                 if image.shape[1] == 4:
-                    image[tile, 3, x] = column(1.0) - t
+                    image[tile, 3, x] = column(1.0) - transmittance
 
     return forward
 
@@ -142,7 +142,7 @@ def removal_cost(
     # Out:
     slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
 ):
-    """What the weighted squared error would grow by if a shape alone were taken away.
+    """Compute by how much the weighted squared error would grow if one shape were removed.
 
     Behind a shape lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
     squared error by 2 d . (image - target) + d . d. On a transparent canvas the error is the mean of those on
@@ -154,7 +154,7 @@ def removal_cost(
     zero = column(0.0)
     planes = image.shape[1]
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        t = one
+        transmittance = one
         red = image[tile, 0, x]
         green = image[tile, 1, x]
         blue = image[tile, 2, x]
@@ -169,15 +169,15 @@ def removal_cost(
         for k in range(tile_first[tile], tile_stop[tile]):
             paint = list_paint[k]
             slot = list_slot[k]
-            seen = wp.abs(paint[3]) * t
+            seen = wp.abs(paint[3]) * transmittance
             if slot >= 0:
                 seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
             else:
                 slot = -1 - slot
             if paint[3] < 0.0:
                 seen = wp.cw_mul(seen, paint_columns[slot, 3, x])
-            lit = wp.min(wp.max(STEEP * (t - constants.TRANSMITTANCE_MIN * one), zero), one)
-            t = t - seen
+            lit = wp.min(wp.max(STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one)
+            transmittance = transmittance - seen
             red_seen = paint_times(paint, 0, seen)
             green_seen = paint_times(paint, 1, seen)
             blue_seen = paint_times(paint, 2, seen)
@@ -188,7 +188,7 @@ def removal_cost(
             red = red - red_seen
             green = green - green_seen
             blue = blue - blue_seen
-            share = wp.cw_div(seen, wp.max(t, TINY * one))
+            share = wp.cw_div(seen, wp.max(transmittance, TINY * one))
             red_seen = wp.cw_mul(share, red) - red_seen
             green_seen = wp.cw_mul(share, green) - green_seen
             blue_seen = wp.cw_mul(share, blue) - blue_seen
@@ -220,15 +220,17 @@ def visibility(
     # Out:
     seen: wp.array2d[column],  # [slot_capacity, TILE] written for slots on the lists; others kept
 ):
-    """One thread a tile and lane."""
+    """Compute opacity x coverage x transmittance pixel by pixel: the image changes by seen x d where a
+    shape's colour changes by d. One thread a tile and lane.
+    """
     i, lane = wp.tid()
     tile = offset + i
     for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        t = column(1.0)
+        transmittance = column(1.0)
         for k in range(tile_first[tile], tile_stop[tile]):
             opacity = list_paint[k][3]
             slot = list_slot[k]
-            share = wp.abs(opacity) * t
+            share = wp.abs(opacity) * transmittance
             if slot >= 0:
                 share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
             else:
@@ -236,4 +238,4 @@ def visibility(
             if opacity < 0.0:
                 share = wp.cw_mul(share, paint_columns[slot, 3, x])
             seen[slot, x] = share
-            t = t - share
+            transmittance = transmittance - share

@@ -32,7 +32,7 @@ def make_backward(name: str, *, painted: bool) -> wp.Kernel:
         lane_columns: wp.int32,  # columns of a tile that a thread handles
         tile_first: wp.array[wp.int32],  # [tile_count]
         tile_stop: wp.array[wp.int32],  # [tile_count]
-        tile_still: wp.array[wp.int32],  # [tile_count]
+        tile_cache: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity]
         list_paint: wp.array[wp.vec4],  # [slot_capacity]
         coverage: wp.array2d[column],  # [slot_capacity, TILE]
@@ -50,7 +50,7 @@ def make_backward(name: str, *, painted: bool) -> wp.Kernel:
         """
         i, lane = wp.tid()
         tile = offset + i
-        if tile_still[tile] != 0:
+        if tile_cache[tile] != 0:
             return
         start = tile_first[tile]
         stop = tile_stop[tile]
@@ -69,7 +69,7 @@ def make_backward(name: str, *, painted: bool) -> wp.Kernel:
                 if image.shape[1] == 4:
                     opaque = image_grad[tile, 3, x]
                     behind = behind + wp.cw_mul(image[tile, 3, x], opaque)
-            t = one
+            transmittance = one
             for k in range(start, stop):
                 paint = list_paint[k]
                 slot = list_slot[k]
@@ -96,13 +96,13 @@ def make_backward(name: str, *, painted: bool) -> wp.Kernel:
                 else:
                     share = paint_against(paint, red, green, blue)
                 alpha = opacity * own
-                share = wp.cw_mul(t, share)
-                seen = wp.cw_mul(t, alpha)
+                share = wp.cw_mul(transmittance, share)
+                seen = wp.cw_mul(transmittance, alpha)
                 behind = behind - wp.cw_mul(alpha, share)
                 # Where hardly any light is left, there is only rounding error; Adam would make steps of it.
-                lit = wp.min(wp.max(STEEP * (t - constants.TRANSMITTANCE_MIN * one), zero), one)
+                lit = wp.min(wp.max(STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one)
                 alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
-                t = t - seen
+                transmittance = transmittance - seen
                 if not full:
                     # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.
                     slope = one - covered

@@ -56,7 +56,7 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
         image_grad: wp.array3d[column],  # [tile_count, planes, TILE]
         background: wp.vec3,
         # Out:
-        transmittance: wp.array2d[column],  # [slot_capacity, lanes] by place in the lists; scratch
+        transmittances: wp.array2d[column],  # [slot_capacity, lanes] by place in the lists; scratch
         paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] replaced by their gradients
         sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
         slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3), opacity by pixel row: one lane
@@ -97,18 +97,18 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
                     if image_grad.shape[1] == 4:
                         opaque = image_grad[tile, 3, x]
                 behind = background[0] * red + background[1] * green + background[2] * blue
-            t = one
+            transmittance = one
             for k in range(start, stop):
-                transmittance[k, lane] = t
+                transmittances[k, lane] = transmittance
                 opacity = list_paint[k][3]
                 slot = list_slot[k]
-                seen = wp.abs(opacity) * t
+                seen = wp.abs(opacity) * transmittance
                 if slot >= 0:
                     seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
                 if painted:
                     if opacity < 0.0:
                         seen = wp.cw_mul(seen, paint_columns[wp.max(slot, -1 - slot), 3, x])
-                t = t - seen
+                transmittance = transmittance - seen
             for n in range(start, stop):
                 k = start + stop - 1 - n
                 paint = list_paint[k]
@@ -136,10 +136,10 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
                     own = wp.cw_mul(covered, painted_opacity)
                 else:
                     against = paint_against(paint, red, green, blue)
-                t = transmittance[k, lane]
+                transmittance = transmittances[k, lane]
                 alpha = opacity * own
                 difference = against - behind
-                alpha_grad = wp.cw_mul(t, difference)
+                alpha_grad = wp.cw_mul(transmittance, difference)
                 behind = behind + wp.cw_mul(alpha, difference)
                 if not full:
                     if straight:
@@ -152,7 +152,7 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
                         if painted:
                             slope = wp.cw_mul(slope, painted_opacity)
                         sum_grad[slot, x] = opacity * wp.cw_mul(slope, alpha_grad)
-                seen = wp.cw_mul(t, alpha)
+                seen = wp.cw_mul(transmittance, alpha)
                 red_grad = wp.cw_mul(seen, red)
                 green_grad = wp.cw_mul(seen, green)
                 blue_grad = wp.cw_mul(seen, blue)

@@ -7,8 +7,8 @@ STROKE = 1
 """Kinds of shapes: a closed ring of cubics that is painted inside, a chain of cubics painted along."""
 
 STYLED = 2
-"""Of exact coverage, the part of those strokes that are drawn as polygons, as they have dashes, or caps or
-joins that are not round; the others' parts are their kinds."""
+"""Part, in exact coverage, of strokes that are drawn as polygons, as they have dashes, or caps or joins that
+are not round; the parts of other shapes are their kinds."""
 
 CUBIC = 0
 SPLINE = 1
@@ -63,7 +63,7 @@ QUAD = 4
 """Pixels of a column that are copied to rows of pixels at a time."""
 
 GAUSSIAN_MIN = 1.0 / 255.0
-"""A Gaussian weaker than this is cut: it changes no 8-bit colour."""
+"""Value below which a Gaussian is cut: it changes no 8-bit colour."""
 
 Q_MAX = -2.0 * math.log(GAUSSIAN_MIN)
 """The same cut as a squared Mahalanobis distance: exp(-Q_MAX / 2) = GAUSSIAN_MIN."""
@@ -81,7 +81,7 @@ GAUSSIAN_MAX = 0.99
 backward, and a clamped Gaussian has no gradient."""
 
 TRANSMITTANCE_MIN = 1.0e-4
-"""A pixel that lets less light through than this is finished: what lies behind changes no 8-bit colour."""
+"""Transmittance below which a pixel is finished: what lies behind changes no 8-bit colour."""
 
 SEEN = 0.5 / 255.0
 """Opacity from which on a shape hides the black that pictures that are not premultiplied begin with."""
@@ -96,7 +96,7 @@ WIDTH_SIGMA = 0.4
 """Standard deviation across a soft stroke, over its width: opaque, it covers half at half the width."""
 
 PIXEL_VARIANCE = 1.0 / 12.0
-"""Of a pixel's area [px squared]: what looking at a soft Gaussian through it adds to its variance."""
+"""Variance of a pixel's area [px squared], which is added to that of a soft Gaussian."""
 
 PIXEL_SIGMA = 0.13
 """Standard deviation [px] added in quadrature to both scales, so that no Gaussian vanishes. The softer the
@@ -132,7 +132,7 @@ INT_MAX = 2**31 - 1
 """Sort key of an unused slot: sorts behind every tile; a need that 32 bits do not hold."""
 
 COUNT_MAX = 2**30
-"""Where a shape's count of samples stays: more than any capacity, and two of them can be added."""
+"""Bound of a shape's count of samples: more than any capacity, and two of them can be added."""
 
 PLATEAU = 0.985
 """Mean coverage well inside a splatted shape (its Gaussians overlap to a little less than 1). A solid path
@@ -167,11 +167,11 @@ PARTIAL = COVERED + UNCOVERED
 """Only for a slot in this state is there a coverage to read; one that is FULL has coverage 1 throughout."""
 
 HIDDEN = 4
-"""Added to the state of a slot that nothing of is seen, as slots in front are opaque."""
+"""Added to the state of a slot that is hidden by opaque slots in front."""
 
 AREA = 0
 PRODUCT = 1
-"""How a coverage follows from the sum s that a model of coverage makes: |s|, clamped at 1, or 1 - exp(-s)."""
+"""Coverage mappings from the sum s that a model computes: |s|, clamped at 1, or 1 - exp(-s)."""
 
 MODULE_OPTIONS = {
     "enable_backward": False,
@@ -184,8 +184,8 @@ it has fused multiply-adds. Loops over the 16 elements of a column become vector
 they are not unrolled before; unrolled, they also take ten times as long to compile. Warp's headers are
 precompiled once for all modules whose options for the compiler are the same."""
 
-STILL = 1
-"""A tile that shows nothing but flat colours which cover it: of outlines there is nothing to be found ..."""
+CACHEABLE = 1
+"""A tile that shows nothing but flat colours which cover it, so that no outline has a gradient there ..."""
 
-SAME = 2
-"""... and did so in the last pass."""
+CACHED = 2
+"""... and showed the same shapes in the last pass, so that its pixels and loss are still valid."""

@@ -15,7 +15,7 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-MIN_LENGTH = wp.constant(1.0e-6)  # [canvas units] shorter ways have no direction
+MIN_LENGTH = wp.constant(1.0e-6)  # [canvas units] shorter vectors have no direction
 MIN_HANDLE = wp.constant(0.05)  # [canvas units] a handle of length 0 would have none, and the joint a corner
 
 
@@ -27,7 +27,7 @@ def along_joint(
     before_free: wp.bool,
     after_free: wp.bool,
 ) -> wp.vec2:
-    """Unit vector along the outline at a smooth joint; zero where there is none.
+    """Return a unit vector along the outline at a smooth joint; zero where there is none.
 
     A line gives it. Of two free handles it is the axis from which they lie least apart, by squares.
     """
@@ -135,7 +135,7 @@ def turn_backward(
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] added to
 ):
-    """What lines give their far ends, for the joints that they turn; a thread a point."""
+    """Add the gradients that joints pass on to the far ends of their lines; a thread a point."""
     i = offset + wp.tid()
     g = points_grad[i]
     if turned_by[i, 0] != constants.NONE:
@@ -153,7 +153,7 @@ def lay(
     # Out:
     points: wp.array[wp.vec2],  # [point_count] updated: handles of lines [canvas units]
 ):
-    """Handles of lines at their thirds; a thread a point."""
+    """Put the handles of lines at their thirds; a thread a point."""
     i = offset + wp.tid()
     j = line_end[i]
     if j != constants.NONE:
@@ -192,7 +192,7 @@ def spread(
     # Out:
     value: wp.array2d[wp.float32],  # [point_count, 2] updated: points [canvas units]
 ):
-    """Each tie takes the value of its first member; a thread a tie."""
+    """Copy the value of a tie's first member to the others; a thread a tie."""
     i = offset + wp.tid()
     first = tie_member[tie_first[i]]
     x = value[first >> 1, first & 1]
@@ -231,7 +231,9 @@ def share(
     # Out:
     grad: wp.array2d[wp.float32],  # [point_count, 2] updated: of points
 ):
-    """All members of a tie get the gradient of all, and so move as one; of a pinned one 0. A thread a tie."""
+    """Give all members of a tie their total gradient, so that they move as one; 0 if pinned. A thread a
+    tie.
+    """
     i = offset + wp.tid()
     total = float(0.0)
     if tie_pinned[i] == 0:

@@ -27,7 +27,7 @@ TINY = wp.constant(1.0e-12)
 def segment_direction(
     vertex: wp.array[wp.vec2], vertex_next: wp.array[wp.int32], segment: wp.int32
 ) -> wp.vec2:
-    """Unit vector along a segment of the centre line; NONE has that of the x axis."""
+    """Return a unit vector along a segment of the centre line; NONE has that of the x axis."""
     if segment == constants.NONE:
         return wp.vec2(1.0, 0.0)
     d = vertex[vertex_next[segment]] - vertex[segment]
@@ -36,13 +36,13 @@ def segment_direction(
 
 @wp.func
 def turn_between(before: wp.vec2, after: wp.vec2) -> wp.float32:
-    """Angle from one unit vector to another, positive from x to y."""
+    """Return the angle from one unit vector to another, positive from x to y."""
     return angle_of(wp.dot(before, after), before[0] * after[1] - before[1] * after[0])
 
 
 @wp.func
 def miter_ratio(turn: wp.float32) -> wp.float32:
-    """Length of a mitre over the width (SVG 1.1, 11.4)."""
+    """Return the length of a mitre over the width (SVG 1.1, 11.4)."""
     return 1.0 / wp.max(sine_and_cosine(0.5 * turn)[1], 1.0e-6)
 
 
@@ -50,7 +50,7 @@ def miter_ratio(turn: wp.float32) -> wp.float32:
 def corner_centre(
     vertex: wp.array[wp.vec2], vertex_next: wp.array[wp.int32], segment: wp.int32, along: wp.float32
 ) -> wp.vec2:
-    """The point of the centre line that a corner hangs on; at 0 and 1 exactly the segment's ends."""
+    """Return the point of the centre line that a corner hangs on; at 0 and 1 exactly the segment's ends."""
     end = segment
     if along != 0.0:
         end = vertex_next[segment]
@@ -73,7 +73,7 @@ def place_corners(
     corner_shape: wp.array[wp.int32],  # [vertex_capacity]
     corner: wp.array[wp.vec2],  # [vertex_capacity] px
 ):
-    """One thread a corner. Those beyond the last are left as they are."""
+    """Compute the positions of corners. One thread a corner; those beyond the last stay as they are."""
     i = offset + wp.tid()
     shapes = corner_ends.shape[0]
     shape = find_range(corner_ends, shapes, i)
@@ -116,7 +116,7 @@ def add_corner_grad(
     end_grad: wp.array[wp.vec2],
     segment_grad: wp.array[wp.vec3],
 ) -> wp.float32:
-    """Hand a corner's gradient on to its segments; what is returned is that of half the width, times it."""
+    """Hand a corner's gradient on to its segments; return that of half the width, times it."""
     before = corner_segments[i][0]
     after = corner_segments[i][1]
     place = corner_place[i]
@@ -162,7 +162,9 @@ def add_segment_grads(
     start_grad: wp.array[wp.vec2],
     end_grad: wp.array[wp.vec2],
 ):
-    """Turns and lengths of the segments of a contour, the vertices [first, last) -> ends of the segments."""
+    """Pass gradients of turns and lengths of a contour's segments, vertices [first, last), on to their
+    ends.
+    """
     behind = float(0.0)
     for k in range(last - first):
         i = last - 1 - k
@@ -208,7 +210,7 @@ def corners_backward(
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
     widths_grad: wp.array[wp.float32],  # [shape_count] written
 ):
-    """One thread a shape: edges of polygons -> segments of centre lines, and the width."""
+    """Pass gradients of the polygons' edges on to centre lines and the width. One thread a shape."""
     shape = offset + wp.tid()
     if part[shape] != constants.STYLED:
         return

@@ -27,7 +27,7 @@ def bezier_of(
     contour_closed: wp.array[wp.int32],
     local: wp.int32,
 ) -> control_points:
-    """Bézier ``local`` of a contour, as a cubic."""
+    """Return Bézier ``local`` of a contour, as a cubic."""
     first = contour_first[contour]
     count = contour_first[contour + 1] - first
     return bezier_points(points, contour_closed[contour], basis, first, count, local)
@@ -35,8 +35,8 @@ def bezier_of(
 
 @wp.func
 def turn_rate(leg: wp.vec2, middle: wp.vec2) -> wp.float32:
-    """How fast a cubic's direction turns by t at an end: |B' x B''| / |B'|^2, from two legs
-    of its control polygon, that at the end first.
+    """Return the rate at which a cubic's direction turns with t at an end, |B' x B''| / |B'|^2, from two legs
+    of its control polygon, the one at the end first.
     """
     return 2.0 * wp.abs(leg[0] * middle[1] - leg[1] * middle[0]) / wp.max(wp.dot(leg, leg), 1.0e-12)
 
@@ -46,9 +46,9 @@ def plan_outline(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
-    widths: wp.array[wp.float32],  # [shape_count] canvas units; of fills not read
+    widths: wp.array[wp.float32],  # [shape_count] canvas units; not read for fills
     kind: wp.array[wp.int32],  # [shape_count] FILL or STROKE
-    part: wp.array[wp.int32],  # [shape_count] of STYLED ones the ends have directions
+    part: wp.array[wp.int32],  # [shape_count] for STYLED ones the directions at the ends matter
     basis: wp.array[wp.int32],  # [shape_count] CUBIC or SPLINE
     bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier of each shape
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
@@ -62,7 +62,9 @@ def plan_outline(
     bezier_pieces: wp.array[wp.int32],  # [bezier_count] straight pieces
     vertex_count: wp.array[wp.int32],  # [shape_count] an open contour has one more than pieces
 ):
-    """Pieces of each Bézier, one thread a shape: the polyline is slack x FLATNESS px off it at most."""
+    """Choose the number of pieces of each Bézier: the polyline is at most slack x FLATNESS px off it. One
+    thread a shape.
+    """
     shape = offset + wp.tid()
     flatness = constants.FLATNESS
     if kind[shape] != constants.FILL:
@@ -96,7 +98,7 @@ def plan_outline(
 
 @wp.func
 def within_reach(x: wp.float32) -> wp.float32:
-    """A coordinate that kernels may turn into an int: a file may hold any number."""
+    """Clamp a coordinate, which in a file may be any number, to what kernels may convert to an int."""
     if not wp.isfinite(x):
         return 0.0
     return wp.clamp(x, -constants.REACH_MAX, constants.REACH_MAX)
@@ -104,7 +106,7 @@ def within_reach(x: wp.float32) -> wp.float32:
 
 @wp.func
 def weighted(p: control_points, w: wp.vec4) -> wp.vec2:
-    """Sum of a cubic's control points by weight."""
+    """Return the weighted sum of a cubic's control points."""
     return w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3]
 
 
@@ -113,7 +115,7 @@ def outline_forward(
     # In:
     offset: wp.int32,
     points: wp.array[wp.vec2],  # [point_count] canvas units
-    widths: wp.array[wp.float32],  # [shape_count] canvas units; of fills not read
+    widths: wp.array[wp.float32],  # [shape_count] canvas units; not read for fills
     kind: wp.array[wp.int32],  # [shape_count]
     basis: wp.array[wp.int32],  # [shape_count]
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
@@ -132,7 +134,9 @@ def outline_forward(
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     extent: wp.array[wp.vec2],  # [vertex_capacity] px; how far the shape may reach beyond the vertex
 ):
-    """One thread a Bézier: the vertices at k / n of it, its end being the next one's, but for the last's."""
+    """Write the vertices at t = k / n of a Bézier; its end is the start of the next, but for the last of an
+    open contour. One thread a Bézier.
+    """
     bezier = offset + wp.tid()
     contour = bezier_contour[bezier]
     shape = contour_shape[contour]

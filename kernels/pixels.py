@@ -1,4 +1,4 @@
-"""Images by tiles <-> rows of pixels, as the rest of the world has them.
+"""Images by tiles <-> rows of pixels.
 
 A thread has four rows of a tile and takes four pixels at a time, one below the other: in each plane these
 lie side by side. All 16 rows in one thread are slower, as those of a picture whose rows are a multiple of
@@ -23,7 +23,7 @@ def tiles_to_pixels(
     # Out:
     pixels: wp.array2d[wp.vec4],  # [height, width] sRGB and opacity
 ):
-    """One thread four rows of pixels of a tile. Of three planes the opacity is 1."""
+    """Convert to rows; with three planes the opacity is 1. One thread four rows of pixels of a tile."""
     i, part = wp.tid()
     tile = offset + i
     y = tile / tiles_x * constants.TILE + constants.QUAD * part
@@ -52,7 +52,9 @@ def pixels_to_tiles(
     # Out:
     image_quads: wp.array3d[wp.vec4],  # [tile_count, planes, TILE_PIXELS / QUAD] by columns; the padding is 0
 ):
-    """One thread four rows of pixels of a tile. Three planes leave the opacity out."""
+    """Convert to tiles; with three planes the opacity is left out. One thread four rows of pixels of a
+    tile.
+    """
     i, part = wp.tid()
     tile = offset + i
     y = tile / tiles_x * constants.TILE + constants.QUAD * part

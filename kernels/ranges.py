@@ -9,13 +9,15 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 
 @wp.func
 def bounded_product(a: wp.int32, b: wp.int32) -> wp.int32:
-    """``a`` times ``b`` as a count: from 0 to COUNT_MAX."""
+    """Return ``a`` times ``b``, clamped to [0, COUNT_MAX]."""
     return wp.int32(wp.clamp(wp.int64(a) * wp.int64(b), wp.int64(0), wp.int64(constants.COUNT_MAX)))
 
 
 @wp.func
 def find_range(ends: wp.array[wp.int32], count: wp.int32, i: wp.int32) -> wp.int32:
-    """Smallest index with ``ends[index] > i``; ``ends`` is an inclusive prefix sum of ``count`` entries."""
+    """Return the smallest index with ``ends[index] > i``; ``ends`` is an inclusive prefix sum of ``count``
+    entries.
+    """
     low = int(0)
     high = int(count)
     while low < high:
@@ -40,10 +42,10 @@ def clip_ranges(
     range_last: wp.array[wp.int32],  # [n] one past the end; an empty range where the capacity is exceeded
     needed: wp.array[wp.int32],  # [1] the largest total ever asked for; INT_MAX: more than 32 bits hold
 ):
-    """Prefix sum -> ranges. What does not fit is left out whole and counted, never cut.
+    """Turn a prefix sum into ranges. A range that does not fit is left out whole and counted, never cut.
 
     A sum that exceeds 31 bits turns negative where it first does, as no count does by itself. What comes
-    behind may have any range within the capacity, until ``needed`` is looked at.
+    behind may have any range within the capacity, until ``needed`` is read.
     """
     i = offset + wp.tid()
     n = ends.shape[0]

@@ -35,12 +35,13 @@ def renderer_for(
     threads: int | None = None,
     lanes: int | None = None,
     capacity: Capacity | None = None,
+    opaque: bool = False,
 ) -> Renderer:
     """Return a renderer after a complete forward pass. ``lanes``: default: as usual on the device."""
     backend = Backend.on(device, threads)
     backend = replace(backend, lanes=lanes or backend.lanes)
     viewport = Viewport(round(scene.canvas.width * scale), round(scene.canvas.height * scale), scale)
-    renderer = Renderer(Parameters(scene, backend), viewport, model=model, capacity=capacity)
+    renderer = Renderer(Parameters(scene, backend), viewport, model=model, capacity=capacity, opaque=opaque)
     renderer.forward_complete()
     return renderer
 
@@ -89,12 +90,18 @@ def compare(
     assert np.abs(renderer.read_image() - image.detach().numpy()).mean() < 2e-6
     weights = np.random.default_rng(1).normal(size=(*image.shape,))
     (image * torch.tensor(weights)).sum().backward()
-    renderer.write_image_grad(weights.astype(np.float32))
-    renderer.backward()
-    for name, got in renderer.parameters.gradients().items():
+    for name, got in adjoint(renderer, weights).items():
         gradient = p[name].grad
         want = np.zeros(got.shape) if gradient is None else gradient.numpy()
         assert relative_error(got, want) < tolerance, name
+
+
+def adjoint(renderer: Renderer, image_grad: Any = 1.0) -> dict[str, np.ndarray]:
+    """Gradients of the parameters for one of the image, after a forward pass."""
+    shape = renderer.read_image().shape
+    renderer.write_image_grad(np.array(np.broadcast_to(image_grad, shape), np.float32))
+    renderer.backward()
+    return renderer.parameters.gradients()
 
 
 def coverage_images(renderer: Renderer) -> np.ndarray:

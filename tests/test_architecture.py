@@ -205,7 +205,9 @@ SHAPE = re.compile(r"\[[^\[\]]+\]")
 
 
 def is_kernel(node: ast.AST) -> bool:
-    return isinstance(node, ast.FunctionDef) and "wp.kernel" in map(ast.unparse, node.decorator_list)
+    return isinstance(node, ast.FunctionDef) and any(
+        ast.unparse(decorator).startswith("wp.kernel") for decorator in node.decorator_list
+    )
 
 
 def kernels() -> dict[str, tuple[ast.FunctionDef, list[str]]]:
@@ -260,12 +262,18 @@ STORES = {"atomic_add", "atomic_or", "atomic_and", "atomic_min", "atomic_max", "
 
 
 def written(kernel: ast.FunctionDef, parameters: set[str]) -> set[str]:
-    """Names of arrays that the kernel, or a function of ours that it hands them to, stores into."""
+    """Names of arrays that the kernel, or a function of ours that it hands them to, stores into, be they
+    fields of a structure.
+    """
     names: set[str] = set()
+    fields: dict[str, str] = {}
     for node in ast.walk(kernel):
         targets: list[ast.expr] = []
         if isinstance(node, ast.Assign):
             targets = node.targets
+            fields |= {
+                ast.unparse(t): ast.unparse(node.value) for t in targets if isinstance(t, ast.Attribute)
+            }
         elif isinstance(node, ast.AugAssign):
             targets = [node.target]
         elif isinstance(node, ast.Call):
@@ -274,12 +282,13 @@ def written(kernel: ast.FunctionDef, parameters: set[str]) -> set[str]:
                 names.add(ast.unparse(node.args[0]))
             elif called in FUNCTIONS:
                 order = [a.arg for a in FUNCTIONS[called].args.args]
-                stored = written(FUNCTIONS[called], set(order))
-                names |= {ast.unparse(a) for name, a in zip(order, node.args, strict=True) if name in stored}
-        for target in targets:
-            if isinstance(target, ast.Subscript):
-                names.add(ast.unparse(target.value))
-    return names & parameters
+                given = dict(zip(order, map(ast.unparse, node.args), strict=True))
+                for stored in written(FUNCTIONS[called], set(order)):
+                    name, dot, field = stored.partition(".")
+                    names.add(given[name] + dot + field)
+        names |= {ast.unparse(target.value) for target in targets if isinstance(target, ast.Subscript)}
+    names = {fields.get(name, name) for name in names}
+    return {name for name in names if name.partition(".")[0] in parameters}
 
 
 FUNCTIONS = {

@@ -28,13 +28,17 @@ MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as
 
 @wp.func
 def tile_of(x: wp.float32, wide: wp.int32) -> wp.int32:
-    """Tile of ``x`` px right of the shape's tiles' left border: -1 left of them, ``wide`` right of them."""
+    """Return the tile of ``x`` px right of the shape's tiles' left border: -1 left of them, ``wide`` right of
+    them.
+    """
     return int(wp.floor(wp.clamp(x, -1.0, float(constants.TILE * wide)) / float(constants.TILE)))
 
 
 @wp.func
 def cut_to_row(a: wp.vec2, b: wp.vec2, low: wp.float32, high: wp.float32) -> wp.vec2:
-    """The x at which an edge from ``a`` to ``b`` starts and ends between two heights that it reaches."""
+    """Return the x at which an edge from ``a`` to ``b`` starts and ends between two heights that it
+    reaches.
+    """
     if wp.abs(a[1] - b[1]) <= FLAT:
         return wp.vec2(a[0], b[0])
     slope = (b[0] - a[0]) / (b[1] - a[1])
@@ -45,7 +49,7 @@ def cut_to_row(a: wp.vec2, b: wp.vec2, low: wp.float32, high: wp.float32) -> wp.
 
 @wp.func
 def crossing(a: wp.vec2, b: wp.vec2, y: wp.float32) -> wp.int32:
-    """1 where an edge crosses height ``y`` downwards, -1 upwards, 0 where it does not."""
+    """Return 1 where an edge crosses height ``y`` downwards, -1 upwards, 0 where it does not."""
     if wp.abs(a[1] - b[1]) <= FLAT:
         return 0
     if a[1] <= y and b[1] > y:
@@ -73,7 +77,7 @@ def fill_states(
     slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
     slot_winding: wp.array[wp.int32],  # [slot_capacity] of slots that no edge touches
 ):
-    """One thread a row of tiles of a shape (that of its leftmost slot).
+    """Find the states of slots. One thread a row of tiles of a shape (that of its leftmost slot).
 
     Slots that an edge touches are PARTIAL; in the others the winding number is the same everywhere: that on
     a line through the middle of the row.
@@ -212,7 +216,7 @@ def add_edge(
 
 @wp.func
 def any_visible(slot_state: wp.array[wp.int32], first: wp.int32, last: wp.int32) -> wp.bool:
-    """Whether one of the slots [first, last) is PARTIAL and not HIDDEN."""
+    """Return whether one of the slots [first, last) is PARTIAL and not HIDDEN."""
     for s in range(first, last):
         if slot_state[s] == constants.PARTIAL:
             return True
@@ -227,7 +231,7 @@ def sum_columns(
     first: wp.int32,
     last: wp.int32,
 ):
-    """Prefix sums along the rows of the slots [first, last), clamped: 16 rows at a time."""
+    """Compute prefix sums along the rows of the slots [first, last), clamped: 16 rows at a time."""
     total = column(0.0)
     one = column(1.0)
     for s in range(first, last):
@@ -241,8 +245,8 @@ def sum_columns(
 
 @wp.func
 def fold(s: wp.float32) -> wp.float32:
-    """What is left of a winding-weighted area by the even-odd rule: as far as it is from the nearest even
-    number, with the sign of the side on which it lies, which is that of the coverage's derivative.
+    """Return a winding-weighted area's signed distance from the nearest even number: by the even-odd rule,
+    its magnitude is the coverage and its sign that of the coverage's derivative.
     """
     return s - 2.0 * wp.floor(0.5 * s + 0.5)
 
@@ -257,7 +261,7 @@ def sum_row(
     row: wp.int32,
     rule: wp.int32,
 ):
-    """Prefix sums along one row of the slots [first, last), clamped or folded."""
+    """Compute prefix sums along one row of the slots [first, last), clamped or folded."""
     total = float(0.0)
     for s in range(first, last):
         if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
@@ -292,8 +296,8 @@ def fill_forward(
     coverage: wp.array2d[column],  # [slot_capacity, TILE] signed, in [-1, 1]
     coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
 ):
-    """One thread a row of tiles of a shape (that of its leftmost slot) and lane. Only slots that are PARTIAL
-    are written, and rows without a visible one are left out.
+    """Compute the coverage of PARTIAL slots, in rows of tiles with a visible one. One thread a row of tiles
+    of a shape (that of its leftmost slot) and lane.
     """
     i, lane = wp.tid()
     slot = offset + i
@@ -331,8 +335,8 @@ def fill_forward(
 
 @wp.func
 def inside_box(a: wp.vec2, d: wp.vec2, box: wp.vec4) -> wp.vec2:
-    """Parameters between which the edge from ``a`` along ``d`` is inside a box (left, top, right, bottom);
-    first > second: none.
+    """Return the parameters between which the edge from ``a`` along ``d`` is inside a box (left, top, right,
+    bottom); first > second: none.
     """
     s = float(0.0)
     s_end = float(1.0)
@@ -349,7 +353,9 @@ def inside_box(a: wp.vec2, d: wp.vec2, box: wp.vec4) -> wp.vec2:
 
 @wp.func
 def leaves_at(border: wp.int32, a: wp.float32, d: wp.float32, inverse: wp.float32) -> wp.float32:
-    """Parameter at which an edge from ``a`` along ``d`` reaches a border; beyond all where it never does."""
+    """Return the parameter at which an edge from ``a`` along ``d`` reaches a border; NEVER where it does
+    not.
+    """
     if d == 0.0:
         return NEVER
     return (float(border) - a) * inverse
@@ -376,7 +382,7 @@ def fill_backward(
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts here
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
 ):
-    """One thread an edge, walking the pixels that it crosses."""
+    """Compute the gradients of an edge's ends along the pixels that it crosses. One thread an edge."""
     i = offset + wp.tid()
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return

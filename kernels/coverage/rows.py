@@ -1,4 +1,4 @@
-"""Rows of tiles: a thread of a coverage takes the slots of a shape that lie in one row of tiles."""
+"""Rows of tiles: each thread of a coverage kernel handles the slots of a shape in one row of tiles."""
 
 import warp as wp
 
@@ -16,8 +16,8 @@ def tile_row(
     slot_first: wp.array[wp.int32],
     shape_tiles: wp.array2d[wp.int32],
 ) -> wp.vec4i:
-    """(shape, leftmost tile, width [tiles], tile's y) of the row that starts at ``slot``; shape NO_ROW where
-    none does.
+    """Return (shape, leftmost tile, width [tiles], tile's y) of the row that starts at ``slot``; the shape is
+    NO_ROW where none does.
     """
     shape = slot_shape[slot]
     if shape < 0:

@@ -27,7 +27,7 @@ MARGIN = wp.constant(0.02)  # [px] against rounding
 
 @wp.func
 def half_plane(x: wp.float32, n: wp.vec2) -> wp.float32:
-    """Area of the unit square centred at 0 where n . p < x, n a unit vector."""
+    """Return the area of the unit square centred at 0 where n . p < x, n a unit vector."""
     a = wp.max(wp.abs(n[0]), wp.abs(n[1]))
     b = wp.min(wp.abs(n[0]), wp.abs(n[1]))
     distance = wp.abs(x)
@@ -46,7 +46,7 @@ def half_plane(x: wp.float32, n: wp.vec2) -> wp.float32:
 
 @wp.func
 def half_plane_slope(x: wp.float32, n: wp.vec2) -> wp.float32:
-    """Derivative of ``half_plane`` by ``x``: the length of the line inside the square."""
+    """Return the derivative of ``half_plane`` by ``x``: the length of the line inside the square."""
     a = wp.max(wp.abs(n[0]), wp.abs(n[1]))
     b = wp.min(wp.abs(n[0]), wp.abs(n[1]))
     distance = wp.abs(x)
@@ -59,14 +59,14 @@ def half_plane_slope(x: wp.float32, n: wp.vec2) -> wp.float32:
 
 @wp.func
 def nearest(p: wp.vec2, a: wp.vec2, b: wp.vec2) -> wp.float32:
-    """Parameter in [0, 1] of the point of segment (a, b) nearest to ``p``."""
+    """Return the parameter in [0, 1] of the point of segment (a, b) nearest to ``p``."""
     e = b - a
     return wp.clamp(wp.dot(p - a, e) / wp.max(wp.dot(e, e), TINY), 0.0, 1.0)
 
 
 @wp.func
 def direction(r: wp.vec2, length: wp.float32) -> wp.vec2:
-    """Unit vector of ``r``; on the centre line itself any will do."""
+    """Return the unit vector of ``r``; any on the centre line itself."""
     if length < 1.0e-6:
         return wp.vec2(1.0, 0.0)
     return r / length
@@ -74,7 +74,9 @@ def direction(r: wp.vec2, length: wp.float32) -> wp.vec2:
 
 @wp.func
 def turn(before: wp.vec2, after: wp.vec2) -> wp.float32:
-    """Sine of the angle between two segments, 1 for a right angle and more, or where one has no length."""
+    """Return the sine of the angle between two segments, 1 for a right angle and more, or where one has no
+    length.
+    """
     lengths = wp.length(before) * wp.length(after)
     if lengths < TINY or wp.dot(before, after) <= 0.0:
         return 1.0
@@ -89,11 +91,11 @@ def overhang(
     first: wp.int32,
     reach: wp.float32,
 ) -> wp.vec2:
-    """How far beyond its ends the segment that starts at vertex ``i`` is looked at [px].
+    """Return how far beyond its ends the segment that starts at vertex ``i`` may be nearest to pixels [px].
 
     A pixel whose nearest point is the joint of two segments lies in the wedge between their normals, hence at
     most the sine of their angle times its distance beyond each of them; at the ends of the stroke are caps.
-    ``first``: the shape's first vertex. Where a closed contour begins, the angle is not looked at.
+    ``first``: the shape's first vertex. The angle at the start of a closed contour is ignored.
     """
     e = vertex[vertex_next[i]] - vertex[i]
     start = float(1.0)
@@ -109,7 +111,9 @@ def overhang(
 
 @wp.func
 def segment_rows(a: wp.vec2, e: wp.vec2, length: wp.float32, reach: wp.float32, over: wp.vec2) -> wp.vec2:
-    """Lowest and highest y of the rectangle around the segment from ``a`` along the unit vector ``e``."""
+    """Return the lowest and highest y of the rectangle around the segment from ``a`` along the unit vector
+    ``e``.
+    """
     start = a[1] - over[0] * e[1]
     end = a[1] + (length + over[1]) * e[1]
     side = reach * wp.abs(e[0])
@@ -118,8 +122,8 @@ def segment_rows(a: wp.vec2, e: wp.vec2, length: wp.float32, reach: wp.float32, 
 
 @wp.func
 def segment_ends(e: wp.vec2, length: wp.float32, over: wp.vec2) -> wp.vec3:
-    """Where the rectangle's short sides meet the line at a's height, lower x first, and their slope dx / dy;
-    relative to a.
+    """Return where the rectangle's short sides meet the line at a's height, lower x first, and their slope
+    dx / dy; relative to a.
     """
     if wp.abs(e[0]) <= FLAT:
         return wp.vec3(-1.0e8, 1.0e8, 0.0)
@@ -130,7 +134,7 @@ def segment_ends(e: wp.vec2, length: wp.float32, over: wp.vec2) -> wp.vec3:
 
 @wp.func
 def segment_sides(e: wp.vec2, reach: wp.float32) -> wp.vec2:
-    """Half of the chord between the rectangle's long sides, and their slope dx / dy."""
+    """Return half of the chord between the rectangle's long sides, and their slope dx / dy."""
     if wp.abs(e[1]) <= FLAT:
         return wp.vec2(1.0e8, 0.0)
     return wp.vec2(reach / wp.abs(e[1]), e[0] / e[1])
@@ -138,7 +142,9 @@ def segment_sides(e: wp.vec2, reach: wp.float32) -> wp.vec2:
 
 @wp.func
 def segment_span(x: wp.float32, dy: wp.float32, ends: wp.vec3, sides: wp.vec2) -> wp.vec2:
-    """Lowest and highest x of the rectangle at ``dy`` below a, a at ``x``; empty (low > high) without any."""
+    """Return the lowest and highest x of the rectangle at ``dy`` below a, which is at ``x``; low > high where
+    there is none.
+    """
     low = wp.max(ends[0] + ends[2] * dy, sides[1] * dy - sides[0])
     high = wp.min(ends[1] + ends[2] * dy, sides[1] * dy + sides[0])
     return wp.vec2(x + low - MARGIN, x + high + MARGIN)
@@ -146,14 +152,14 @@ def segment_span(x: wp.float32, dy: wp.float32, ends: wp.vec3, sides: wp.vec2) -
 
 @wp.func
 def pixels_within(low: wp.float32, high: wp.float32, first: wp.int32, last: wp.int32) -> wp.vec2i:
-    """Range of the pixels of [first, last) whose centres lie between two coordinates, give or take one."""
+    """Return the range of pixels of [first, last) with centres between two coordinates, give or take one."""
     start = wp.max(first, int(wp.ceil(wp.clamp(low, -1.0, 1.0e8) - 0.5)))
     return wp.vec2i(start, wp.min(last, int(wp.floor(wp.min(high, 1.0e8) + 0.5))))
 
 
 @wp.func
 def half_width(width: wp.float32, scale: wp.float32) -> wp.float32:
-    """Half a stroke's width [px], within what kernels can hold."""
+    """Return half a stroke's width [px], clamped to what kernels can hold."""
     return wp.min(0.5 * scale * width, constants.REACH_MAX)
 
 
@@ -174,11 +180,11 @@ def keep_nearest(
     rows: wp.vec2i,
     top: wp.int32,
 ):
-    """Where segment ``j``, which ends at ``b``, is nearer than all before it, store it and
-    reach^2 - distance^2.
+    """Store segment ``j``, which ends at ``b``, and reach^2 - distance^2 in the pixels to which it is nearer
+    than all segments before it.
 
     ``columns``, ``rows``: a lane's pixels [first, last) of the row of tiles at ``top`` that starts with
-    ``slot``; those that have ``inside`` are done with.
+    ``slot``; those that have ``inside`` are finished.
     """
     a = vertex[j]
     d = b - a
@@ -217,7 +223,7 @@ def keep_nearest(
 
 @wp.func
 def strip_coverage(centre: wp.vec2, a: wp.vec2, b: wp.vec2, half: wp.float32) -> wp.float32:
-    """Area of the pixel at ``centre`` within ``half`` of the segment from ``a`` to ``b``."""
+    """Return the area of the pixel at ``centre`` within ``half`` of the segment from ``a`` to ``b``."""
     t = nearest(centre, a, b)
     r = centre - (1.0 - t) * a - t * b
     distance = wp.length(r)
@@ -241,7 +247,7 @@ def cover_slot(
     half: wp.float32,
     inside: wp.float32,
 ) -> wp.int32:
-    """Distances of a slot's pixels in ``rows`` -> coverages; the slot's state as far as they tell."""
+    """Turn the distances of a slot's pixels in ``rows`` into coverages; return the state of these pixels."""
     most = float(0.0)
     least = float(1.0)
     for x in range(constants.TILE):
@@ -287,8 +293,8 @@ def stroke_forward(
     slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
     slot_near: wp.array2d[wp.int32],  # [slot_capacity, lanes] whether a segment is near
 ):
-    """One thread a row of tiles of a shape (that of its leftmost slot) and lane: the nearest segment of each
-    pixel first, then coverage.
+    """Find the nearest segment of each pixel, then coverages. One thread a row of tiles of a shape (that of
+    its leftmost slot) and lane.
     """
     i, lane = wp.tid()
     slot = offset + i
@@ -372,7 +378,7 @@ def stroke_backward(
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of its second end
     half_grad: wp.array[wp.float32],  # [vertex_capacity] of half the width [px]
 ):
-    """One thread a segment, over the border pixels whose nearest segment it is."""
+    """Sum over the border pixels whose nearest segment it is. One thread a segment."""
     i = offset + wp.tid()
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
@@ -441,7 +447,7 @@ def widths_backward(
     # Out:
     widths_grad: wp.array[wp.float32],  # [shape_count] written
 ):
-    """One thread a shape sums its segments in order."""
+    """Sum over the segments of a shape in order. One thread a shape."""
     shape = offset + wp.tid()
     if part[shape] != constants.STROKE:
         return

@@ -16,7 +16,7 @@ def alpha_loss(
     image: wp.array3d[column],  # [tile_count, 4, TILE] premultiplied, and opacity
     target: wp.array3d[column],  # [tile_count, 4, TILE]
     importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
-    tile_still: wp.array[wp.int32],  # [tile_count] the loss of tiles that are the SAME is, if it is known
+    tile_cache: wp.array[wp.int32],  # [tile_count] the loss of CACHED tiles is kept, if it is known
     value_count: wp.int32,  # pixels x colours
     # Out:
     image_grad: wp.array3d[column],  # [tile_count, 4, TILE]
@@ -26,7 +26,7 @@ def alpha_loss(
     which is that on black, a the error of the opacity, by which less of the white shows. One thread a tile.
     """
     tile = offset + wp.tid()
-    if tile_still[tile] == constants.SAME and loss[tile, 0] >= 0.0:
+    if tile_cache[tile] == constants.CACHED and loss[tile, 0] >= 0.0:
         return
     factor = 1.0 / float(value_count)
     for channel in range(3):

@@ -30,7 +30,7 @@ def image_loss(
     image: wp.array3d[column],  # [tile_count, 3, TILE]
     target: wp.array3d[column],  # [tile_count, 3, TILE]
     importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
-    tile_still: wp.array[wp.int32],  # [tile_count] the loss of tiles that are the SAME is, if it is known
+    tile_cache: wp.array[wp.int32],  # [tile_count] the loss of CACHED tiles is kept, if it is known
     weighted: wp.int32,  # whether that is anything but 1 in the image; if not, it is not read
     width: wp.int32,  # [px]
     height: wp.int32,  # [px]
@@ -57,7 +57,7 @@ def image_loss(
     """
     i, channel = wp.tid()
     tile = offset + i
-    if tile_still[tile] == constants.SAME and loss[tile, channel] >= 0.0:
+    if tile_cache[tile] == constants.CACHED and loss[tile, channel] >= 0.0:
         return
     columns = wp.min(width - tile % tiles_x * constants.TILE, constants.TILE)
     rows = wp.min(height - tile / tiles_x * constants.TILE, constants.TILE)

@@ -1,1 +1,1 @@
-"""What shapes are coloured with."""
+"""Paints: flat colours, gradients and pictures."""

@@ -1,7 +1,8 @@
 """Flat paint: one colour and one opacity a shape, and the adjoint.
 
-Compositing asks a paint for two things of a column of pixels: a light times the paint's colour, and the
-colour times the image's gradient. Gradients (``gradient``) lie in memory instead, pixel by pixel.
+Compositing asks a paint for two products in a column of pixels: its colour times the share of the light that
+it reflects, and its colour times the image's gradient. Gradients (``gradient``) are in memory instead, pixel
+by pixel.
 """
 
 import warp as wp
@@ -18,7 +19,7 @@ SOME = wp.constant(1.0e-20)  # as good as nothing, but with a sign
 def shape_paint(
     paint: wp.array[wp.int32], colors: wp.array[wp.vec3], opacities: wp.array[wp.float32], shape: wp.int32
 ) -> wp.vec4:
-    """Colour and opacity of a shape, as the tiles' lists have them; a negative opacity says that the colour
+    """Return the colour and opacity of a shape for the tiles' lists; a negative opacity means that the colour
     is a gradient's.
     """
     if paint[shape] != constants.FLAT:
@@ -28,14 +29,14 @@ def shape_paint(
 
 
 @wp.func
-def paint_times(paint: wp.vec4, channel: wp.int32, light: column) -> column:
-    """What a column of pixels gets in a channel where ``light`` falls on the shape."""
-    return paint[channel] * light
+def paint_times(paint: wp.vec4, channel: wp.int32, share: column) -> column:
+    """Return what a shape adds to a channel of a column of pixels that reflect ``share`` of the light."""
+    return paint[channel] * share
 
 
 @wp.func
 def paint_against(paint: wp.vec4, red: column, green: column, blue: column) -> column:
-    """Dot product of the paint's colour with a column's gradient."""
+    """Return the dot product of the paint's colour with a column's gradient."""
     return paint[0] * red + paint[1] * green + paint[2] * blue
 
 
@@ -54,7 +55,7 @@ def flat_backward(
     colors_grad: wp.array[wp.vec3],  # [shape_count] written
     opacities_grad: wp.array[wp.float32],  # [shape_count] written
 ):
-    """One thread a shape sums its visible slots in a fixed order: the same bits on every run."""
+    """Sum over a shape's visible slots in a fixed order: the same bits on every run. One thread a shape."""
     shape = offset + wp.tid()
     red = column(0.0)
     green = column(0.0)

@@ -4,7 +4,7 @@ A frame maps the gradient's unit space to the canvas; a pixel's centre, mapped b
 linear gradient that is its first coordinate; on a radial one it says which of the circles between the focus
 and the unit circle goes through it: the larger root s of |p - c0 + s c0| = r0 + s (1 - r0). Between two stops
 colours and opacities are interpolated, colours not premultiplied, at t after the spread.
-What is usual, ``ramp`` and ``stops`` do in less time.
+``ramp`` and ``stops`` are faster kernels for the common cases.
 """
 
 from typing import Any
@@ -23,7 +23,7 @@ frame: Any = wp.types.vector(length=6, dtype=wp.float32)
 
 @wp.func
 def is_gradient(paint: wp.int32) -> wp.bool:
-    """Whether that is what is here."""
+    """Return whether a paint is a gradient."""
     if paint == constants.LINEAR:
         return True
     return paint == constants.RADIAL
@@ -31,7 +31,7 @@ def is_gradient(paint: wp.int32) -> wp.bool:
 
 @wp.func
 def to_unit(f: frame, p: wp.vec2) -> wp.vec2:
-    """A point of the canvas in the gradient's unit space; a frame without area has the origin only."""
+    """Map a point of the canvas to the gradient's unit space; a frame without area has only the origin."""
     x = p[0] - f[0]
     y = p[1] - f[1]
     area = f[2] * f[5] - f[3] * f[4]
@@ -42,7 +42,7 @@ def to_unit(f: frame, p: wp.vec2) -> wp.vec2:
 
 @wp.func
 def to_unit_adjoint(f: frame, g: wp.vec2) -> wp.vec2:
-    """What a gradient by the place in unit space is by the place on the canvas."""
+    """Turn a derivative with respect to a point in unit space into one with respect to that on the canvas."""
     area = f[2] * f[5] - f[3] * f[4]
     if wp.abs(area) < TINY:
         return wp.vec2(0.0, 0.0)
@@ -51,7 +51,7 @@ def to_unit_adjoint(f: frame, g: wp.vec2) -> wp.vec2:
 
 @wp.func
 def parameter(paint: wp.int32, focus: wp.vec3, p: wp.vec2) -> wp.vec3:
-    """t at a point of the unit space, and its derivatives by the two coordinates."""
+    """Return t at a point of the unit space, and its derivatives by the two coordinates."""
     if paint == constants.LINEAR:
         return wp.vec3(p[0], 1.0, 0.0)
     c0 = wp.vec2(focus[0], focus[1])
@@ -68,7 +68,7 @@ def parameter(paint: wp.int32, focus: wp.vec3, p: wp.vec2) -> wp.vec3:
 
 @wp.func
 def spread_out(spread: wp.int32, t: wp.float32) -> wp.vec2:
-    """t brought into [0, 1], and the derivative of that; where the end stops go on, t as it is."""
+    """Return t mapped into [0, 1] by the spread, and the derivative of that; padded gradients keep t."""
     if spread == constants.PAD:
         return wp.vec2(t, 1.0)
     if spread == constants.REPEAT:
@@ -81,7 +81,7 @@ def spread_out(spread: wp.int32, t: wp.float32) -> wp.vec2:
 
 @wp.struct
 class Between:
-    """Where t lies among the stops."""
+    """Position of t among the stops."""
 
     low: wp.int32
     high: wp.int32
@@ -93,7 +93,9 @@ class Between:
 
 @wp.func
 def between_stops(offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32, t: wp.float32) -> Between:
-    """The two stops that ``t`` lies between; before the first and after the last only these count."""
+    """Return the two stops that ``t`` lies between; before the first and after the last, only that one
+    counts.
+    """
     result = Between()
     result.low = first
     result.high = first
@@ -129,7 +131,7 @@ def between_stops(offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 def is_ramp(
     spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 ) -> wp.bool:
-    """Whether a gradient is one of those that ``ramp`` has a shorter way for."""
+    """Return whether ``ramp`` handles a gradient: padded, centred, with two ascending stops."""
     if spread != constants.PAD or last - first != 2:
         return False
     if focus[0] != 0.0 or focus[1] != 0.0 or focus[2] != 0.0:
@@ -139,9 +141,7 @@ def is_ramp(
 
 @wp.func
 def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) -> wp.bool:
-    """Whether a gradient is one of those that ``stops`` has a shorter way for: a ramp, but for more stops, in
-    any order.
-    """
+    """Return whether ``stops`` handles a gradient: padded, centred, with three stops or more in any order."""
     if spread != constants.PAD or last - first < 3:
         return False
     return focus[0] == 0.0 and focus[1] == 0.0 and focus[2] == 0.0
@@ -151,7 +151,7 @@ def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) 
 def is_columnwise(
     spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 ) -> wp.bool:
-    """Whether one of the two has it."""
+    """Return whether ``ramp`` or ``stops`` handles a gradient."""
     if is_ramp(spread, focus, offsets, first, last):
         return True
     return is_chain(spread, focus, first, last)
@@ -159,7 +159,7 @@ def is_columnwise(
 
 @wp.func
 def pixel_place(tile: wp.int32, tiles_x: wp.int32, x: wp.int32, y: wp.int32, scale: wp.float32) -> wp.vec2:
-    """Centre of a tile's pixel, canvas units."""
+    """Return the centre of a tile's pixel, canvas units."""
     px = float(constants.TILE * (tile % tiles_x) + x) + 0.5
     py = float(constants.TILE * (tile / tiles_x) + y) + 0.5
     return wp.vec2(px / scale, py / scale)
@@ -186,9 +186,7 @@ def gradient_forward(
     # Out:
     paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] colour and opacity, by column
 ):
-    """One thread a slot and lane; slots of other paints, of those that go by columns and such as
-    are not seen are left out.
-    """
+    """Colour the pixels of visible slots of gradients that go pixel by pixel. One thread a slot and lane."""
     i, lane = wp.tid()
     slot = offset + i
     shape = slot_shape[slot]
@@ -239,8 +237,8 @@ def gradient_backward(
     stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
     stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
 ):
-    """One thread a shape sums its visible slots in a fixed order: the same bits on every run. The focus is
-    taken as a constant.
+    """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated as
+    a constant. One thread a shape.
     """
     shape = offset + wp.tid()
     if not is_gradient(paint[shape]):

@@ -1,4 +1,4 @@
-"""Pictures as paint: what a file keeps as it is, drawn by a viewer. Nothing of it changes, so no adjoint."""
+"""Pictures as paint: markup that a file keeps as it is, drawn by a viewer. It never changes: no adjoint."""
 
 import warp as wp
 
@@ -24,7 +24,7 @@ def picture_forward(
     # Out:
     paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
 ):
-    """One thread a slot and lane; slots of other paints and such as are not seen are left out."""
+    """Copy the pixels of pictures into visible slots. One thread a slot and lane."""
     i, lane = wp.tid()
     slot = offset + i
     shape = slot_shape[slot]

@@ -1,6 +1,6 @@
-"""The usual gradients, column by column: two ascending stops, padded, linear or from a circle's centre.
+"""The most common gradients, column by column: two ascending stops, padded, linear or from a circle's centre.
 
-What ``gradient`` computes of these, as vector arithmetic: along a column of pixels both coordinates in unit
+The same as ``gradient``, as vector arithmetic: along a column of pixels both coordinates in unit
 space go by constant steps, and the share of the second stop is a clamped linear function of t.
 """
 
@@ -25,7 +25,7 @@ TINY = wp.constant(1.0e-12)
 
 @wp.func
 def rows() -> column:
-    """Numbers of a column's pixels."""
+    """Return the indices of a column's pixels."""
     result = column(0.0)
     for i in range(constants.TILE):
         result[i] = float(i)
@@ -34,7 +34,7 @@ def rows() -> column:
 
 @wp.func
 def roots(squares: column) -> column:
-    """Square root of each element."""
+    """Return the square root of each element."""
     result = column(0.0)
     for i in range(constants.TILE):
         result[i] = wp.sqrt(squares[i])
@@ -43,7 +43,7 @@ def roots(squares: column) -> column:
 
 @wp.func
 def share_of_second(t: column, start: wp.float32, width: wp.float32) -> column:
-    """Of the second stop, at parameters ``t``."""
+    """Return the share of the second stop at parameters ``t``."""
     linear = (t - column(start)) / width
     return wp.min(wp.max(linear, column(0.0)), column(1.0))
 
@@ -69,7 +69,7 @@ def ramp_forward(
     # Out:
     paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
 ):
-    """One thread a slot and lane; slots of other shapes and such as are not seen are left out."""
+    """Colour the pixels of visible slots whose gradients this file handles. One thread a slot and lane."""
     i, lane = wp.tid()
     slot = offset + i
     shape = slot_shape[slot]
@@ -129,7 +129,7 @@ def ramp_backward(
     stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
     stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
 ):
-    """One thread a shape sums its visible slots in a fixed order: the same bits on every run."""
+    """Sum over a shape's visible slots in a fixed order: the same bits on every run. One thread a shape."""
     shape = offset + wp.tid()
     first = stop_first[shape]
     if not is_gradient(paint[shape]) or not is_ramp(
@@ -156,7 +156,7 @@ def ramp_backward(
     opacity_high = zero
     by_t = zero
     by_t_high = zero
-    # Of the place in unit space, and that times each coordinate.
+    # Derivatives by the point in unit space, and the same times each coordinate.
     by_u = zero
     by_v = zero
     u_by_u = zero
@@ -215,7 +215,7 @@ def ramp_backward(
     stop_opacities_grad[first + 1] = total(opacity_high)
     stop_offsets_grad[first] = total(by_t_high) - total(by_t)
     stop_offsets_grad[first + 1] = -total(by_t_high)
-    # A frame that moves takes the place in unit space the other way.
+    # A frame that moves shifts the points in unit space the other way.
     origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
     along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
     across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
@@ -230,7 +230,7 @@ def tie_circles(
     # Out:
     frames_grad: wp.array[frame],  # [shape_count] updated
 ):
-    """A circle stays one: its second axis is the first one, turned by a right angle."""
+    """Keep circles round: the second axis is the first one, turned by a right angle."""
     i = offset + wp.tid()
     if circular[i] == 1:
         g = frames_grad[i]

@@ -1,6 +1,6 @@
 """Padded gradients of three stops or more, column by column: linear ones and those of a circle's centre.
 
-What ``gradient`` computes of these, as vector arithmetic like ``ramp``. The colour at t is that of the first
+The same as ``gradient``, as vector arithmetic like ``ramp``. The colour at t is that of the first
 stop and, for each interval, the clamped share of its second stop times the difference of the two: only those
 that a column reaches are computed, which are one or two.
 """
@@ -27,7 +27,9 @@ TINY = wp.constant(1.0e-12)
 
 @wp.func
 def share_of_next(t: column, before: wp.float32, after: wp.float32) -> column:
-    """Of the second stop of an interval, at parameters ``t``; two stops in one place are a step."""
+    """Return the share of an interval's second stop at parameters ``t``; two stops in one place are a
+    step.
+    """
     if after > before:
         return share_of_second(t, before, after - before)
     return wp.min(wp.max(STEEP * (t - column(before)) + column(1.0), column(0.0)), column(1.0))
@@ -54,7 +56,7 @@ def stops_forward(
     # Out:
     paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
 ):
-    """One thread a slot and lane; slots of other shapes and such as are not seen are left out."""
+    """Colour the pixels of visible slots whose gradients this file handles. One thread a slot and lane."""
     i, lane = wp.tid()
     slot = offset + i
     shape = slot_shape[slot]
@@ -132,7 +134,7 @@ def stops_backward(
     stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
     stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
 ):
-    """One thread a shape sums its visible slots in a fixed order: the same bits on every run.
+    """Sum over a shape's visible slots in a fixed order: the same bits on every run. One thread a shape.
 
     The first stop takes all of a column's gradient but what the share of its interval passes on to the next
     one, and so on. The offset of a stop that counts as lying where one before it does has no gradient.
@@ -152,7 +154,7 @@ def stops_backward(
     row = rows()
     zero = column(0.0)
     one = column(1.0)
-    # Of the place in unit space, and that times each coordinate.
+    # Derivatives by the point in unit space, and the same times each coordinate.
     by_u = zero
     by_v = zero
     u_by_u = zero
@@ -232,7 +234,7 @@ def stops_backward(
                     u_by_v = u_by_v + wp.cw_mul(u, to_v)
                     v_by_u = v_by_u + wp.cw_mul(v, to_u)
                     v_by_v = v_by_v + wp.cw_mul(v, to_v)
-    # A frame that moves takes the place in unit space the other way.
+    # A frame that moves shifts the points in unit space the other way.
     origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
     along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
     across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))

@@ -154,7 +154,7 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
         for _ in range(12):
             step.advance()
             figures.append(step.loss_target.mean_square())
-            states.append(step.renderer.bins.buffers.tile_still.numpy().copy())
+            states.append(step.renderer.bins.buffers.tile_cache.numpy().copy())
         step.render()
         assert step.measured_error() == pytest.approx(step.square_error(), rel=1e-5)
         points.append(step.state.scene().points)
@@ -163,6 +163,6 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
     np.testing.assert_array_equal(*points)
     assert errors[0] == errors[1]
     assert not np.any(still[0])
-    same = np.stack(still[1]) == constants.SAME
+    same = np.stack(still[1]) == constants.CACHED
     assert same[1:].any(axis=1).all(), "where nothing is to be found"
     assert (same[1:-1] != same[2:]).any(), "outlines come and go"

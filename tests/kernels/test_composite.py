@@ -7,7 +7,7 @@ import pytest
 import torch
 import warp as wp
 
-from tests.helpers import SPLAT, coverage_images, relative_error, renderer_for
+from tests.helpers import SPLAT, adjoint, coverage_images, relative_error, renderer_for
 from tests.reference.composite import composite
 from tests.reference.curves import tensors
 from tests.scenes import mixed_scene, random_scene
@@ -36,9 +36,7 @@ def test_blending_and_adjoint(device: str, opaque: bool) -> None:
     np.testing.assert_allclose(renderer.read_image(), image.detach().numpy(), atol=2e-4)
     weights = np.random.default_rng(2).normal(size=image.shape)
     (image * torch.tensor(weights)).sum().backward()
-    renderer.write_image_grad(weights.astype(np.float32))
-    renderer.backward()
-    got = renderer.parameters.gradients()
+    got = adjoint(renderer, weights)
     for name in ("colors", "opacities"):
         gradient = p[name].grad
         assert gradient is not None

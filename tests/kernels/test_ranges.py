@@ -63,7 +63,7 @@ def test_such_a_scene_is_refused_in_a_line(device: str) -> None:
     renderer = renderer_for(random_scene(Kind.FILL, 2), device)
     renderer.needed_slots.fill_(constants.INT_MAX)
     with pytest.raises(CapacityError, match=r"needs \d+ samples and over 2 billion tile slots") as caught:
-        renderer.make_room()
+        renderer.grow()
     assert "\n" not in str(caught.value)
 
 

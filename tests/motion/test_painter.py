@@ -57,7 +57,7 @@ def test_a_viewer_draws_what_the_renderer_cannot(monkeypatch: pytest.MonkeyPatch
 
     scene, settings = flat(), Settings()
     empty = scene.take(np.arange(0))
-    monkeypatch.setattr(rendering.Renderer, "make_room", refuses)
+    monkeypatch.setattr(rendering.Renderer, "grow", refuses)
     for one in (scene, empty):
         seen = render_svg(export(one, settings, GRIDS[-1]), zoom=2.0)
         assert psnr(premultiplied(painted(one, settings)), premultiplied(seen)) > 45

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from tests.helpers import relative_error, renderer_for
+from tests.helpers import adjoint, relative_error, renderer_for
 from tests.paper.helpers import soft_image
 from tests.scenes import mixed_scene, random_scene, with_gradients
 from warpsplat.paper.models import GaussianModel
@@ -37,10 +37,8 @@ def compare(scene: Scene, device: str, scale: float, model: GaussianModel, lanes
     assert np.abs(renderer.read_image() - image.detach().numpy()).mean() < 5e-6
     weights = np.random.default_rng(1).normal(size=(*image.shape,))
     (image * torch.tensor(weights)).sum().backward()
-    renderer.write_image_grad(weights.astype(np.float32))
-    renderer.backward()
     rows = np.flatnonzero(scene.kind == STROKE)
-    for name, found in renderer.parameters.gradients().items():
+    for name, found in adjoint(renderer, weights.astype(np.float32)).items():
         gradient = p[name].grad
         want = np.zeros(found.shape) if gradient is None else gradient.numpy()
         # Fills have no widths and fades, so that nothing reads those gradients.

@@ -1,6 +1,6 @@
 """Polygons whose union is a stroke with caps, joins and dashes, in float64 with autograd.
 
-The rules by which neighbours share corners are those of ``kernels.stroker``; all else is said anew, contour
+The rules by which neighbours share corners are those of ``kernels.stroker``; the rest is independent, contour
 by contour and dash by dash.
 """
 

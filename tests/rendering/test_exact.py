@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.helpers import compare, outline_of, reference_image, renderer_for
+from tests.helpers import adjoint, compare, outline_of, reference_image, renderer_for
 from tests.scenes import disc, points_by_shape, random_scene, with_points
 from warpsplat.kernels import constants
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.models import ExactModel
-from warpsplat.rendering.renderer import Capacity, render
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind
 from warpsplat.scene.geometry import flatten
 from warpsplat.svg.viewer import on_white, render_svg
@@ -82,9 +82,7 @@ def test_finite_differences(device: str, kind: Kind, basis: Basis) -> None:
     rng = np.random.default_rng(0)
     weights = cv2.GaussianBlur(rng.normal(size=(36, 40, 3)), (0, 0), 2.0)
     renderer = renderer_for(scene, device)
-    renderer.write_image_grad(weights.astype(np.float32))
-    renderer.backward()
-    gradient = renderer.parameters.gradients()["points"].astype(np.float64)
+    gradient = adjoint(renderer, weights)["points"].astype(np.float64)
     step = 0.02
     for _ in range(3):
         direction = rng.normal(size=scene.points.shape)
@@ -140,11 +138,7 @@ def test_degenerate_shapes_do_no_harm(device: str, kind: Kind, basis: Basis) -> 
     points[4] = np.nan
     renderer = renderer_for(replace(scene, points=with_points(scene, points)), device)
     assert np.isfinite(renderer.read_image()).all()
-    renderer.write_image_grad(
-        np.broadcast_to(np.float32([1, -1, 0.5]), (renderer.viewport.height, renderer.viewport.width, 3))
-    )
-    renderer.backward()
-    for name, gradient in renderer.parameters.gradients().items():
+    for name, gradient in adjoint(renderer, np.float32([1, -1, 0.5])).items():
         assert np.isfinite(gradient[: scene.first[4] if name == "points" else 4]).all(), name
 
 
@@ -160,43 +154,17 @@ def test_numbers_of_any_size_do_no_harm(device: str, kind: Kind, basis: Basis, f
     points[2, 1:3] = far
     widths[3] = min(far, 1e30) if kind == STROKE else 0
     renderer = renderer_for(replace(scene, points=with_points(scene, points), widths=widths), device)
-    renderer.write_image_grad(np.ones((renderer.viewport.height, renderer.viewport.width, 3), np.float32))
-    renderer.backward()
     assert np.isfinite(renderer.read_image()).all()
-    assert np.isfinite(renderer.parameters.gradients()["colors"]).all()
+    assert np.isfinite(adjoint(renderer)["colors"]).all()
 
 
 def test_opaque_shapes_and_none_at_all(device: str) -> None:
     scene = random_scene(FILL, count=6)
     renderer = renderer_for(replace(scene, opacities=np.ones_like(scene.opacities)), device)
-    renderer.write_image_grad(np.ones((renderer.viewport.height, renderer.viewport.width, 3), np.float32))
-    renderer.backward()
-    for gradient in renderer.parameters.gradients().values():
+    for gradient in adjoint(renderer).values():
         assert np.isfinite(gradient).all()
     nothing = render(scene.take(np.arange(0)), backend=Backend.on(device))
     np.testing.assert_allclose(nothing, np.broadcast_to(scene.canvas.background, nothing.shape))
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("basis", list(Basis))
-def test_same_bits_for_any_number_of_threads(device: str, kind: Kind, basis: Basis) -> None:
-    scene = random_scene(kind, count=20, width=90, height=70, seed=2, basis=basis)
-    outcomes = []
-    for threads in (1, 2, 3, 1):
-        renderer = renderer_for(scene, device, threads=threads)
-        renderer.film.buffers.image_grad.assign(renderer.film.buffers.image)
-        renderer.backward()
-        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
-    for other in outcomes[1:]:
-        for a, b in zip(outcomes[0], other, strict=True):
-            np.testing.assert_array_equal(a, b)
-
-
-def test_overflow_is_counted_and_mended(device: str) -> None:
-    scene = random_scene(FILL, count=10)
-    renderer = renderer_for(scene, device, capacity=Capacity(50, 9))
-    assert renderer.capacity.samples >= renderer.needed_samples.numpy()[0] > 50
-    np.testing.assert_array_equal(renderer.read_image(), render(scene, backend=Backend.on(device)))
 
 
 def test_full_tiles_take_the_short_path(device: str) -> None:

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 import torch
 
-from tests.helpers import SPLAT, compare, pieces_of, reference_image, renderer_for
+from tests.helpers import SPLAT, adjoint, compare, pieces_of, reference_image, renderer_for
 from tests.reference import exact
 from tests.reference.composite import composite
 from tests.scenes import MIXED_CUBICS, Outline, mixed_scene, ragged_scene, random_scene
-from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.models import EXACT, Model
-from warpsplat.rendering.renderer import Capacity, render
 from warpsplat.scene import Basis, Kind, Scene
 
 CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
@@ -96,14 +94,10 @@ def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> 
         points[:, 0] = np.clip(points[:, 0], 25 * i + 5, 25 * i + 20)
     weights = np.random.default_rng(0).normal(size=(40, 250, 3)).astype(np.float32)
     whole = renderer_for(scene, device, model=model)
-    whole.write_image_grad(weights)
-    whole.backward()
-    together = whole.parameters.gradients()
+    together = adjoint(whole, weights)
     for i in range(len(scene)):
         one = renderer_for(scene.take(np.array([i])), device, model=model)
-        one.write_image_grad(weights)
-        one.backward()
-        alone = one.parameters.gradients()
+        alone = adjoint(one, weights)
         np.testing.assert_allclose(
             together["points"][scene.first[i] : scene.first[i + 1]], alone["points"], atol=1e-4
         )
@@ -111,32 +105,9 @@ def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> 
             np.testing.assert_allclose(together[name][i], alone[name][0], rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
-def test_mixed_scenes_that_outgrow_the_arrays(device: str, model: Model) -> None:
-    scene = scene_for(model, seed=1)
-    whole = render(scene, model=model, backend=Backend.on(device))
-    small = renderer_for(scene, device, model=model, capacity=Capacity(50, 5))
-    np.testing.assert_array_equal(small.read_image(), whole)
-
-
-@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
-def test_same_bits_for_any_number_of_threads(device: str, model: Model) -> None:
-    scene = scene_for(model, 90, 70, seed=6)
-    outcomes = []
-    for threads in (1, 3):
-        renderer = renderer_for(scene, device, model=model, threads=threads)
-        renderer.film.buffers.image_grad.assign(renderer.film.buffers.image)
-        renderer.backward()
-        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
-    for a, b in zip(*outcomes, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 def test_fills_have_no_gradient_of_a_width(device: str) -> None:
     scene = mixed_scene().append(random_scene(Kind.FILL, 2, seed=9))
     renderer = renderer_for(scene, device)
-    renderer.write_image_grad(np.ones((36, 40, 3), np.float32))
-    renderer.backward()
-    gradient = renderer.parameters.gradients()["widths"]
+    gradient = adjoint(renderer)["widths"]
     assert not gradient[scene.kind == Kind.FILL].any()
     assert gradient[scene.kind == Kind.STROKE].all()

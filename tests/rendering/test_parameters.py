@@ -17,16 +17,22 @@ SCENES = {
 }
 
 
+def with_a_past(parameters: Parameters) -> dict[str, list[np.ndarray]]:
+    """Random moments, by attribute; ages from 10 on."""
+    rng = np.random.default_rng(0)
+    moments = {}
+    for name, group in parameters.groups.items():
+        moments[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
+        group.moment1.assign(moments[name][0])
+        group.moment2.assign(moments[name][1])
+    parameters.arrays["ages"].assign(np.arange(10, 10 + parameters.shape_count, dtype=np.int32))
+    return moments
+
+
 @pytest.mark.parametrize(("scene", "added"), SCENES.values(), ids=SCENES.keys())
 def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scene) -> None:
     parameters = Parameters(scene, Backend.on(device))
-    rng = np.random.default_rng(0)
-    before = {}
-    for name, group in parameters.groups.items():
-        before[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
-        group.moment1.assign(before[name][0])
-        group.moment2.assign(before[name][1])
-    parameters.arrays["ages"].assign(np.arange(10, 10 + len(scene), dtype=np.int32))
+    before = with_a_past(parameters)
     keep = np.array([4, 0, 3, 5])
     parameters.rearrange(keep, added)
     after, wanted = parameters.scene(), scene.take(keep).append(added)
@@ -63,14 +69,7 @@ def test_fewer_points_keep_their_moments(device: str) -> None:
     """Shapes, their order and their ages stay; the rows of what has rows by shape, too."""
     scene = random_scene(Kind.FILL, count=3, basis=Basis.SPLINE, beziers=6).append(mixed_scene())
     parameters = Parameters(scene, Backend.on(device))
-    rng = np.random.default_rng(0)
-    moments = {}
-    for name, group in parameters.groups.items():
-        moments[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
-        group.moment1.assign(moments[name][0])
-        group.moment2.assign(moments[name][1])
-    ages = np.arange(10, 10 + len(scene), dtype=np.int32)
-    parameters.arrays["ages"].assign(ages)
+    moments, ages = with_a_past(parameters), 10 + np.arange(len(scene))
     keep = np.delete(np.arange(len(scene.points)), [1, 4, 13])
     mask = np.isin(np.arange(len(scene.points)), keep)
     parameters.reshape(replace(scene, points=scene.points + 1).without_points(mask), keep)

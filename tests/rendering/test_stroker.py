@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.helpers import compare, pieces_of, renderer_for
+from tests.helpers import adjoint, compare, pieces_of, renderer_for
 from tests.scenes import DASHES, polyline_scene, random_scene, styled_scene
 from warpsplat.errors import CapacityError
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import Capacity, render
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Cap, Join, Kind, Scene
 from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.svg.viewer import on_white, render_svg
@@ -54,20 +54,6 @@ def test_all_styles(device: str, cap: Cap, join: Join, dash: int) -> None:
     compare(styled_scene(cap, join, dash, seed=6), device, 1.3, lanes=lanes)
 
 
-@pytest.mark.parametrize("dash", [NO_DASHES, 1])
-def test_sixteen_lanes_do_what_one_does(device: str, dash: int) -> None:
-    scene = styled_scene(Cap.SQUARE, Join.MITER, dash, seed=5)
-    weights = np.random.default_rng(0).normal(size=(36, 40, 3)).astype(np.float32)
-    outcomes = []
-    for lanes in (1, 16):
-        renderer = renderer_for(scene, device, lanes=lanes)
-        renderer.write_image_grad(weights)
-        renderer.backward()
-        outcomes.append([renderer.read_image(), *renderer.parameters.gradients().values()])
-    for one, many in zip(*outcomes, strict=True):
-        np.testing.assert_allclose(many, one, atol=1e-5 * np.abs(one).max(initial=0))
-
-
 @pytest.mark.usual_seed  # in a place where the image does not jump
 @pytest.mark.parametrize(
     ("cap", "join", "dash"),
@@ -83,9 +69,7 @@ def test_finite_differences(device: str, cap: Cap, join: Join, dash: int) -> Non
     rng = np.random.default_rng(0)
     weights = cv2.GaussianBlur(rng.normal(size=(36, 40, 3)), (0, 0), 2.0)
     renderer = renderer_for(scene, device)
-    renderer.write_image_grad(weights.astype(np.float32))
-    renderer.backward()
-    gradients = renderer.parameters.gradients()
+    gradients = adjoint(renderer, weights)
     step = 0.002
     for name in ("points", "widths"):
         value, errors = getattr(scene, name), []
@@ -228,13 +212,6 @@ def test_more_dashes_than_there_is_room_for(device: str) -> None:
     scene = polyline_scene([(line, False)], 6, cap=Cap.BUTT, join=Join.MITER, dash=0, dashes=((0, 0.3, 0.3),))
     with pytest.raises(CapacityError, match="samples"):
         render(scene, backend=Backend.on(device))
-
-
-def test_polygons_that_outgrow_the_arrays(device: str) -> None:
-    scene = styled_scene(Cap.ROUND, Join.BEVEL, 1, seed=2)
-    whole = render(scene, backend=Backend.on(device))
-    small = renderer_for(scene, device, capacity=Capacity(50, 5))
-    np.testing.assert_array_equal(small.read_image(), whole)
 
 
 def test_beside_fills_and_round_strokes(device: str) -> None:

@@ -101,16 +101,16 @@ def _launch_image_error(program: Program, inputs: LossInputs, weight: float) -> 
     renderer, target = inputs.renderer, inputs.target
     film, viewport = renderer.film, renderer.viewport
     arrays = (film.buffers, target, target.buffers)
-    still = renderer.bins.buffers.tile_still
+    cache = renderer.bins.buffers.tile_cache
     if film.planes == 4:
-        program.launch(alpha.alpha_loss, viewport.tile_count, *arrays, tile_still=still, split=True)
+        program.launch(alpha.alpha_loss, viewport.tile_count, *arrays, tile_cache=cache, split=True)
         return
     program.launch(
         image.image_loss,
         (viewport.tile_count, 3),
         *arrays,
         viewport,
-        tile_still=still,
+        tile_cache=cache,
         clock=inputs.clock,
         similarity_weight=inputs.settings.ssim,
         split=True,

@@ -111,7 +111,7 @@ def step_from(
 
 
 def _room(renderer: Renderer) -> dict[str, int]:
-    capacity, needed = renderer.room()
+    capacity, needed = renderer.capacity_and_need()
     return {
         "samples": capacity.samples,
         "slots": capacity.slots,
@@ -124,9 +124,9 @@ def _take_room(renderer: Renderer, room: Any) -> None:
     """Set the capacity: what does not fit is left out until the next check, as in the fit that was saved."""
     if not isinstance(room, dict):
         raise TypeError("room is no table")
-    now, _ = renderer.room()
+    now, _ = renderer.capacity_and_need()
     samples, slots = SPARE_ROOM * now.samples, SPARE_ROOM * now.slots
-    renderer.take_room(
+    renderer.restore_capacity(
         Capacity(whole(room, "samples", 1, samples), whole(room, "slots", 1, slots)),
         Capacity(whole(room, "needed samples", 0, samples), whole(room, "needed slots", 0, slots)),
     )

@@ -144,7 +144,7 @@ class Step:
 
     def ensure_capacity(self) -> None:
         """Enlarge arrays that were too small in the last steps."""
-        grown = [renderer.make_room() for renderer in self.renderers]
+        grown = [renderer.grow() for renderer in self.renderers]
         if any(grown):
             self.record()
 

@@ -16,7 +16,7 @@ from warpsplat.motion import drawing, films, training
 from warpsplat.motion.timing import LONGEST, SECONDS, SHORTEST, kept
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.turns import turn
+from warpsplat.rendering.device_lock import device_lock
 from warpsplat.run.result import Result
 from warpsplat.scene import Scene
 
@@ -126,7 +126,7 @@ class Recorder:
         elif what == "training":
             start_warp()
             backend = Backend.on(choose_device(device), threads)
-            with turn(backend.device):
+            with device_lock(backend.device):
                 frames = training.pictures(self.scenes, self.moments, result, path, width, seconds, backend)
                 data = films.encoded(path, frames)
         elif vector:

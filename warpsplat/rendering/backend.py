@@ -1,4 +1,4 @@
-"""Where kernels run: device, CPU threads, division of tiles; and the arrays of a stage."""
+"""The device that kernels run on, CPU threads, division of tiles; and the arrays of a stage."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from warpsplat.rendering.tiles import tile_counts
 Buffers = TypeVar("Buffers")
 
 LARGE = 1 << 20
-"""Bytes of a CPU array from on which it takes the system's zeroed pages, each when it is first used: many an
-array is made for a need that a scene has not, and clearing them was a third of a drawing's renders."""
+"""Bytes of a CPU array from on which it takes zeroed pages from the system, each when it is first used: many
+arrays are larger than a scene needs, and clearing them took a third of the time of a drawing's renders."""
 
 THREADS_PER_CORE = 8
 """Most threads that a split launch is cut for: more only wait, and cost memory for pieces and stacks."""
@@ -28,7 +28,7 @@ THREADS_PER_CORE = 8
 
 @dataclass(frozen=True)
 class Viewport:
-    """The picture that is rendered."""
+    """Size of the image that is rendered."""
 
     width: int
     """[px]"""
@@ -70,7 +70,7 @@ class Backend:
 
     @staticmethod
     def on(device: wp.Device | str | None = None, threads: int | None = None) -> Backend:
-        """The usual division on ``device`` (default: Warp's).
+        """Return the usual division on ``device`` (default: Warp's).
 
         ``threads``: of a CPU, default one a core, THREADS_PER_CORE a core at most.
         """
@@ -90,7 +90,7 @@ class Backend:
         return Program(self.device, self.threads, stage)
 
     def array(self, dtype: Any, *shape: int) -> wp.array:
-        """A zeroed array."""
+        """Return a zeroed array."""
         size = math.prod(shape) * wp.types.type_size_in_bytes(dtype)
         if not self.device.is_cpu or size < LARGE:
             return wp.zeros(shape, dtype=dtype, device=self.device)
@@ -104,7 +104,7 @@ class Backend:
         )
 
     def allocate(self, buffers: type[Buffers], sizes: Mapping[str, int]) -> Buffers:
-        """Zeroed arrays for all fields of a dataclass made of ``buffer`` fields.
+        """Allocate zeroed arrays for all fields of a dataclass made of ``buffer`` fields.
 
         Args:
             buffers: the dataclass.
@@ -119,11 +119,11 @@ class Backend:
 
 
 def _release(memory: np.ndarray, pointer: int, size: int) -> None:
-    """Keeps the memory of an array as long as Warp has the array, which calls this at its end."""
+    """Keep the memory of an array alive until Warp drops the array and calls this."""
 
 
 def buffer(dtype: Any, *dimensions: str | int, memory_of: str = "") -> Any:
-    """A field of a dataclass of device arrays.
+    """Declare a field of a dataclass of device arrays.
 
     Args:
         dtype: of the elements.
@@ -134,5 +134,5 @@ def buffer(dtype: Any, *dimensions: str | int, memory_of: str = "") -> Any:
 
 
 def view(array: wp.array, dtype: Any, shape: tuple[int, ...]) -> wp.array:
-    """The same memory as ``array``, read as ``shape`` elements of ``dtype``."""
+    """Return the same memory as ``array``, read as ``shape`` elements of ``dtype``."""
     return wp.array(ptr=array.ptr, dtype=dtype, shape=shape, device=array.device, copy=False)

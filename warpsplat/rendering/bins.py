@@ -16,7 +16,7 @@ from warpsplat.rendering.ranges import record_ranges
 
 @dataclass
 class BinBuffers:
-    """What the stage owns. A slot is one (shape, tile) pair."""
+    """Arrays that the stage owns. A slot is one (shape, tile) pair."""
 
     shape_tiles: wp.array = buffer(wp.int32, "shapes", 4)
     """Rectangle of tiles of each shape: x0, y0, x1, y1, ends excluded."""
@@ -37,8 +37,8 @@ class BinBuffers:
     tile_stop: wp.array = buffer(wp.int32, "tiles")
     """End of a tile's visible slots in the two lists."""
     tile_shapes: wp.array = buffer(wp.int32, "tiles")
-    tile_still: wp.array = buffer(wp.int32, "tiles")
-    """0, ``constants.STILL`` or ``SAME``."""
+    tile_cache: wp.array = buffer(wp.int32, "tiles")
+    """0, ``constants.CACHEABLE`` or ``CACHED``."""
     list_slot: wp.array = buffer(wp.int32, "slots")
     list_paint: wp.array = buffer(wp.vec4, "slots")
 
@@ -54,10 +54,10 @@ class Bins:
         capacity: int,
         needed: wp.array,
         *,
-        most: float = 1.0,
+        opacity_limit: float = 1.0,
     ) -> None:
-        """``most``: of an opacity, where it decides whether what lies behind is seen."""
-        self._most = most
+        """``opacity_limit``: see ``bins.list_visible``."""
+        self._opacity_limit = opacity_limit
         self._parameters, self._viewport = parameters, viewport
         self._capacity, self._needed = capacity, needed
         self.paint: dict[str, wp.array] = {}
@@ -96,7 +96,7 @@ class Bins:
             self._viewport.tile_count,
             self.buffers,
             self._parameters.arrays,
-            most=self._most,
+            opacity_limit=self._opacity_limit,
             keeps_colors=int(self._parameters.keeps_colors),
             split=True,
             **self.paint,

@@ -19,7 +19,9 @@ from warpsplat.rendering.program import Program
 
 @dataclass
 class CoverageBuffers:
-    """What every model owns: a tile of floats a slot, as columns and, in the same memory, as pixels."""
+    """Arrays that every model owns: a tile of floats a slot, as columns and, in the same memory, as
+    pixels.
+    """
 
     coverage: wp.array = buffer(column, "slots", constants.TILE)
     """After the adjoint of compositing, the gradient of the sum that the coverage came from."""
@@ -28,15 +30,15 @@ class CoverageBuffers:
 
 @dataclass
 class FillBuffers:
-    """What fills need besides."""
+    """Further arrays for fills."""
 
     slot_winding: wp.array = buffer(wp.int32, "slots")
-    """Of slots that no edge touches."""
+    """Winding number of slots that no edge touches."""
 
 
 @dataclass
 class StrokeBuffers:
-    """What strokes need besides."""
+    """Further arrays for strokes."""
 
     slot_near: wp.array = buffer(wp.int32, "slots", "lanes")
     segment: wp.array = buffer(wp.int32, "slots", constants.TILE_PIXELS)
@@ -44,7 +46,7 @@ class StrokeBuffers:
 
 
 class Coverage(Protocol):
-    """What compositing asks of a model."""
+    """Interface of a coverage model."""
 
     buffers: CoverageBuffers
     mapping: int
@@ -62,7 +64,7 @@ class Coverage(Protocol):
 
 @dataclass(frozen=True)
 class Stages:
-    """What the parts of a coverage read and write."""
+    """Stages that the parts of a coverage read and write."""
 
     backend: Backend
     parameters: Parameters
@@ -74,7 +76,7 @@ class Stages:
 
     @property
     def sources(self) -> tuple[object, ...]:
-        """Where launches find their arrays."""
+        """Return the objects in which launches find their arrays."""
         arrays = self.coverage, self.bins.buffers, self.outline.buffers, self.parameters.arrays
         return (*arrays, self.viewport)
 
@@ -166,7 +168,7 @@ class StrokeCoverage:
         )
 
     def values(self, program: Program) -> None:
-        """See ``Coverage``: all are there."""
+        """Do nothing: all values are there."""
 
     def backward(self, program: Program) -> None:
         """Record gradients in the coverages' place -> gradients of the segments' ends and of the widths."""
@@ -187,11 +189,11 @@ EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
     constants.STROKE: StrokeCoverage,
     constants.STYLED: StyledCoverage,
 }
-"""What covers the shapes of each of ``Parameters.parts``."""
+"""Coverage of the shapes of each of ``Parameters.parts``."""
 
 
 class ExactCoverage:
-    """The area that a viewer computes, of polylines: a part for each kind of shape that there is."""
+    """The area that a viewer computes, from polylines: a part for each kind of shape in the scene."""
 
     mapping = constants.AREA
 
@@ -220,7 +222,7 @@ class ExactCoverage:
             part.values(program)
 
     def backward(self, program: Program) -> None:
-        """See ``Coverage``: from the edges on to the points."""
+        """Record gradients in the coverages' place -> gradients of the points."""
         for part in self.parts:
             part.backward(program)
         self._outline.backward(program)

@@ -22,16 +22,16 @@ def start_warp() -> None:
             return
         except OSError as error:
             failure = error
-    use_temporary_folder(failure)  # outside the block, as it has something to say
+    use_temporary_folder(failure)  # outside the block, as it logs
     with messages_hidden():
         wp.init()
 
 
 def choose_device(name: str = "auto") -> wp.Device:
-    """``auto`` (the first GPU, else the CPU), ``cpu``, ``cuda`` or ``cuda:N``.
+    """Return a device by name: ``auto`` (the first GPU, else the CPU), ``cpu``, ``cuda`` or ``cuda:N``.
 
     Raises:
-        UsageError: there is no such device here.
+        UsageError: there is no such device.
     """
     if name == "auto":
         return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")

@@ -33,7 +33,7 @@ class FilmBuffers:
 
 
 class Film:
-    """What the shapes are composited on."""
+    """The image that shapes are composited on."""
 
     def __init__(
         self,
@@ -48,8 +48,8 @@ class Film:
 
         Args:
             backend: the device.
-            viewport: the picture.
-            canvas: its background; premultiplied, a transparent one is black.
+            viewport: the image.
+            canvas: has the background; a transparent one is black.
             opaque: whether shapes of opacity 1 have gradients (``kernels.composite_opaque``).
             straight: whether colours are not premultiplied; on a transparent canvas, with any opacities.
         """
@@ -98,7 +98,7 @@ class Film:
         values: dict[str, Any] = {"mapping": coverage.mapping, "sum_grad": coverage.buffers.coverage}
         if self._opaque:
             slots = bins.buffers.list_slot.shape[0]
-            values["transmittance"] = self._backend.array(column, slots, self._backend.lanes)
+            values["transmittances"] = self._backend.array(column, slots, self._backend.lanes)
         self._launch(program, self._kernels(paint)[1], bins, coverage, paint, **values)
 
     def removal_cost(

@@ -11,18 +11,18 @@ from collections.abc import Callable
 
 
 class Request:
-    """Work for one helper, and what became of it."""
+    """Work for one helper thread."""
 
     def __init__(self, work: Callable[[], None]) -> None:
         self._work = work
         self._error: BaseException | None = None
         self._claim = threading.Lock()
-        """Taken by who decides: the helper that begins, or the caller that withdraws."""
+        """Taken by the helper that begins, or by the caller that withdraws, whichever comes first."""
         self._done = threading.Lock()
         self._done.acquire()
 
     def serve(self) -> None:
-        """Do the work, in a helper, unless it was withdrawn."""
+        """Do the work, called by a helper, unless it was withdrawn."""
         if not self._claim.acquire(blocking=False):
             return
         try:
@@ -33,10 +33,7 @@ class Request:
             self._done.release()
 
     def settle(self) -> None:
-        """Withdraw what no helper has begun; wait for what one has, and raise what it raised.
-
-        Afterwards no helper does any of the work.
-        """
+        """Withdraw the work if no helper has begun; else wait for it, and raise what it raised."""
         if self._claim.acquire(blocking=False):
             return
         self._done.acquire()
@@ -72,7 +69,7 @@ class Helpers:
 
 @functools.cache
 def helpers(threads: int) -> Helpers:
-    """Kept for the next program."""
+    """Return the helpers for so many threads, kept for the next program."""
     return Helpers(threads - 1)
 
 

@@ -1,4 +1,4 @@
-"""Models of coverage: which stages make a shape's coverage of the pixels."""
+"""Models of coverage: the stages that compute a shape's coverage of the pixels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpsplat.rendering.program import Program
 
 
 class Geometry(Protocol):
-    """What binning asks of the stage that samples the shapes."""
+    """Interface of the stage that samples the shapes, for binning."""
 
     def samples(self) -> dict[str, wp.array]:
         """``sample_first``, ``sample_last``, ``position`` and ``extent`` of ``kernels.bins.rectangles``."""
@@ -27,7 +27,7 @@ class Geometry(Protocol):
 
 @dataclass(frozen=True)
 class Job:
-    """What a model makes its stages for."""
+    """Inputs and capacities of a model's stages."""
 
     backend: Backend
     parameters: Parameters
@@ -38,11 +38,11 @@ class Job:
     slots: int
     """Capacity for slots."""
     needed: wp.array
-    """Where the need for samples is counted, shape (1,)."""
+    """Counter of the need for samples, shape (1,)."""
 
 
 class Model(Protocol):
-    """A way from shapes to coverages."""
+    """Interface of a model of coverage."""
 
     @property
     def samples_per_shape(self) -> int:

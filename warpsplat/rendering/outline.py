@@ -16,7 +16,7 @@ from warpsplat.rendering.stroker import Stroker
 
 @dataclass
 class OutlineBuffers:
-    """What the stage owns."""
+    """Arrays that the stage owns."""
 
     bezier_vertex: wp.array = buffer(wp.int32, "beziers")
     """First vertex of each Bézier, counted in its shape."""
@@ -28,17 +28,17 @@ class OutlineBuffers:
     vertex_last: wp.array = buffer(wp.int32, "shapes")
     vertex_shape: wp.array = buffer(wp.int32, "vertices")
     vertex_next: wp.array = buffer(wp.int32, "vertices")
-    """Where the edge that starts at a vertex ends."""
+    """End of the edge that starts at a vertex."""
     vertex: wp.array = buffer(wp.vec2, "vertices")
     """[px]"""
     extent: wp.array = buffer(wp.vec2, "vertices")
     """How far the shape may reach beyond the vertex [px]."""
     start_grad: wp.array = buffer(wp.vec2, "vertices")
-    """Of the first end of the edge that starts at a vertex."""
+    """Gradient of the first end of the edge that starts at a vertex."""
     end_grad: wp.array = buffer(wp.vec2, "vertices")
-    """Of its second end."""
+    """Gradient of its second end."""
     half_grad: wp.array = buffer(wp.float32, "vertices")
-    """Of half a stroke's width, by edge."""
+    """Gradient of half a stroke's width, by edge."""
 
 
 class Outline:
@@ -62,12 +62,12 @@ class Outline:
             {"beziers": parameters.bezier_count, "shapes": parameters.shape_count, "vertices": capacity},
         )
         self.stroker: Stroker | None = None
-        """Of the strokes that are drawn as polygons."""
+        """Stage of the strokes that are drawn as polygons."""
         if constants.STYLED in parameters.parts:
             self.stroker = Stroker(backend, parameters, viewport, self.buffers, capacity, needed)
 
     def samples(self) -> dict[str, wp.array]:
-        """What tiles are found by: ``bins.rectangles``'s parameters."""
+        """Return the samples that tiles are found from, as ``bins.rectangles`` takes them."""
         b = self.buffers
         return {
             "sample_first": b.vertex_first,

@@ -1,6 +1,6 @@
-"""The paint stage: what a shape is coloured with.
+"""The paint stage: the colours of shapes.
 
-The forward half of flat colours is part of compositing, which waits for memory: ``kernels.paint.flat`` is
+The forward half of flat colours is part of compositing, which is bound by memory: ``kernels.paint.flat`` is
 inlined there. Gradients and pictures fill arrays that compositing reads, and replaces by their gradients.
 """
 
@@ -23,12 +23,12 @@ from warpsplat.scene import GRADIENTS, Paint
 
 @dataclass
 class PaintBuffers:
-    """What the stage owns."""
+    """Arrays that the stage owns."""
 
     slot_columns: wp.array = buffer(column, "column_slots", 4)
-    """Gradients of colour (3) and opacity, where a thread has the tile."""
+    """Gradients of colour (3) and opacity, where one thread handles a tile."""
     slot_grad: wp.array = buffer(wp.vec4, "lane_slots", "lanes")
-    """The same by lane, where it has not."""
+    """The same by lane, where several threads share a tile."""
     paint_columns: wp.array = buffer(column, "paint_slots", 4, constants.TILE)
     """Colour (3) and opacity of the pixels of slots that are not flat."""
     paint_pixels: wp.array = buffer(

@@ -28,7 +28,7 @@ from warpsplat.scene.attributes import NO_DASHES, Cap, Join
 from warpsplat.scene.scene import level_ends, starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
-"""What kernels read a row of so many numbers as."""
+"""Type as which kernels read a row of so many numbers."""
 
 
 Moments = tuple[dict[str, FloatArray], dict[str, FloatArray]]
@@ -47,7 +47,7 @@ class Group:
     owner: wp.array
     """[row] the shape of each row."""
     held: wp.array
-    """[row] 1 where the value is not updated any more."""
+    """[row] 1 where the value is held fixed."""
 
 
 class Parameters:
@@ -61,7 +61,7 @@ class Parameters:
         self.revision = 0
         """Counts ``rearrange``: launches recorded on arrays of an earlier revision are out of date."""
         self.keeps_colors = False
-        """Whether colours and opacities stay: where nothing but these is to be found, nothing is computed."""
+        """Whether colours and opacities are fixed: their gradients are not computed then."""
         zeros = {a.name: np.zeros(scene.shape_of(a), np.float32) for a in ATTRIBUTES}
         self._upload(
             scene, moments or (zeros, zeros), np.zeros(len(scene), np.int32) if ages is None else ages
@@ -95,13 +95,15 @@ class Parameters:
             "bezier_contour": self._ints(np.repeat(contours, in_contour)),
             "ages": self._ints(ages),
         }
-        """What kernels bind by name: the layout of the shapes, and each attribute with its gradient."""
+        """Arrays that kernels bind by name: the layout of the shapes, and each attribute with its
+        gradient.
+        """
         self.has_twins = bool(scene.twin.any())
         if self.has_twins:
             self.arrays["point_twin"] = self._ints(_twins(scene))
         self.tie_circles(_circular(scene))
         self.parts = tuple(np.unique(parts).tolist())
-        """Of exact coverage, that there are shapes of."""
+        """Parts of exact coverage that have shapes."""
         if constants.STYLED in self.parts:
             self._upload_styles(scene)
         self.broken = self.backend.array(wp.int32, self.shape_count)
@@ -124,13 +126,14 @@ class Parameters:
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
 
     def tie_circles(self, rows: np.ndarray) -> None:
-        """From now on the gradients of the shapes ``rows`` (true or 1) keep circles round."""
+        """Keep the gradients of the shapes ``rows`` (true or 1) circular from now on."""
         self.has_circles = bool(rows.any())
         if self.has_circles:
             self.arrays["circular"] = self._ints(rows)
 
     def prefix(self, count: int) -> Parameters:
-        """The first ``count`` shapes: the same values, in the same memory, with gradients of their own.
+        """Return the first ``count`` shapes: the same values, in the same memory, with gradients of their
+        own.
 
         It holds as long as the arrays do: until the next ``rearrange``.
         """
@@ -162,17 +165,17 @@ class Parameters:
 
     @property
     def kinds(self) -> frozenset[Kind]:
-        """Kinds of shapes that there are."""
+        """Kinds of shapes in the scene."""
         return frozenset(Kind(k) for k in np.unique(self._scene.kind))
 
     @property
     def paints(self) -> frozenset[Paint]:
-        """Paints of shapes that there are."""
+        """Paints of shapes in the scene."""
         return frozenset(Paint(k) for k in np.unique(self._scene.paint))
 
     @property
     def pictures(self) -> tuple[Picture, ...]:
-        """See ``Scene.pictures``."""
+        """``Scene.pictures``."""
         return self._scene.pictures
 
     @property
@@ -182,12 +185,12 @@ class Parameters:
 
     @property
     def level_ends(self) -> tuple[int, ...]:
-        """Of the scene."""
+        """``level_ends`` of the scene."""
         return level_ends(self._scene)
 
     @property
     def canvas(self) -> Canvas:
-        """What the shapes lie on."""
+        """The scene's canvas."""
         return self._scene.canvas
 
     def scene(self) -> Scene:
@@ -221,7 +224,7 @@ class Parameters:
         self.revision += 1
 
     def repaint(self, scene: Scene) -> None:
-        """Take ``scene``, the same shapes with other paints; stops of shapes that change begin anew. As after
+        """Take ``scene``, the same shapes with other paints; stops of shapes that change start over. As after
         ``rearrange``, launches must be recorded again.
         """
         before = self._scene
@@ -246,13 +249,14 @@ class Parameters:
             group.value.assign(getattr(scene, name).reshape(group.value.shape))
 
     def hold(self, name: str, rows: npt.NDArray[np.bool_]) -> None:
-        """From now on only the other rows of attribute ``name`` are updated; until the next ``rearrange``."""
+        """Hold ``rows`` of attribute ``name`` fixed until the next ``rearrange``."""
         self.groups[name].held.assign(rows.astype(np.int32))
 
     def take_broken(self) -> npt.NDArray[np.bool_]:
-        """Which shapes an update left out since the last call, as a number was not finite, shape (shape,).
+        """Return which shapes an update skipped since the last call because of a non-finite number, shape
+        (shape,).
 
-        Reads a number a shape back from the device.
+        Reads one number per shape back from the device.
         """
         found = self.broken.numpy() != 0
         if found.any():
@@ -260,7 +264,7 @@ class Parameters:
         return np.asarray(found)
 
     def invalid(self) -> npt.NDArray[np.bool_]:
-        """Which shapes have a value or moment that is not finite, shape (shape,). Copies all to the host."""
+        """Return which shapes have a non-finite value or moment, shape (shape,). Copies all to the host."""
         found = np.zeros(self.shape_count, np.bool_)
         for group in self.groups.values():
             finite = [np.isfinite(x.numpy()).all(axis=1) for x in (group.value, group.moment1, group.moment2)]
@@ -268,7 +272,9 @@ class Parameters:
         return found
 
     def reset(self, shapes: npt.NDArray[np.bool_]) -> None:
-        """Give ``shapes`` the values that they had after the last surgery, or at the start, and no past."""
+        """Reset ``shapes`` to their values after the last surgery, or at the start, with age and moments
+        0.
+        """
         for name, group in self.groups.items():
             rows = shapes[group.owner.numpy()]
             first = getattr(self._scene, name).reshape(group.value.shape)
@@ -279,8 +285,8 @@ class Parameters:
     def rearrange(self, keep: IndexArray, added: Scene) -> None:
         """Keep the shapes ``keep`` (in that order) with their moments and ages, put ``added`` in front.
 
-        New shapes start with moments and age 0. Device arrays are made anew, so launches recorded on the
-        old ones must be recorded again: ``revision`` tells.
+        New shapes start with moments and age 0. Device arrays are replaced, so launches recorded on the old
+        ones must be recorded again; ``revision`` counts this.
         """
         before = self.scene()
 
@@ -298,20 +304,20 @@ class Parameters:
 
 
 def _parts(scene: Scene) -> np.ndarray:
-    """Which part of exact coverage each shape belongs to."""
+    """Return which part of exact coverage each shape belongs to."""
     plain = (scene.cap == Cap.ROUND) & (scene.join == Join.ROUND) & (scene.dash == NO_DASHES)
     return np.where((scene.kind == Kind.STROKE) & ~plain, constants.STYLED, scene.kind)
 
 
 def _circular(scene: Scene) -> np.ndarray:
-    """Whether each shape has a radial gradient whose second axis is the first one, turned."""
+    """Return whether each shape has a radial gradient whose second axis is the first one, turned."""
     along, across = scene.frames[:, 2:4], scene.frames[:, 4:]
     turned = np.stack([-along[:, 1], along[:, 0]], axis=1)
     return (scene.paint == Paint.RADIAL) & (across == turned).all(axis=1)
 
 
 def _twins(scene: Scene) -> IndexArray:
-    """For each point the same point of the shape that its shape is the twin of, or NONE."""
+    """Return for each point the same point of the shape that its shape is the twin of, or NONE."""
     owner = np.repeat(np.arange(len(scene)), scene.point_counts())
     behind = np.arange(len(owner)) - scene.point_counts()[owner]
     return np.where(scene.twin[owner] == 1, behind, NONE)

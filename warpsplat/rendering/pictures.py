@@ -18,11 +18,11 @@ from warpsplat.scene import FloatArray, Picture
 TILE = constants.TILE
 
 CLEAR = 1e-4
-"""Opacity below which a colour is not known."""
+"""Opacity below which a colour is unknown."""
 
 
 def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, device: wp.Device) -> dict[str, wp.array]:
-    """What ``kernels.paint.picture`` reads: of each picture the tiles in which something is seen."""
+    """Return the arrays of ``kernels.paint.picture``: the tiles of each picture in which it is visible."""
     boxes, tiles = [], []
     for one in pictures:
         box, shown = _tiles(one, viewport)
@@ -41,7 +41,7 @@ def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, device: wp.D
 
 
 def _tiles(picture: Picture, viewport: Viewport) -> tuple[tuple[int, int, int, int], FloatArray]:
-    """The rectangle of tiles in which a picture is seen, and what is seen there, not premultiplied."""
+    """Return the rectangle of tiles in which a picture is visible, and its straight colours there."""
     top, left = picture.corner
     height, width = picture.pixels.shape[:2]
     size = round(viewport.width / viewport.scale), round(viewport.height / viewport.scale)
@@ -57,7 +57,7 @@ def _tiles(picture: Picture, viewport: Viewport) -> tuple[tuple[int, int, int, i
 
 
 def _reach(left: int, top: int, right: int, bottom: int, viewport: Viewport) -> tuple[int, int, int, int]:
-    """Tiles that a rectangle of the canvas touches; one at the least."""
+    """Return the tiles that a rectangle of the canvas touches; at least one."""
     (x0, x1), (y0, y1) = (
         _range(low * viewport.scale, high * viewport.scale, tiles)
         for low, high, tiles in ((left, right, viewport.tiles_x), (top, bottom, viewport.tiles_y))
@@ -66,6 +66,8 @@ def _reach(left: int, top: int, right: int, bottom: int, viewport: Viewport) -> 
 
 
 def _range(low: float, high: float, tiles: int) -> tuple[int, int]:
-    """The tiles from ``low`` to ``high`` px, and a pixel more that a reduced picture may be blurred by."""
+    """Return the tiles from ``low`` to ``high`` px, with a margin of a pixel for the blur of reduced
+    pictures.
+    """
     first = min(max(int((low - 1) // TILE), 0), tiles - 1)
     return first, min(max(int(-(-(high + 1) // TILE)), first + 1), tiles)

@@ -13,9 +13,9 @@ from typing import Any
 
 import warp as wp
 
+from warpsplat.rendering.device_lock import exclusive
 from warpsplat.rendering.helpers import Request, helpers
 from warpsplat.rendering.kernel_cache import load
-from warpsplat.rendering.turns import undisturbed
 
 PIECES_PER_THREAD = 4
 """A split launch is cut finer than there are threads, so that uneven pieces balance."""
@@ -27,7 +27,7 @@ class Launch:
 
     stage: str
     name: str
-    """Of the kernel or function."""
+    """Name of the kernel or function."""
     pieces: tuple[Callable[[], None], ...]
 
 
@@ -44,7 +44,7 @@ class Program:
         self.device = device
         self.threads = threads
         self.stage = stage
-        """Names what is added from now on, for ``run_timed``."""
+        """Name of the launches that are added from now on, for ``run_timed``."""
         self.launches: list[Launch] = []
         # Recorded launches hold addresses only.
         self._arrays: list[Sequence[Any]] = []
@@ -91,8 +91,8 @@ class Program:
         self.launches.append(Launch(self.stage, kernel.key, tuple(itertools.starmap(replay, commands))))
 
     def rebind(self, name: str, array: wp.array) -> None:
-        """From now on ``array``, of the same type as before, is the parameter ``name`` of all launches that
-        have one. Not kept alive: whoever runs the program does that.
+        """Bind parameter ``name`` of all launches that have it to ``array``, of the same type as before. The
+        caller keeps the array alive.
         """
         value = array.__ctype__()
         for command, packed in self._commands:
@@ -103,7 +103,7 @@ class Program:
                         setattr(packed, name, value)
 
     def memory(self) -> dict[int, int]:
-        """Bytes of the arrays of all launches, by address."""
+        """Return the bytes of the arrays of all launches, by address."""
         arrays = (array for arguments in self._arrays for array in arguments if isinstance(array, wp.array))
         return {array.ptr: array.capacity for array in arrays if array.ptr}
 
@@ -115,7 +115,7 @@ class Program:
         pieces = iter(launch.pieces)
 
         def work() -> None:
-            # Taking from a shared iterator is atomic: who is done with a piece takes the next.
+            # Taking from a shared iterator is atomic: each thread takes the next piece when it is done.
             for piece in pieces:
                 piece()
 
@@ -127,7 +127,7 @@ class Program:
             work()
         finally:  # an interruption must not free arrays that helpers still write
             for request in requests:
-                request.settle()  # on a busy machine many a helper comes too late
+                request.settle()  # on a busy machine helpers may come too late
 
     def run(self) -> None:
         """Replay all launches."""
@@ -148,10 +148,10 @@ class Program:
 
 
 def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
-    """One graph that replays ``programs`` without Python in between; None where that is not possible.
+    """Capture a graph that replays ``programs`` without Python in between; None where that is not possible.
 
-    A CPU graph runs on one thread, so several threads are not given up for it; nor is one made while other
-    threads work (``turns``), whose launches would become part of it. A GPU needs its memory pool,
+    A CPU graph runs on one thread, so it is not used instead of several threads; nor is one captured while
+    other threads work (``device_lock``), whose launches would become part of it. A GPU needs its memory pool,
     as scans and sorts take their scratch memory from it.
     """
     if device.is_cpu:
@@ -159,7 +159,7 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
             return None
     elif not wp.is_mempool_enabled(device):
         return None
-    with undisturbed() as alone:
+    with exclusive() as alone:
         if not alone and device.is_cpu:
             return None
         with wp.ScopedCapture(device) as captured:
@@ -169,7 +169,7 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
 
 
 def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:
-    """A recorded launch whose threads start at ``start``, for a part of what recording it anew would take."""
+    """Return a recorded launch whose threads start at ``start``, in a fraction of the time to record it."""
     command = copy.copy(whole)
     command.params, command.fwd_args = list(whole.params), list(whole.fwd_args or ())
     command.set_dim(shape)
@@ -178,11 +178,11 @@ def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:
 
 
 QUICK_VERSIONS = ("1.19.",)
-"""Of Warp, in which CPU kernels are known to be called as ``replay`` does."""
+"""Versions of Warp whose CPU kernels can be called as ``replay`` does."""
 
 
 def pack(command: wp.Launch) -> ctypes.Structure | None:
-    """The arguments of a launch on a CPU as its kernel takes them; None where that is not known.
+    """Return the arguments of a launch on a CPU as its kernel takes them; None where that is unknown.
 
     Packing takes 7 us a piece, in which it holds the interpreter lock that other threads wait for: up to a
     tenth of a step.
@@ -194,7 +194,7 @@ def pack(command: wp.Launch) -> ctypes.Structure | None:
 
 
 def replay(command: wp.Launch, packed: ctypes.Structure | None) -> Callable[[], None]:
-    """What launches ``command``, with its arguments as ``pack`` has them."""
+    """Return a function that launches ``command`` with the arguments of ``pack``."""
     if packed is None:
         return command.launch
     return functools.partial(command.hooks.forward, ctypes.byref(command.params[0]), ctypes.byref(packed))
@@ -207,7 +207,7 @@ def _layout(fields: tuple[tuple[str, Any], ...]) -> type[ctypes.Structure]:
 
 
 def bind(kernel: wp.Kernel, sources: Sequence[object], values: Mapping[str, Any]) -> list[Any]:
-    """Arguments of ``kernel`` but the first, each found by its name; see ``Program.launch``.
+    """Return the arguments of ``kernel`` but the first, found by name; see ``Program.launch``.
 
     Raises:
         TypeError: a parameter is missing or stands in two sources, or a value is no parameter.
@@ -226,7 +226,7 @@ def bind(kernel: wp.Kernel, sources: Sequence[object], values: Mapping[str, Any]
 
 
 def _lookup(name: str, sources: Sequence[object]) -> list[Any]:
-    """What the sources have under ``name``."""
+    """Return the values of ``name`` in the sources."""
     found = []
     for source in sources:
         if isinstance(source, Mapping):

@@ -14,11 +14,11 @@ from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins
 from warpsplat.rendering.film import Film
+from warpsplat.rendering.memory import check_memory
 from warpsplat.rendering.models import EXACT, Job, Model
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
-from warpsplat.rendering.room import check_room
 from warpsplat.rendering.tiles import from_tiles, to_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
@@ -44,7 +44,7 @@ class Capacity:
 
 
 class Visible(NamedTuple):
-    """What compositing multiplies the shapes' colours with, in the tiles where they are seen."""
+    """Weights with which shapes' colours enter the image, in the tiles where they are visible."""
 
     shape: IntArray
     """Shape (slot,)."""
@@ -62,7 +62,7 @@ class Renderer:
     """Renders ``parameters`` into ``viewport``; and the adjoint.
 
     Nothing is allocated and nothing is copied to the host between ``forward`` and ``backward``. A scene
-    that needs more than the capacity is rendered without the shapes that do not fit; ``make_room`` mends it.
+    that needs more than the capacity is rendered without the shapes that do not fit; ``grow`` fixes that.
     """
 
     def __init__(
@@ -79,18 +79,18 @@ class Renderer:
 
         Args:
             parameters: what is rendered.
-            viewport: the picture.
+            viewport: the image.
             model: of coverage.
-            capacity: without, a guess that ``make_room`` mends.
+            capacity: without, a guess that ``grow`` corrects.
             opaque: whether shapes may have opacities beyond OPACITY_RANGE, and gradients even so.
             straight: whether colours are not premultiplied; on a transparent canvas, with any opacities.
 
         Raises:
-            ResourceError: the picture takes more memory than there is.
+            ResourceError: the image takes more memory than there is.
         """
         self.parameters, self.viewport = parameters, viewport
         self.backend = parameters.backend
-        check_room(viewport, self.backend.device)
+        check_memory(viewport, self.backend.device)
         self.model, self._opaque = model, opaque or straight
         self.film = Film(self.backend, viewport, parameters.canvas, opaque=self._opaque, straight=straight)
         self.needed_samples = self.backend.array(wp.int32, 1)
@@ -105,8 +105,8 @@ class Renderer:
         """Make the stages for ``capacity`` and record their launches."""
         backend, p, v = self.backend, self.parameters, self.viewport
         self.capacity = capacity
-        most = OPACITY_RANGE[1] if self._opaque else 1.0
-        self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, most=most)
+        limit = OPACITY_RANGE[1] if self._opaque else 1.0
+        self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, opacity_limit=limit)
         job = Job(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
         self.geometry, self.coverage = self.model.stages(job)
         self.paint = Painting(backend, p, v, self.bins, capacity.slots)
@@ -116,7 +116,7 @@ class Renderer:
         self._revision = p.revision
 
     def check_current(self) -> None:
-        """Whether the programs are those of the parameters' arrays as they are.
+        """Check that the programs were recorded for the parameters' current arrays.
 
         Raises:
             RuntimeError: surgery has replaced the arrays, whose addresses the recorded launches hold.
@@ -138,7 +138,7 @@ class Renderer:
 
     @property
     def backward_program(self) -> Program:
-        """The adjoint, recorded when it is first asked for: many a renderer only renders."""
+        """The adjoint, recorded when first used: many renderers only render."""
         if self._backward_program is None:
             self._backward_program = self.backend.program("backward")
             self._record_backward(self._backward_program)
@@ -150,7 +150,7 @@ class Renderer:
         self.coverage.backward(program)  # -> samples -> points, widths
 
     def bytes(self) -> int:
-        """Memory of all arrays that the programs work on."""
+        """Return the memory of all arrays that the programs work on [bytes]."""
         return sum((self.forward_program.memory() | self.backward_program.memory()).values())
 
     def forward(self) -> None:
@@ -159,12 +159,12 @@ class Renderer:
         self.forward_program.run()
 
     def backward(self) -> None:
-        """From the film's gradient and the last forward pass to the gradients of the parameters."""
+        """Compute the gradients of the parameters from the film's gradient and the last forward pass."""
         self.check_current()
         self.backward_program.run()
 
     def read_image(self) -> FloatArray:
-        """The image on the host: sRGB in [0, 1], shape (height, width, 3); of a transparent canvas
+        """Return the image on the host: sRGB in [0, 1], shape (height, width, 3); of a transparent canvas
         premultiplied, and opacity: shape (height, width, 4).
         """
         return from_tiles(self.film.buffers.image.numpy(), self.viewport.width, self.viewport.height)
@@ -174,10 +174,11 @@ class Renderer:
         self.film.buffers.image_grad.assign(to_tiles(gradient))
 
     def removal_costs(self, target: wp.array, importance: wp.array | None = None) -> FloatArray:
-        """What the mean squared error against ``target`` would grow by without each shape, after ``forward``.
+        """Return by how much the mean squared error against ``target`` would grow without each shape.
 
         ``target``: tiles as the film's image; ``importance``: weights of the pixels by tiles, without all 1.
-        Shape of the result: (shape,). Allocates and copies to the host: for use between steps.
+        Shape of the result: (shape,). To be called after ``forward``. Allocates and copies to the host: for
+        use between steps.
         """
         cost = self.backend.array(wp.float32, self.capacity.slots, self.backend.lanes)
         program = self.backend.program()
@@ -193,8 +194,8 @@ class Renderer:
         return np.asarray(totals / (3 * self.viewport.pixel_count), np.float32)
 
     def visible(self) -> Visible:
-        """What is seen of each shape, after ``forward``. Allocates and copies to the host: for use between
-        steps.
+        """Return what is visible of each shape, after ``forward``. Allocates and copies to the host: for use
+        between steps.
         """
         seen = self.backend.array(column, self.capacity.slots, constants.TILE)
         program = self.backend.program()
@@ -210,9 +211,9 @@ class Renderer:
             colors = self.paint.buffers.paint_columns.numpy()[rows[colored], :3]
         return Visible(shapes[rows], tiles[rows], shares[rows], colored, colors)
 
-    def make_room(self) -> bool:
-        """Whether the passes since the last call ran out of capacity; if so, the arrays are now larger and
-        the programs others.
+    def grow(self) -> bool:
+        """Enlarge the arrays and record the programs again if a pass since the last call ran out of capacity;
+        return whether it did.
 
         Reads two counters back from the device.
 
@@ -235,30 +236,30 @@ class Renderer:
         self._build(Capacity(max(now.samples, int(GROWTH * samples)), max(now.slots, int(GROWTH * slots))))
         return True
 
-    def room(self) -> tuple[Capacity, Capacity]:
-        """The capacity, and the largest need since it last grew: what a pass leaves out depends on both."""
+    def capacity_and_need(self) -> tuple[Capacity, Capacity]:
+        """Return the capacity, and the largest need since it last grew: a pass depends on both."""
         samples, slots = (int(count.numpy()[0]) for count in (self.needed_samples, self.needed_slots))
         return self.capacity, Capacity(samples, slots)
 
-    def take_room(self, capacity: Capacity, needed: Capacity) -> None:
-        """Go on with the ``room`` of an earlier renderer of the same shapes; the programs are others then."""
+    def restore_capacity(self, capacity: Capacity, needed: Capacity) -> None:
+        """Set ``capacity_and_need`` to that of an earlier renderer of the same shapes; may record again."""
         if capacity != self.capacity:
             self._build(capacity)
         self.needed_samples.fill_(needed.samples)
         self.needed_slots.fill_(needed.slots)
 
     def forward_complete(self) -> bool:
-        """Render, growing until everything fits; whether it had to grow, and so has other programs now."""
+        """Render, growing until everything fits; return whether it grew, and so has other programs now."""
         self.forward()
         grown = False
-        while self.make_room():
+        while self.grow():
             grown = True
             self.forward()
         return grown
 
 
 def _counted(need: int) -> str:
-    """A need as ``kernels.ranges`` leaves it."""
+    """Return a need, as ``kernels.ranges`` counts it, as text."""
     return "over 2 billion" if need == constants.INT_MAX else str(need)
 
 
@@ -280,7 +281,7 @@ def render(
 def render_into(
     scene: Scene, viewport: Viewport, *, model: Model = EXACT, backend: Backend | None = None
 ) -> FloatArray:
-    """As ``render``, at a size in pixels."""
+    """Render as ``render`` does, at a size in pixels."""
     made = Renderer(Parameters(scene, backend or Backend.on()), viewport, model=model)
     made.forward_complete()
     return made.read_image()

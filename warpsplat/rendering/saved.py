@@ -1,4 +1,4 @@
-"""Parameters as named arrays, for files, and back: what comes from a file is checked."""
+"""Parameters as named arrays, for files, and back, with checks."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 def parameter_arrays(parameters: Parameters) -> dict[str, Array]:
-    """The shapes with their moments and ages, and what of them is held."""
+    """Return the shapes with their moments and ages, and which rows are held."""
     arrays = to_arrays(parameters.scene())
     for prefix, moments in zip(MOMENTS, parameters.moments(), strict=True):
         arrays |= {f"{prefix}.{name}": values for name, values in moments.items()}
     arrays |= {f"held.{name}": group.held.numpy() for name, group in parameters.groups.items()}
     arrays["ages"] = parameters.arrays["ages"].numpy()
     if parameters.has_circles:
-        # By the values of now it might be others: surgery alone looks at them.
+        # Computed at surgery only, so these may differ from what the current values would give.
         arrays["circular"] = parameters.arrays["circular"].numpy()
     return arrays
 
 
 def parameters_from(arrays: Mapping[str, Array], like: Scene, backend: Backend) -> Parameters:
-    """The parameters of which ``parameter_arrays`` made ``arrays``; ``like``: see ``from_arrays``.
+    """Restore parameters from ``parameter_arrays``; ``like``: see ``from_arrays``.
 
     Raises:
         ValueError: as ``from_arrays``.
@@ -48,7 +48,7 @@ def parameters_from(arrays: Mapping[str, Array], like: Scene, backend: Backend) 
 
 
 def _rows(arrays: Mapping[str, Array], name: str, count: int, most: int) -> Array:
-    """An array of ``count`` whole numbers from 0 to ``most``."""
+    """Return an array of ``count`` integers from 0 to ``most``, checked."""
     found = typed(arrays, name, np.int32)
     if found.shape != (count,):
         raise ValueError(f"{name} has shape {found.shape}, not ({count},)")
@@ -57,7 +57,7 @@ def _rows(arrays: Mapping[str, Array], name: str, count: int, most: int) -> Arra
 
 
 def _moments(arrays: Mapping[str, Array], scene: Scene) -> Moments:
-    """Adam's moments of the shapes of ``scene``."""
+    """Return Adam's moments of the shapes of ``scene``."""
     found: Moments = ({}, {})
     for prefix, moments, least in zip(MOMENTS, found, (-LARGEST, 0.0), strict=True):
         for attribute in ATTRIBUTES:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpsplat.kernels import corners, stroker
+from warpsplat.kernels import corners
+from warpsplat.kernels.stroker.walk import walk_strokes
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -15,7 +16,7 @@ from warpsplat.rendering.ranges import record_ranges
 
 @dataclass
 class StrokerBuffers:
-    """What the stage owns."""
+    """Arrays that the stage owns."""
 
     corner_count: wp.array = buffer(wp.int32, "shapes")
     corner_ends: wp.array = buffer(wp.int32, "shapes")
@@ -24,17 +25,17 @@ class StrokerBuffers:
     corner_segments: wp.array = buffer(wp.vec2i, "corners")
     """Segments of the centre line that a corner hangs on."""
     corner_place: wp.array = buffer(wp.vec4, "corners")
-    """Where, as ``kernels.corners`` says."""
+    """Position relative to these, see ``kernels.corners``."""
     corner_shape: wp.array = buffer(wp.int32, "corners")
     corner_next: wp.array = buffer(wp.int32, "corners")
     corner: wp.array = buffer(wp.vec2, "corners")
     """[px]"""
     corner_start_grad: wp.array = buffer(wp.vec2, "corners")
-    """Of the first end of the edge that starts at a corner."""
+    """Gradient of the first end of the edge that starts at a corner."""
     corner_end_grad: wp.array = buffer(wp.vec2, "corners")
-    """Of its second end."""
+    """Gradient of its second end."""
     segment_grad: wp.array = buffer(wp.vec3, "corners")
-    """Of the turn and the length of each segment of centre lines, and of the length before it."""
+    """Gradients of the turn and the length of each segment of centre lines, and of the length before it."""
 
 
 class Stroker:
@@ -57,7 +58,7 @@ class Stroker:
         self._sources = (self.buffers, lines, parameters.arrays, viewport)
 
     def edges(self) -> dict[str, wp.array]:
-        """The polygons as the kernels of fills know outlines."""
+        """Return the polygons as the kernels of fills take outlines."""
         b = self.buffers
         return {
             "vertex": b.corner,
@@ -73,7 +74,7 @@ class Stroker:
     def forward(self, program: Program) -> None:
         """Record centre lines, widths -> corners; and how far these reach."""
         b, shapes = self.buffers, self._parameters.shape_count
-        program.launch(stroker.walk_strokes, shapes, *self._sources, write=0, split=True)
+        program.launch(walk_strokes, shapes, *self._sources, write=0, split=True)
         record_ranges(
             program,
             b.corner_count,
@@ -83,7 +84,7 @@ class Stroker:
             self._needed,
             capacity=self._capacity,
         )
-        program.launch(stroker.walk_strokes, shapes, *self._sources, write=1, split=True)
+        program.launch(walk_strokes, shapes, *self._sources, write=1, split=True)
         program.launch(corners.place_corners, self._capacity, *self._sources, split=True)
 
     def backward(self, program: Program) -> None:

@@ -1,4 +1,4 @@
-"""Images <-> tiles as the kernels have them: [tile, channel, column, row], padded to whole tiles."""
+"""Images <-> tiles: [tile, channel, column, row], padded to whole tiles."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ TILE = constants.TILE
 
 
 def tile_counts(width: int, height: int) -> tuple[int, int]:
-    """Tiles in a row and in a column of an image."""
+    """Return the number of tiles in a row and in a column of an image."""
     return -(-width // TILE), -(-height // TILE)
 
 
 def to_tiles(image: FloatArray) -> FloatArray:
-    """Shape (height, width, channels) -> (tiles, channels, TILE, TILE); the padding is 0."""
+    """Convert shape (height, width, channels) to (tiles, channels, TILE, TILE); the padding is 0."""
     height, width, channels = image.shape
     across, down = tile_counts(width, height)
     padded = np.zeros((down * TILE, across * TILE, channels), np.float32)
@@ -26,7 +26,7 @@ def to_tiles(image: FloatArray) -> FloatArray:
 
 
 def from_tiles(tiles: FloatArray, width: int, height: int) -> FloatArray:
-    """The inverse of ``to_tiles``."""
+    """Convert back: the inverse of ``to_tiles``."""
     across, down = tile_counts(width, height)
     channels = tiles.shape[1]
     blocks = tiles.reshape(down, across, channels, TILE, TILE).transpose(0, 4, 1, 3, 2)

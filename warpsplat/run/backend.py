@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from warpsplat.errors import UsageError, shown
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.turns import turn
+from warpsplat.rendering.device_lock import device_lock
 
 
 @contextmanager
@@ -22,5 +22,5 @@ def backend_on(device: str, threads: int | None) -> Iterator[Backend]:
         raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
     start_warp()
     backend = Backend.on(choose_device(device), threads)
-    with turn(backend.device):
+    with device_lock(backend.device):
         yield backend

@@ -18,7 +18,7 @@ from warpsplat.files.sources import ImageSource
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
 from warpsplat.native import machine_memory
-from warpsplat.rendering.room import SHARE, in_words
+from warpsplat.rendering.memory import SHARE, in_words
 from warpsplat.scene import Kind
 from warpsplat.svg.strips import WHOLE_PIXELS
 

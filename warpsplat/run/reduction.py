@@ -13,7 +13,7 @@ from warpsplat.fit.loop import Fit
 from warpsplat.fit.options import limits_of
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import Rows, Score, score_svg
-from warpsplat.rendering.room import in_words
+from warpsplat.rendering.memory import in_words
 from warpsplat.run.memory import (
     factor_for,
     facts_of,

@@ -13,9 +13,9 @@ from PIL import Image
 from warpsplat.errors import ImageError, UsageError, shown
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.renderer import render as render_scene
 from warpsplat.rendering.renderer import render_into
-from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.run.backend import backend_on
 from warpsplat.run.svg import SvgSource, save_svg, svg_name_of, text_of
 from warpsplat.scene import FloatArray, Scene

@@ -15,14 +15,14 @@ import warp as wp
 
 from warpsplat.errors import UsageError
 from warpsplat.kernels import constants, pixels
+from warpsplat.rendering import memory
 from warpsplat.rendering.backend import Backend, Viewport, view
 from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.device_lock import device_lock
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Renderer
-from warpsplat.rendering.room import check_room
-from warpsplat.rendering.turns import turn
 from warpsplat.scene import TRAITS, Scene
 from warpsplat.torch.tensors import attributes_of
 
@@ -119,7 +119,7 @@ class Engine:
             if name in VALID:
                 own.clamp_(*VALID[name])
         self._replay(self._renderer.forward_program)
-        if self._renderer.make_room():
+        if self._renderer.grow():
             self._graphs.clear()
             self._renderer.forward_complete()
             self.bytes = self._renderer.bytes()
@@ -205,14 +205,14 @@ def check_memory(spec: RenderSpec, count: int = 1) -> None:
         UsageError: the device is neither a CPU nor CUDA.
         ResourceError: there is not enough.
     """
-    check_room(spec.viewport, _warp_device(spec.device), count)
+    memory.check_memory(spec.viewport, _warp_device(spec.device), count)
 
 
 @contextlib.contextmanager
 def engine_of(spec: RenderSpec) -> Iterator[Engine]:
     """Yield the engine of ``spec``, for this thread alone and on torch's current stream."""
     device = _warp_device(spec.device)
-    with turn(device), _on_stream(spec.device):
+    with device_lock(device), _on_stream(spec.device):
         engine = ENGINES.get(spec)
         with engine.lock:
             engine.follow(spec.device)

@@ -12,8 +12,8 @@ from torch.autograd.function import once_differentiable
 from warpsplat.errors import UsageError, shown
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.models import Model
-from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import RenderSpec, check_memory, engine_of

@@ -24,7 +24,7 @@ def test_loss_and_gradient_on_black_and_on_white(device: str) -> None:
     }
     arrays["importance"] = wp.array(to_tiles(weights)[:, 0], dtype=column, device=device)
     tiles = arrays["image"].shape[0]
-    arrays["tile_still"] = wp.zeros(tiles, dtype=int, device=device)
+    arrays["tile_cache"] = wp.zeros(tiles, dtype=int, device=device)
     arrays["loss"] = wp.zeros((tiles, 3), dtype=float, device=device)
     run(alpha_loss, tiles, device, arrays, value_count=3 * height * width)
 

@@ -43,7 +43,7 @@ class Launched:
             "target": target,
             "importance": wp.array(to_tiles(given[..., None])[:, 0], dtype=column, device=device),
             "weighted": weights is not None,
-            "tile_still": wp.zeros(TILE_COUNT, dtype=int, device=device),
+            "tile_cache": wp.zeros(TILE_COUNT, dtype=int, device=device),
             "width": WIDTH,
             "height": HEIGHT,
             "tiles_x": TILES_X,

@@ -19,7 +19,7 @@ from warpsplat.fit.progress import Progress
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.turns import turn
+from warpsplat.rendering.device_lock import device_lock
 from warpsplat.run.command_line import vectorize_command
 from warpsplat.run.formats import named_bytes, write_named
 from warpsplat.run.keys import STOPPED, job_key
@@ -78,7 +78,7 @@ def _made(task: Task, key: str, image: bytes, stop: Stop | None, on_progress: On
     backend = Backend.on(choose_device(task.device), task.threads)
     if not task.bring:
         make_folder(output.parent)
-    with turn(backend.device):
+    with device_lock(backend.device):
         prepared = prepare(image, task.settings, name=task.name, importance=task.mask, keyed=True)
         write = None if task.bring else partial(write_named, output)
         result = make_result(prepared, Run(backend, on_progress, stop), write)
@@ -105,7 +105,7 @@ def _measured(task: Task, key: str, image: bytes) -> Outcome:
         figures = task.report.figures or score.as_dict()
         start_warp()
         backend = Backend.on(choose_device(task.device), task.threads)
-        with turn(backend.device):
+        with device_lock(backend.device):
             made = _with_report(task, image, svg_text(data, task.output), figures, backend)
     return replace(made, key=key, digest=digest(data), figures=score.as_dict())
 

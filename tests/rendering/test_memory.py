@@ -9,7 +9,7 @@ import pytest
 import warpsplat
 from tests.scenes import random_scene
 from warpsplat.errors import ResourceError, UsageError
-from warpsplat.rendering import backend, room
+from warpsplat.rendering import backend, memory
 from warpsplat.scene import Kind
 
 SCENE = random_scene(Kind.FILL, width=40, height=40)
@@ -49,7 +49,7 @@ WAYS: dict[str, Callable[[int], object]] = {
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("side", [30_000, 200_000])
 def test_what_no_memory_holds(way: str, side: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, "machine_memory", lambda: 8 * 10**9)
+    monkeypatch.setattr(memory, "machine_memory", lambda: 8 * 10**9)
     made: list[int] = []
     array = backend.Backend.array
 
@@ -64,7 +64,7 @@ def test_what_no_memory_holds(way: str, side: int, monkeypatch: pytest.MonkeyPat
 
 
 def test_what_is_small_is_drawn_without_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, "machine_memory", lambda: pytest.fail("asked"))
+    monkeypatch.setattr(memory, "machine_memory", lambda: pytest.fail("asked"))
     assert warpsplat.render(SCENE, 80, device="cpu").shape == (80, 80, 4)
 
 

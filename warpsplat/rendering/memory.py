@@ -1,4 +1,4 @@
-"""Whether a device has the memory for a picture, said before anything is allocated for it."""
+"""Whether a device has the memory for an image, checked before anything is allocated for it."""
 
 from __future__ import annotations
 
@@ -12,23 +12,27 @@ SHARE = 0.9
 """Share of a machine's memory that may be taken, as other programs need some."""
 
 MOST_SIDE = (1 << 31) - 1
-"""Largest side of a picture [px]: kernels count in 32 bits."""
+"""Largest side of an image [px]: kernels count in 32 bits."""
 
-PIXEL = 48
-"""Bytes for each pixel, as measured: the film and its gradient, a slot of each tile, the picture itself."""
+DRAWN_BYTES = 48
+"""Memory for each pixel of an image that is drawn, as measured: the film and its gradient, a slot of each
+tile, the finished image."""
 
-SMALL = 1 << 28
-"""Bytes that are not asked for: asking how many there are takes longer than many a picture."""
+FINISHED_BYTES = 16
+"""Memory for each pixel of a finished image: four channels."""
+
+UNCHECKED = 1 << 28
+"""Bytes that are always allowed: asking how many there are takes longer than drawing many an image."""
 
 
-def check_room(viewport: Viewport, device: wp.Device, count: int = 1) -> None:
-    """Whether there is memory for ``count`` pictures, of which one is drawn at a time.
+def check_memory(viewport: Viewport, device: wp.Device, count: int = 1) -> None:
+    """Check that there is memory for ``count`` images, of which one is drawn at a time.
 
     Raises:
         ResourceError: there is not.
     """
-    wanted = (PIXEL + PICTURE * (count - 1)) * viewport.pixel_count
-    if wanted <= SMALL:
+    wanted = (DRAWN_BYTES + FINISHED_BYTES * (count - 1)) * viewport.pixel_count
+    if wanted <= UNCHECKED:
         return
     there = machine_memory() if device.is_cpu else device.total_memory
     limit = None if there is None else round(SHARE * there)
@@ -40,11 +44,7 @@ def check_room(viewport: Viewport, device: wp.Device, count: int = 1) -> None:
         )
 
 
-PICTURE = 16
-"""Bytes for each pixel of a finished picture: four channels."""
-
-
 def in_words(size: int) -> str:
-    """Bytes, for people."""
+    """Return a number of bytes as text for people."""
     size = min(size, 10**300)  # what floats hold
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
