@@ -10,31 +10,22 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from tests.files.profiles import (
-    DISPLAY_P3,
-    SRGB,
-    cmyk_profile,
-    encoded,
-    grey_profile,
-    linear,
-    rgb_profile,
-)
+from tests.files.profiles import DISPLAY_P3, SRGB, cmyk_profile, encoded, grey_profile, linear, rgb_profile
+from tests.fuzz import corpus
 from warpsplat.files.image import load_image
 from warpsplat.files.profile import profile_of
 from warpsplat.files.sources import image_of
 
 COLORS = np.random.default_rng(0).integers(60, 200, (8, 9, 3)).astype(np.uint8)
-"""Inside of what a screen shows."""
+"""Colours that a screen can show."""
 
 
 def saved(image: Image.Image, profile: bytes, form: str = "PNG", **options: Any) -> bytes:
-    data = io.BytesIO()
-    image.save(data, form, icc_profile=profile, **options)
-    return data.getvalue()
+    return corpus.saved(image, form, icc_profile=profile, **options)
 
 
 def as_srgb(colors: np.ndarray) -> np.ndarray:
-    """Display P3 as sRGB, by its definition."""
+    """Return Display P3 as sRGB, by its definition."""
     change = np.array(DISPLAY_P3) @ np.linalg.inv(np.array(SRGB))
     return encoded(linear(colors / 255) @ change)
 
@@ -45,7 +36,7 @@ def test_a_screen_with_more_colours(form: str) -> None:
     data = saved(Image.fromarray(COLORS), rgb_profile(DISPLAY_P3), form, **options)
     found = load_image(data)
     assert np.abs(found - as_srgb(COLORS)).max() < 1.5 / 255
-    assert np.abs(found - COLORS / 255).max() > 10 / 255, "another picture than without"
+    assert np.abs(found - COLORS / 255).max() > 10 / 255, "the profile makes a difference"
     with Image.open(io.BytesIO(data)) as opened:
         np.testing.assert_array_equal(image_of(opened), found)
 

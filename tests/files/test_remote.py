@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import run
+from tests.fuzz.corpus import saved
 from warpsplat.errors import ImageError, OutputError, UsageError
 from warpsplat.files import remote as module
 from warpsplat.files.inputs import read_input
@@ -28,10 +28,8 @@ EFFORT = ("--curves", "4", "--iterations", "4", "--quality", "draft", "--workers
 
 
 def png(seed: int) -> bytes:
-    file = io.BytesIO()
     pixels = np.random.default_rng(seed).integers(0, 255, (24, 32, 3), dtype=np.uint8)
-    Image.fromarray(pixels).save(file, "png")
-    return file.getvalue()
+    return saved(Image.fromarray(pixels), "PNG")
 
 
 @pytest.fixture
@@ -51,12 +49,11 @@ def names(found: list[Path]) -> list[str]:
     return [str(path).removeprefix("memory://bucket/") for path in found]
 
 
-def test_what_is_a_url() -> None:
-    assert is_url("s3://bucket/a.png")
-    assert is_url("https://host/a.png?x=1")
-    assert not is_url("C:/a.png")
-    assert not is_url("a/b.png")
-    assert not is_url("./s3://x")
+def test_urls() -> None:
+    assert all(map(is_url, ("s3://bucket/a.png", "https://host/a.png?x=1")))
+    assert not any(map(is_url, ("C:/a.png", "a/b.png", "./s3://x")))
+    with pytest.raises(UsageError, match="nope://a/b"):
+        remote("nope://a/b")
 
 
 @pytest.mark.usefixtures("store")
@@ -102,19 +99,18 @@ def test_reads_and_writes() -> None:
 
 def test_a_store_that_refuses_is_one_line(store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     class RefusalError(Exception):
-        """As boto's, which derive from nothing that the system raises."""
+        """An error like boto's, which derive from no OSError."""
 
     def refuse(*given: Any, **named: Any) -> Any:
         raise RefusalError("Access Denied\nand much more")
 
     path = remote("memory://bucket/in/a.png")
     monkeypatch.setattr(type(store), "pipe_file", refuse)
-    with pytest.raises(
-        OutputError, match=r"^memory://bucket/in/a\.png: could not be written: Access Denied$"
-    ):
+    name = r"^memory://bucket/in/a\.png"
+    with pytest.raises(OutputError, match=name + ": could not be written: Access Denied$"):
         write_result(path, b"")
     monkeypatch.setattr(type(store), "open", refuse)
-    with pytest.raises(ImageError, match=r"^memory://bucket/in/a\.png: cannot be read: Access Denied$"):
+    with pytest.raises(ImageError, match=name + ": cannot be read: Access Denied$"):
         read_input(path)
     monkeypatch.setattr(type(store), "ls", refuse)
     with pytest.raises(OutputError, match="cannot be listed: Access Denied"):
@@ -138,11 +134,6 @@ def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "upath", None)
     with pytest.raises(UsageError, match=r'pip install "warpsplat\[remote\]"'):
         remote("memory://bucket/a.png")
-
-
-def test_an_unknown_protocol() -> None:
-    with pytest.raises(UsageError, match="nope://a/b"):
-        remote("nope://a/b")
 
 
 def batch(*given: str) -> int:
