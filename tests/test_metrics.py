@@ -199,7 +199,7 @@ def test_memory_of_a_score_is_bounded() -> None:
 
 
 def test_ssimulacra2_is_that_of_the_package(tmp_path: Path) -> None:
-    """Of files, as its own command takes them: the SVG drawn by resvg on white, and the image."""
+    """For files, which its own command takes: the SVG rendered on white, and the image."""
     package = pytest.importorskip("ssimulacra2")
     shape = '<circle cx="40" cy="30" r="25" fill="#c52" fill-opacity=".7"/>'
     text = f'<svg xmlns="http://www.w3.org/2000/svg" width="80" height="60">{shape}</svg>'

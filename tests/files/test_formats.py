@@ -68,7 +68,7 @@ def test_postscript_is_run_by_nothing_that_reads_images(
     assert programs == []
 
 
-def test_every_format_of_pillows_is_decided_on() -> None:
+def test_every_format_of_pillow_is_accounted_for() -> None:
     """A format that a later Pillow adds is not read, and fails here."""
     Image.init()
     assert not PIXELS & REFUSED

@@ -137,7 +137,7 @@ def test_transparent_grey_of_any_depth(depth: int) -> None:
     np.testing.assert_allclose(pixels, np.repeat(want, 3, axis=2), atol=1e-6)
 
 
-def test_transparent_colour_of_16_bits_counts_all_of_them() -> None:
+def test_transparent_colour_of_16_bits_is_compared_exactly() -> None:
     samples = np.tile(np.array([0x1234, 0x5678, 0x9ABC]), (4, 6, 1))
     samples[:, 3:] += 1  # alike in the upper bytes
     pixels = load_image(png(2, 16, samples, [0x1234, 0x5678, 0x9ABC]))

@@ -62,7 +62,7 @@ def test_failures_leave_the_old_file(
     assert os.listdir(tmp_path) == ["a.svg"]
 
 
-def test_outputs_that_cannot_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_impossible_outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(UsageError, match="does not exist"):
         check_output(tmp_path / "missing" / "a.svg")
@@ -106,7 +106,7 @@ def test_the_umask_of_the_process_is_left_alone(tmp_path: Path, monkeypatch: pyt
     assert stat.S_IMODE((tmp_path / "a.svg").stat().st_mode) == 0o640
 
 
-def test_links_that_lead_nowhere(tmp_path: Path) -> None:
+def test_broken_links(tmp_path: Path) -> None:
     (tmp_path / "one.svg").symlink_to(tmp_path / "two.svg")
     (tmp_path / "two.svg").symlink_to(tmp_path / "one.svg")
     with pytest.raises(UsageError, match="loop of links"):
@@ -121,7 +121,7 @@ def test_links_that_lead_nowhere(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
-def test_names_that_cannot_be_files(tmp_path: Path) -> None:
+def test_impossible_names(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.svg")
     with pytest.raises(UsageError, match="pipe"):
         check_output(tmp_path / "pipe.svg", overwrite=False)
@@ -154,7 +154,7 @@ def test_files_that_may_be_replaced(tmp_path: Path) -> None:
         assert marked.info["Software"] == "warpsplat"
 
 
-def test_only_the_temporary_files_of_the_dead_are_removed(tmp_path: Path) -> None:
+def test_only_temporary_files_of_dead_runs_are_removed(tmp_path: Path) -> None:
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
     here = files._machine()

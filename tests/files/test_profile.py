@@ -49,7 +49,7 @@ def test_opacity_stays() -> None:
     assert np.abs(found[..., :3] - as_srgb(COLORS) * opacity / 255).max() < 1.5 / 255
 
 
-def test_palettes_have_them_as_well() -> None:
+def test_profiles_of_palettes() -> None:
     image = Image.fromarray(COLORS).quantize(8)
     found = load_image(saved(image, rgb_profile(DISPLAY_P3)))
     assert np.abs(found - as_srgb(np.asarray(image.convert("RGB")))).max() < 1.5 / 255
@@ -87,7 +87,7 @@ def test_inks_of_a_printer() -> None:
     ("profile", "words"),
     [(b"no profile", ""), (rgb_profile(DISPLAY_P3)[:300], ""), (grey_profile(2.0), "it is of GRAY colours")],
 )
-def test_what_is_no_profile_is_ignored_in_one_line(
+def test_invalid_profiles_are_ignored_with_one_line(
     profile: bytes, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING):
@@ -98,5 +98,5 @@ def test_what_is_no_profile_is_ignored_in_one_line(
     assert "\n" not in message
 
 
-def test_without_one_there_is_nothing_to_do() -> None:
+def test_no_profile() -> None:
     assert profile_of(Image.fromarray(COLORS)) is None

@@ -117,7 +117,7 @@ def test_a_store_that_refuses_is_one_line(store: Any, monkeypatch: pytest.Monkey
         listed(path)
 
 
-def test_renames_where_files_can_be_seen_half_written(store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_writes_atomically_where_the_store_does_not(store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "WHOLE", ())
     path = remote("memory://bucket/new/a.svg")
     write_result(path, b"one")
@@ -174,7 +174,7 @@ def test_the_bytes_of_a_local_batch(store: Any, tmp_path: Path) -> None:
     assert (tmp_path / "there/a.svg").read_bytes() == wanted
 
 
-def test_what_others_wrote_stays(store: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_of_others_are_not_replaced(store: Any, capsys: pytest.CaptureFixture[str]) -> None:
     store.pipe_file("/bucket/out/a.svg", b"<svg>mine</svg>")
     assert batch("memory://bucket/in/a.png", "-o", "memory://bucket/out") == 2
     assert "memory://bucket/out/a.svg" in capsys.readouterr().err
@@ -182,7 +182,7 @@ def test_what_others_wrote_stays(store: Any, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.usefixtures("store")
-def test_shards_share_the_images_out() -> None:
+def test_shards_partition_the_images() -> None:
     jobs = plan_jobs(["memory://bucket/**/*.png", "memory://bucket/in/b.PNG"])
     parts = [[job for job in jobs if in_shard(job, Path(), i, 3)] for i in (1, 2, 3)]
     assert sum(map(len, parts)) == len(jobs) == 3

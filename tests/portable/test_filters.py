@@ -36,7 +36,7 @@ def test_resized_as_by_opencv(name: str, size: tuple[int, int], by: str) -> None
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", IMAGES)
 def test_areas_as_by_opencv(name: str, size: tuple[int, int]) -> None:
-    """By sides: where one of them grows OpenCV samples the other one."""
+    """One side at a time: where one grows, OpenCV samples the other."""
     image = IMAGES[name]
     down = cv2.resize(image, (image.shape[1], size[1]), interpolation=cv2.INTER_AREA)
     down = down.reshape(size[1], *image.shape[1:])
@@ -161,7 +161,7 @@ def test_bands_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(np.array_equal(a, b) for a, b in zip(whole, made(), strict=True))
 
 
-def test_the_same_bits_as_ever() -> None:
+def test_pinned_bits() -> None:
     image = IMAGES["40x53x3"]
     made = [
         filters.resize_area(image, (17, 13)),

@@ -111,7 +111,7 @@ def test_convolution() -> None:
     assert np.allclose(convolve(signal, kernel), np.convolve(signal, kernel, "valid"))
 
 
-def test_the_same_bits_as_ever() -> None:
+def test_pinned_bits() -> None:
     made = [
         linear.product(STACK, STACK),
         linear.product(TALL.reshape(-1, 126), TALL.reshape(126, -1)),

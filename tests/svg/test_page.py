@@ -60,7 +60,7 @@ def test_a_picture_is_in_the_middle_of_its_sheet() -> None:
     assert head(placed(picture(), "", "", "mm")) == ("15.875mm", "10.583mm", "0 0 300 200")
 
 
-def test_a_viewer_shows_it_there() -> None:
+def test_a_viewer_shows_it_in_the_middle() -> None:
     sheet = Sheet(25.4, 25.4)  # 96 px
     shown = np.asarray(render_svg(on_sheet(picture(), sheet)).convert("RGBA"))[..., 3] > 128
     rows, columns = np.nonzero(shown)

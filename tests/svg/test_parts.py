@@ -48,7 +48,7 @@ HOLES = [square(x + 2, y + 2, 4) for y in (2, 14, 26) for x in (2, 14, 26, 38)]
 
 
 @pytest.mark.parametrize("most", [8, 16, 40])
-def test_parts_show_the_same_and_are_small(most: int) -> None:
+def test_parts_look_the_same_and_are_small(most: int) -> None:
     scene = squares([*GRID, *HOLES])
     made = in_parts(scene, most)
     contours = np.diff(np.searchsorted(made.starts, made.first))

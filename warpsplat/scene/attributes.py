@@ -16,7 +16,7 @@ from warpsplat.kernels import constants
 
 
 class Kind(IntEnum):
-    """How a path is painted."""
+    """Fill or stroke."""
 
     FILL = constants.FILL
     """Painted inside its contours; open ones are closed by a straight line."""

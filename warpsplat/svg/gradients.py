@@ -173,7 +173,7 @@ PLACES = {"x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "fr"}
 
 
 class _Chain(NamedTuple):
-    """What a gradient and those that it links to, directly or not, have."""
+    """The stops and attributes of a gradient and of those that it links to, directly or not."""
 
     stops: Element | None
     """The first gradient with stops; None: there is none before an element that is no gradient."""

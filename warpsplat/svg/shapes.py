@@ -29,7 +29,7 @@ MAX_EXTENT = 1e5
 
 @dataclass(frozen=True)
 class Line:
-    """How a stroke is drawn, in canvas units."""
+    """Geometry of a stroke, in canvas units."""
 
     width: float
     cap: Cap

@@ -75,7 +75,7 @@ class _Unit:
 
 @dataclass(frozen=True)
 class _Context:
-    """What an element inherits."""
+    """Properties that an element inherits."""
 
     style: Style
     """Its parent's."""
@@ -129,8 +129,8 @@ def read_parts(
 ) -> tuple[list[Part], Document]:
     """Return the shapes as ``read_shapes``, and the document.
 
-    ``keep``: elements that ``read_shapes`` refuses are parts as well; it refuses only what the root or style
-    sheets say.
+    ``keep``: elements that ``read_shapes`` refuses are parts as well; only the root and style sheets may be
+    refused.
     """
     root = inspect_svg(text).root
     try:
@@ -148,7 +148,7 @@ def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) 
     """Return the map of user units to canvas units, and the viewport."""
     size = svg_size(root)
     if size is None:
-        raise ImageError("says neither its size nor a viewBox")
+        raise ImageError("has neither its size nor a viewBox")
     if scale is None and abs(size[0] / size[1] - width / height) > 0.02 * width / height:
         raise ImageError(
             f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
