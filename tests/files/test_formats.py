@@ -16,7 +16,7 @@ from tests import ROOT
 from tests.cli.helpers import one_line, run
 from warpsplat.errors import ExitCode, ImageError
 from warpsplat.files.image import FORMATS, image_facts, load_image
-from warpsplat.files.importance import load_importance
+from warpsplat.files.sources import load_importance
 from warpsplat.jobs.batch.images import ENDINGS
 from warpsplat.serve.pictures import read_picture
 

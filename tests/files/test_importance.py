@@ -6,7 +6,7 @@ from PIL import Image
 
 from tests.fuzz.corpus import saved
 from warpsplat.errors import ImageError
-from warpsplat.files.importance import load_importance
+from warpsplat.files.sources import load_importance
 
 
 def png(pixels: np.ndarray) -> bytes:

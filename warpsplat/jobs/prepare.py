@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.files.importance import load_importance
-from warpsplat.files.sources import ImageSource, held, image_of, source_name
+from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.jobs.keys import job_key
 from warpsplat.jobs.reduction import Memory, Reduction
