@@ -13,7 +13,7 @@ import torch
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
 from warpsplat.pydiffvg.shape import Circle, Ellipse, Path, Polygon, Rect, Shape, ShapeGroup
-from warpsplat.svg.shapes import Line
+from warpsplat.svg.shapes import LineStyle
 
 Tensor = torch.Tensor
 
@@ -54,7 +54,7 @@ class Plan(NamedTuple):
     """Whether its map has one scale in all directions."""
     one_width: bool
     """Whether all its shapes have one and the same tensor as width."""
-    line: Line | None
+    line: LineStyle | None
     is_mapped: bool
     """Whether its map changes anything."""
 

@@ -23,11 +23,11 @@ from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
 from warpsplat.pydiffvg.tuned import Tuned, TunedGradient, optimizer_of
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import outline, parse_transform, view_box_map
-from warpsplat.svg.gradients import Flat, Gradient, resolve_paint
+from warpsplat.svg.gradients import FlatColor, Gradient, resolve_paint
 from warpsplat.svg.inspect import NAMESPACE, inspect_svg, read_svg_text, svg_size, view_box
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.style import DRAWN
-from warpsplat.svg.values import Viewport, fraction, length
+from warpsplat.svg.values import SvgViewport, fraction, length
 
 Tensor = torch.Tensor
 Store = dict[str, Any]
@@ -159,7 +159,7 @@ class _Node:
         text = self.style[name]
         eye = torch.eye(3).numpy()
         paint = resolve_paint(text, self.style, svg.document, svg.viewport, subpaths, eye)
-        if isinstance(paint, Flat):
+        if isinstance(paint, FlatColor):
             color = torch.tensor(paint.color, device=svg.device)
             wanted = self.settings["optimize_color"]
             color.requires_grad_(wanted)
@@ -264,7 +264,7 @@ class OptimizableSvg:
             self.document = Document(text)
             self.canvas = tuple(math.ceil(side) for side in size)
             box = view_box(root)
-            self.viewport = Viewport(*(box[2:] if box else size))
+            self.viewport = SvgViewport(*(box[2:] if box else size))
             view = view_box_map(root, *size)
             self._view = torch.eye(3) if view is None else torch.tensor(view).float()
             self.settings.global_override(["transforms", "translation_mult"], max(self.canvas))
