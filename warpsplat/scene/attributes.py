@@ -78,6 +78,10 @@ class Spread(IntEnum):
     REPEAT = constants.REPEAT
 
 
+CHOICES = (Kind, Basis, Rule, Cap, Join, Paint, Spread)
+"""The types of traits; the fields of ``Scene`` have their names in lower case."""
+
+
 class Unit(Enum):
     """Units of numbers in the table."""
 
