@@ -68,7 +68,7 @@ def test_grey_and_bits_are_images(device: str) -> None:
         (np.full((4, 5, 3), np.nan), "60 of 60 values"),
         (np.zeros((1, 5, 3), np.uint8), "5x1 pixels"),
         (b"not an image", "not an image"),
-        (io.BytesIO(b""), "nothing came"),
+        (io.BytesIO(b""), "is empty"),
         ("missing.png", "missing.png: no such file"),
     ],
 )

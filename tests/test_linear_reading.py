@@ -1,6 +1,6 @@
-"""Long rows of one character: texts that a pattern with several ways to match takes minutes for.
+"""Long rows of one character: texts for which a pattern that backtracks takes minutes.
 
-Nothing is timed: what is not linear would take from half an hour to a day.
+Nothing is timed: if reading were not linear, a test would take from half an hour to a day.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ def test_spaces_anywhere_in_a_file(tmp_path: Path, start: str) -> None:
     [f'viewBox="0 0 32 {DIGITS}e"', f'viewBox="{DIGITS}e"', f'viewBox="0{SPACES},{SPACES}x"'],
     ids=["a view box", "its first number", "its spaces"],
 )
-def test_a_view_box_that_is_none(attributes: str) -> None:
+def test_invalid_view_boxes(attributes: str) -> None:
     assert svg_size(inspect_svg(f"{HEAD}{attributes}>{TRIANGLE}").root) == (32, 24)
 
 
-def test_a_length_that_is_none() -> None:
+def test_an_invalid_length() -> None:
     assert svg_size({"width": f"{DIGITS}x", "height": "24"}) is None
 
 
 @pytest.mark.parametrize("attribute", ["opacity", "stroke-width", "stroke-miterlimit"])
-def test_what_is_no_number_counts_as_not_said(attribute: str) -> None:
+def test_invalid_numbers_are_ignored(attribute: str) -> None:
     path = '<path stroke="red" d="M0 0h9v9z"'
     plain, odd = (
         load_scene(f"{HEAD}>{path}{more}/></svg>", 32, 24, "a.svg")[0]
@@ -65,7 +65,7 @@ def test_what_is_no_number_counts_as_not_said(attribute: str) -> None:
     ],
     ids=["colour", "transform", "data", "radius", "points"],
 )
-def test_numbers_that_are_none(shape: str) -> None:
+def test_invalid_numbers_are_refused(shape: str) -> None:
     with pytest.raises(ImageError):
         load_scene(f"{HEAD}>{shape}</svg>", 32, 24, "a.svg")
 
@@ -84,7 +84,7 @@ def test_links_that_do_not_end() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sheet", "said"),
+    ("sheet", "message"),
     [
         ("a" * LONG, None),
         (LONG // 2 * "}a", None),
@@ -95,17 +95,17 @@ def test_links_that_do_not_end() -> None:
     ],
     ids=["no brace", "braces that close", "tags", "at-rules", "one", "selector"],
 )
-def test_style_sheets_that_are_none(sheet: str, said: str | None) -> None:
+def test_invalid_style_sheets(sheet: str, message: str | None) -> None:
     body = f"<style>{sheet}</style>{TRIANGLE.removesuffix('</svg>')}"
-    if said is None:
+    if message is None:
         assert shapes(body) == 1
         return
-    with pytest.raises(ImageError, match=said):
+    with pytest.raises(ImageError, match=message):
         shapes(body)
 
 
 def gradients(count: int, last: str) -> str:
-    """One that takes over from the next, and so on; the shapes are filled with them."""
+    """Return a chain of gradients that inherit from the next, and shapes filled with them."""
     chain = "".join(f'<linearGradient id="g{i}" href="#g{i + 1}"/>' for i in range(count))
     ramp = f'<linearGradient id="g{count}"{last}><stop stop-color="red"/><stop offset="1"/></linearGradient>'
     return chain + ramp + "".join(f'<path fill="url(#g{i})" d="M0 0h9v9z"/>' for i in range(count))
@@ -113,20 +113,20 @@ def gradients(count: int, last: str) -> str:
 
 @pytest.mark.parametrize("last", ["", ' href="#g0"'], ids=["chain", "ring"])
 def test_gradients_that_refer_to_one_another(last: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each is looked at once, or twice in a ring, however many shapes there are."""
-    looks = []
+    """Each is visited once, or twice in a ring, however many shapes there are."""
+    visited = []
     linked = Document.linked
 
     def counted(document: Document, element: Element) -> Element | None:
-        looks.append(element)
+        visited.append(element)
         return linked(document, element)
 
     monkeypatch.setattr(Document, "linked", counted)
     assert shapes(gradients(300, last)) == 300
-    assert len(looks) <= 301
+    assert len(visited) <= 301
 
 
-def test_gradients_in_a_ring_take_over_from_all_of_it() -> None:
+def test_gradients_in_a_ring_inherit_from_each_other() -> None:
     body = (
         '<linearGradient id="a" href="#b" x1="1"/><linearGradient id="b" href="#c" x1="2" x2="7"/>'
         '<linearGradient id="c" href="#a" gradientUnits="userSpaceOnUse" x2="9">'
@@ -143,7 +143,7 @@ CLIP = '<clipPath id="c"><rect width="30" height="20"/></clipPath>'
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("body", "message"),
     [
         ("<style>" + 5000 * "g.a{fill:red}" + "</style>" + 5000 * '<g class="a"/>', "too many rules"),
         ("<style>" + 5000 * "[id~=x]{fill:red}" + f'</style><g id="{LONG * "x "}"/>', "too many rules"),
@@ -169,8 +169,8 @@ CLIP = '<clipPath id="c"><rect width="30" height="20"/></clipPath>'
     ],
     ids=["rules", "words", "dashes", "inherited", "linked data", "links", "stops", "transform"],
 )
-def test_what_multiplies_is_refused(body: str, said: str) -> None:
-    with pytest.raises(ImageError, match=said):
+def test_multiplication_is_refused(body: str, message: str) -> None:
+    with pytest.raises(ImageError, match=message):
         shapes(body)
 
 
@@ -192,5 +192,5 @@ def test_groups_that_clip_in_one_another(monkeypatch: pytest.MonkeyPatch) -> Non
     ],
     ids=["tag", "link", "reference", "sheet"],
 )
-def test_spaces_in_what_is_kept(body: str) -> None:
+def test_spaces_in_kept_elements(body: str) -> None:
     assert len(load_kept(f"{HEAD}>{body}{PATH}</svg>", 32, 24, "a.svg").scene) == 2

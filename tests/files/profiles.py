@@ -41,31 +41,31 @@ def _profile(kind: bytes, space: bytes, between: bytes, tags: dict[bytes, bytes]
 
 
 def linear(encoded: np.ndarray) -> np.ndarray:
-    """Light of sRGB values."""
+    """Return linear light of sRGB values."""
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def encoded(light: np.ndarray) -> np.ndarray:
-    """sRGB values of light."""
+    """Return sRGB values of linear light."""
     light = np.clip(light, 0, 1)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
 def rgb_profile(primaries: tuple[tuple[float, float, float], ...], curve: np.ndarray | None = None) -> bytes:
-    """Of a screen with sRGB's curve, or another one."""
+    """Return a screen's profile with sRGB's curve, or another one."""
     shape = _curve(linear(np.linspace(0, 1, 1024)) if curve is None else curve)
     tags = {name + b"XYZ": _xyz(xyz) for name, xyz in zip((b"r", b"g", b"b"), primaries, strict=True)}
     return _profile(b"mntr", b"RGB ", b"XYZ ", tags | {name + b"TRC": shape for name in (b"r", b"g", b"b")})
 
 
 def grey_profile(gamma: float) -> bytes:
-    """Of grey levels."""
+    """Return a profile of grey levels."""
     tags = {b"kTRC": _curve(np.linspace(0, 1, 1024) ** gamma)}
     return _profile(b"mntr", b"GRAY", b"XYZ ", tags)
 
 
 def cmyk_profile() -> bytes:
-    """Of a printer that knows ink and no ink, whose inks are all dark red (Lab: 30, 40, 20) but black."""
+    """Return the profile of a printer whose inks, all or nothing, are dark red (Lab: 30, 40, 20) or black."""
     lab = []
     for *inks, black in itertools.product((0, 1), repeat=4):
         wet = (30, 40, 20) if any(inks) else (100, 0, 0)

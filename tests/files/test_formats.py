@@ -1,4 +1,4 @@
-"""Which formats are read: those that are nothing but pixels."""
+"""The formats that are read: those of nothing but pixels."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from tests import ROOT
 from tests.cli.helpers import one_line, run
 from warpsplat.errors import ExitCode, ImageError
 from warpsplat.files.image import FORMATS, image_facts, load_image
-from warpsplat.files.importance import load_importance
+from warpsplat.files.sources import load_importance
 
 ENDLESS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 16 16\n%%EndComments\n{} loop\nshowpage\n%%EOF\n"
-"""A program that does not end."""
+"""An endless PostScript program."""
 
 PIXELS = set(FORMATS) | {"MPO"}
-"""An MPO is a JPEG with further ones behind it, and opened as one."""
+"""An MPO is a JPEG with others appended."""
 
 REFUSED = {
     *("EPS", "PDF", "WMF", "FPX", "MIC", "BUFR", "GRIB", "HDF5", "MPEG"),  # programs, documents, stubs, films
     *("IPTC", "ICNS", "CUR", "DIB", "DCX", "FITS", "FLI", "FTEX", "BLP", "GBR", "IM", "IMT", "MCIDAS"),
     *("MSP", "PALM", "PCD", "PIXAR", "SPIDER", "SUN", "XBM", "XPM", "XVTHUMB"),
 }
-"""What Pillow knows besides, looked at one by one."""
+"""Other formats of Pillow."""
 
 
 @pytest.fixture
 def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Those that Ghostscript would have run; it need not be installed."""
+    """Return a list of the programs that Ghostscript would have run; it need not be installed."""
     ran: list[str] = []
 
     def interpret(*_: object, **__: object) -> object:
@@ -45,34 +45,28 @@ def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return ran
 
 
-def test_postscript_is_run_by_nothing_that_reads_images(tmp_path: Path, programs: list[str]) -> None:
-    path = tmp_path / "x.png"
-    path.write_bytes(ENDLESS)
-    said = rf"x\.png: not an image of a format that is read: {', '.join(sorted(FORMATS))}$"
-    for read in (
-        lambda: load_image(path),
-        lambda: load_image(ENDLESS, "x.png"),
-        lambda: load_importance(path, 16, 16),
-        lambda: warpsplat.load_image(path),
-    ):
-        with pytest.raises(ImageError, match=said):
-            read()
-    assert image_facts(ENDLESS) is None
-    assert programs == []
-
-
-def test_the_program_says_so_in_one_line(
+def test_postscript_is_run_by_nothing_that_reads_images(
     tmp_path: Path, programs: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "x.png"
     path.write_bytes(ENDLESS)
     assert run("vectorize", path, "-o", tmp_path / "x.svg") == ExitCode.INPUT
     assert "x.png: not an image of a format that is read: AVIF, BMP, " in one_line(capsys.readouterr().err)
+    message = rf"x\.png: not an image of a format that is read: {', '.join(sorted(FORMATS))}$"
+    for read in (
+        lambda: load_image(path),
+        lambda: load_image(ENDLESS, "x.png"),
+        lambda: load_importance(path, 16, 16),
+        lambda: warpsplat.load_image(path),
+    ):
+        with pytest.raises(ImageError, match=message):
+            read()
+    assert image_facts(ENDLESS) is None
     assert programs == []
 
 
-def test_every_format_of_pillows_is_decided_on() -> None:
-    """One that a later Pillow knows is not read, and shows up here."""
+def test_every_format_of_pillow_is_accounted_for() -> None:
+    """A format that a later Pillow adds is not read, and fails here."""
     Image.init()
     assert not PIXELS & REFUSED
     assert (set(Image.OPEN) | set(Image.SAVE)) - PIXELS == REFUSED & (set(Image.OPEN) | set(Image.SAVE))

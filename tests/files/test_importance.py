@@ -1,19 +1,16 @@
 from __future__ import annotations
 
-import io
-
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.fuzz.corpus import saved
 from warpsplat.errors import ImageError
-from warpsplat.files.importance import load_importance
+from warpsplat.files.sources import load_importance
 
 
-def png(pixels: np.ndarray, mode: str | None = None) -> bytes:
-    file = io.BytesIO()
-    Image.fromarray(pixels, mode).save(file, "PNG") if mode else Image.fromarray(pixels).save(file, "PNG")
-    return file.getvalue()
+def png(pixels: np.ndarray) -> bytes:
+    return saved(Image.fromarray(pixels), "PNG")
 
 
 def test_grey_of_8_and_16_bits() -> None:
@@ -28,8 +25,8 @@ def test_colours_count_by_their_luma() -> None:
     np.testing.assert_allclose(load_importance(png(colours), 2, 2), wanted, atol=1e-5)
 
 
-def test_what_is_transparent_is_black() -> None:
-    """A face marked with a white brush on an empty layer."""
+def test_transparent_pixels_are_black() -> None:
+    """As in a face marked with a white brush on an empty layer."""
     layer = np.full((2, 2, 4), 255, np.uint8)
     layer[..., 3] = [[0, 255], [51, 0]]
     np.testing.assert_allclose(load_importance(png(layer), 2, 2), [[0, 1], [0.2, 0]], atol=1e-6)

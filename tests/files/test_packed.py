@@ -1,4 +1,4 @@
-"""Files of arrays: read as they were written; what is none of them is refused before it costs anything."""
+"""Files of arrays: they come back, and damaged ones are refused cheaply."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARRAYS = {
 WHOLE = pack({"numbers": [1, 2.5, None, 2**127]}, ARRAYS)
 
 
-def test_what_is_packed_comes_back(tmp_path: Path) -> None:
+def test_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(WHOLE)
     assert is_packed(path)
@@ -56,7 +56,7 @@ SMALL = np.zeros(4, np.float32)
 
 
 class Bomb:
-    """What must never be made."""
+    """An object that must never be unpickled."""
 
     def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
         return pytest.fail, ("unpickled",)
@@ -88,7 +88,7 @@ class Bomb:
         (archive(HEAD, ("a.npy", b"\x93NUMPY\2\0" + npy(SMALL)[8:])), "unknown type"),
     ],
 )  # fmt: skip
-def test_what_is_damaged_is_refused(tmp_path: Path, data: bytes, cause: str) -> None:
+def test_damaged_files_are_refused(tmp_path: Path, data: bytes, cause: str) -> None:
     path = tmp_path / "a"
     path.write_bytes(data)
     with pytest.raises(CheckpointError, match=f"a: the checkpoint is .*{cause}"):
@@ -97,7 +97,7 @@ def test_what_is_damaged_is_refused(tmp_path: Path, data: bytes, cause: str) -> 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_nothing_is_larger_than_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a bomb, of members that lie in one another, and of a list of very many."""
+    """Neither a bomb, nor overlapping members, nor a long list of members."""
     monkeypatch.setattr(packed, "read_input", lambda path, what: path.read_bytes())
     path = tmp_path / "a"
     bomb = archive(HEAD, ("a.npy", npy(np.zeros(5_000_000, np.float32))), how=zipfile.ZIP_DEFLATED)

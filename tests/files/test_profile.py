@@ -10,31 +10,22 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from tests.files.profiles import (
-    DISPLAY_P3,
-    SRGB,
-    cmyk_profile,
-    encoded,
-    grey_profile,
-    linear,
-    rgb_profile,
-)
+from tests.files.profiles import DISPLAY_P3, SRGB, cmyk_profile, encoded, grey_profile, linear, rgb_profile
+from tests.fuzz import corpus
 from warpsplat.files.image import load_image
 from warpsplat.files.profile import profile_of
 from warpsplat.files.sources import image_of
 
 COLORS = np.random.default_rng(0).integers(60, 200, (8, 9, 3)).astype(np.uint8)
-"""Inside of what a screen shows."""
+"""Colours that a screen can show."""
 
 
 def saved(image: Image.Image, profile: bytes, form: str = "PNG", **options: Any) -> bytes:
-    data = io.BytesIO()
-    image.save(data, form, icc_profile=profile, **options)
-    return data.getvalue()
+    return corpus.saved(image, form, icc_profile=profile, **options)
 
 
 def as_srgb(colors: np.ndarray) -> np.ndarray:
-    """Display P3 as sRGB, by its definition."""
+    """Return Display P3 as sRGB, by its definition."""
     change = np.array(DISPLAY_P3) @ np.linalg.inv(np.array(SRGB))
     return encoded(linear(colors / 255) @ change)
 
@@ -45,7 +36,7 @@ def test_a_screen_with_more_colours(form: str) -> None:
     data = saved(Image.fromarray(COLORS), rgb_profile(DISPLAY_P3), form, **options)
     found = load_image(data)
     assert np.abs(found - as_srgb(COLORS)).max() < 1.5 / 255
-    assert np.abs(found - COLORS / 255).max() > 10 / 255, "another picture than without"
+    assert np.abs(found - COLORS / 255).max() > 10 / 255, "the profile makes a difference"
     with Image.open(io.BytesIO(data)) as opened:
         np.testing.assert_array_equal(image_of(opened), found)
 
@@ -58,7 +49,7 @@ def test_opacity_stays() -> None:
     assert np.abs(found[..., :3] - as_srgb(COLORS) * opacity / 255).max() < 1.5 / 255
 
 
-def test_palettes_have_them_as_well() -> None:
+def test_profiles_of_palettes() -> None:
     image = Image.fromarray(COLORS).quantize(8)
     found = load_image(saved(image, rgb_profile(DISPLAY_P3)))
     assert np.abs(found - as_srgb(np.asarray(image.convert("RGB")))).max() < 1.5 / 255
@@ -96,7 +87,7 @@ def test_inks_of_a_printer() -> None:
     ("profile", "words"),
     [(b"no profile", ""), (rgb_profile(DISPLAY_P3)[:300], ""), (grey_profile(2.0), "it is of GRAY colours")],
 )
-def test_what_is_no_profile_is_ignored_in_one_line(
+def test_invalid_profiles_are_ignored_with_one_line(
     profile: bytes, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING):
@@ -107,5 +98,5 @@ def test_what_is_no_profile_is_ignored_in_one_line(
     assert "\n" not in message
 
 
-def test_without_one_there_is_nothing_to_do() -> None:
+def test_no_profile() -> None:
     assert profile_of(Image.fromarray(COLORS)) is None

@@ -20,12 +20,11 @@ def names(found: list[Path]) -> list[str]:
     return [str(path).removeprefix("memory://bucket/") for path in found]
 
 
-def test_what_is_a_url() -> None:
-    assert is_url("s3://bucket/a.png")
-    assert is_url("https://host/a.png?x=1")
-    assert not is_url("C:/a.png")
-    assert not is_url("a/b.png")
-    assert not is_url("./s3://x")
+def test_urls() -> None:
+    assert all(map(is_url, ("s3://bucket/a.png", "https://host/a.png?x=1")))
+    assert not any(map(is_url, ("C:/a.png", "a/b.png", "./s3://x")))
+    with pytest.raises(UsageError, match="nope://a/b"):
+        remote("nope://a/b")
 
 
 @pytest.mark.usefixtures("store")
@@ -63,26 +62,25 @@ def test_reads_and_writes() -> None:
 
 def test_a_store_that_refuses_is_one_line(store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     class RefusalError(Exception):
-        """As boto's, which derive from nothing that the system raises."""
+        """An error like boto's, which derive from no OSError."""
 
     def refuse(*given: Any, **named: Any) -> Any:
         raise RefusalError("Access Denied\nand much more")
 
     path = remote("memory://bucket/in/a.png")
     monkeypatch.setattr(type(store), "pipe_file", refuse)
-    with pytest.raises(
-        OutputError, match=r"^memory://bucket/in/a\.png: could not be written: Access Denied$"
-    ):
+    name = r"^memory://bucket/in/a\.png"
+    with pytest.raises(OutputError, match=name + ": could not be written: Access Denied$"):
         write_result(path, b"")
     monkeypatch.setattr(type(store), "open", refuse)
-    with pytest.raises(ImageError, match=r"^memory://bucket/in/a\.png: cannot be read: Access Denied$"):
+    with pytest.raises(ImageError, match=name + ": cannot be read: Access Denied$"):
         read_input(path)
     monkeypatch.setattr(type(store), "ls", refuse)
     with pytest.raises(OutputError, match="cannot be listed: Access Denied"):
         listed(path)
 
 
-def test_renames_where_files_can_be_seen_half_written(store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_writes_atomically_where_the_store_does_not(store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "WHOLE", ())
     path = remote("memory://bucket/new/a.svg")
     write_result(path, b"one")

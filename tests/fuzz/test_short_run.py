@@ -82,7 +82,7 @@ GOOD = Outcome(3, "", "warpsplat: case.svg: not an SVG\n", 0.1, 1000)
         ({"code": 0, "stderr": ""}, "missing"),
     ],
 )
-def test_the_judge_sees(tmp_path: Path, change: dict[str, object], word: str) -> None:
+def test_the_judge_sees_faults(tmp_path: Path, change: dict[str, object], word: str) -> None:
     lay_out(Case("svg", 0, "", "case.svg", b"", (COMMAND,)), tmp_path)
     outcome = Outcome(**{**GOOD.__dict__, **change})
     assert word in (found := judge(COMMAND, outcome, tmp_path)) and bool(word) == bool(found)

@@ -1,4 +1,4 @@
-"""What the corpus and the mutations are made of: heads and shapes of SVG, batch files, words, odd numbers."""
+"""Material of the corpus and of mutations: heads and shapes of SVG, batch files, words, odd numbers."""
 
 WIDTH, HEIGHT = 32, 24
 """Size of the corpus' pictures [px]."""
@@ -12,7 +12,7 @@ HEADS = (
     '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="8em" height="6em" viewBox="0 0 32 24" preserveAspectRatio="none">',
     '<svg xmlns="http://www.w3.org/2000/svg" width="32" height="24" viewBox="0 0 3200 2400">',
 )
-"""Other ways of saying how large an SVG is."""
+"""Other ways to state the size of an SVG."""
 
 SHAPES = (
     '<path d="M2 2C8 2 20 4 28 10S14 22 9 20z" fill="#8a3c1e" fill-opacity=".8"/>',
@@ -48,7 +48,7 @@ SHAPES = (
     '<image width="9" height="9" href="data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="/>',
     '<svg x="3" y="3" width="9" height="9" viewBox="0 0 3 3" preserveAspectRatio="xMaxYMin slice"><rect width="3" height="3"/></svg>',
 )  # fmt: skip
-"""One thing of SVG each."""
+"""One feature of SVG each."""
 
 SVG_WORDS = (
     "path", "g", "svg", "rect", "circle", "ellipse", "line", "polygon", "polyline", "use", "symbol", "switch", "defs", "style",
@@ -118,7 +118,7 @@ YAML_SNIPPETS = (
 NUMBERS = ("0", "-0", "1", "-1", "0.5", "1e-9", "1e9", "1e30", "-1e30", "3.5e38", "1e308", "-1e309", "1e-320", "nan", "inf",
            "NaN", "Infinity", "9" * 400, "0." + "0" * 300 + "1", "2147483648", "-2147483649", "65536", "1e", "--1", "+.5e+2",
            "0x10", "1_000", "١٢", "1,5", "", "50%", "-50%", "1e400%", "2em", "3ex", "1in", "5rem", "10vw", "1q", "90deg")  # fmt: skip
-"""What may stand where a number is expected."""
+"""Replacements for numbers."""
 
 TEXT_OPTIONS = ("--max-memory", "--colors", "--palette", "--levels", "--paint", "--background", "--size", "--page", "--units", "--title",
                 "--subject", "--time-budget", "--max-bytes", "--target-psnr", "--curves", "--iterations", "--seed", "--precision", "--threads",
@@ -132,7 +132,7 @@ FITS = (
     ("--max-memory", "300MB"), ("--max-memory", "310MB", "--json"), ("--max-memory", "1MB"), ("--max-memory", "100GB"), ("--json",),
     ("--ids",), ("--minify", "--title", "<&>"), ("--size", "50x40mm"), ("--max-bytes", "700"), ("--target-psnr", "14"),
 )  # fmt: skip
-"""Ways of vectorizing."""
+"""Options of ``vectorize``."""
 
 TOKENS = (*NUMBERS, "#f00", "#ff8800,#fff", "#", "2,4", "4,2", "1,,4", "linear", "radial", "a4", "50x40mm", "0x0mm", "mm", "none", "photo", "1EB", "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
           "draft", "exact", "x.svg", "/", ".", "..", "a/b.svg", "é.svg", "\udcff.svg", "\n.svg", "\x1b[2J.svg", "x" * 300, "-", "--", "٣s", "x.SVG",
@@ -159,4 +159,4 @@ GROUPS = (
     "<g>", "<g>", "<g>", '<g opacity=".5">', '<g transform="translate(2 1)">', '<g stroke-linecap="round" stroke-linejoin="round">',
     "<symbol>", "<switch>", "<defs>", "<a>", '<g fill="none">', '<g style="isolation:isolate">',
 )  # fmt: skip
-"""What shapes stand in."""
+"""Start tags around shapes."""

@@ -54,7 +54,7 @@ def test_near_the_c_library(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_same_bits_as_ever(name: str) -> None:
+def test_pinned_bits(name: str) -> None:
     ours, _, arguments = CASES[name]
     digest = hashlib.sha256(np.asarray(ours(*arguments), "<f8").tobytes()).hexdigest()
     assert digest[:16] == PINNED[name]
@@ -73,7 +73,7 @@ def test_powers_of_ten() -> None:
     assert [elementary.power_of_ten(k) for k in (-5, -1, 0, 3, 22)] == [1e-5, 0.1, 1, 1000, 1e22]
 
 
-def test_ends_and_what_is_outside() -> None:
+def test_limits() -> None:
     assert elementary.exp([-1e9, 1e9, -np.inf, np.inf]).tolist() == [0, np.inf, 0, np.inf]
     assert elementary.log([0, np.inf]).tolist() == [-np.inf, np.inf]
     assert np.isnan([elementary.exp(np.nan), elementary.log(-1.0), elementary.log(np.nan)]).all()

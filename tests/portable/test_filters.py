@@ -36,7 +36,7 @@ def test_resized_as_by_opencv(name: str, size: tuple[int, int], by: str) -> None
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", IMAGES)
 def test_areas_as_by_opencv(name: str, size: tuple[int, int]) -> None:
-    """By sides: where one of them grows OpenCV samples the other one."""
+    """One side at a time: where one grows, OpenCV samples the other."""
     image = IMAGES[name]
     down = cv2.resize(image, (image.shape[1], size[1]), interpolation=cv2.INTER_AREA)
     down = down.reshape(size[1], *image.shape[1:])
@@ -44,7 +44,7 @@ def test_areas_as_by_opencv(name: str, size: tuple[int, int]) -> None:
     assert_near(filters.resize_area(image, size), theirs)
 
 
-def test_what_is_flat_stays_so() -> None:
+def test_flat_images_stay_flat() -> None:
     image = np.full((31, 47, 3), 0.25, np.float32)
     for resize in (filters.resize_area, filters.resize_linear, filters.resize_cubic):
         assert np.abs(resize(image, (13, 90)) - 0.25).max() < 1e-6
@@ -98,9 +98,8 @@ def test_places_as_by_opencv() -> None:
 
 
 def test_places_in_an_image_of_one_pixel() -> None:
-    assert (
-        filters.remap_linear(IMAGES["1x1"], [-3.0, 0.0, 7.5], [0.0, 0.2, 9.0]).tolist() == [IMAGES["1x1"]] * 3
-    )
+    found = filters.remap_linear(IMAGES["1x1"], [-3.0, 0.0, 7.5], [0.0, 0.2, 9.0])
+    assert found.tolist() == [IMAGES["1x1"]] * 3
 
 
 def test_distances() -> None:
@@ -139,7 +138,7 @@ def test_lab() -> None:
         filters.lab,
     ],
 )
-def test_float64_stays_so_and_arguments_stay_as_they_are(apply: Callable[[np.ndarray], np.ndarray]) -> None:
+def test_float64_stays_and_arguments_are_not_changed(apply: Callable[[np.ndarray], np.ndarray]) -> None:
     given = COLORS.astype(np.float64)
     exact = apply(given)
     assert exact.dtype == np.float64
@@ -162,7 +161,7 @@ def test_bands_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(np.array_equal(a, b) for a, b in zip(whole, made(), strict=True))
 
 
-def test_the_same_bits_as_ever() -> None:
+def test_pinned_bits() -> None:
     image = IMAGES["40x53x3"]
     made = [
         filters.resize_area(image, (17, 13)),

@@ -18,9 +18,8 @@ import warpsplat
 from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
 from warpsplat.errors import ExitCode, ResourceError
-from warpsplat.files.image import ImageFacts, boxed, image_facts, load_image
-from warpsplat.files.importance import load_importance
-from warpsplat.files.whole import load_whole
+from warpsplat.files.image import ImageFacts, boxed, image_facts, load_image, load_rows
+from warpsplat.files.sources import load_importance
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.native import container_limits
 from warpsplat.rendering.parameters import Parameters
@@ -158,7 +157,7 @@ def test_strips_of_an_image_are_those_of_all_of_it(mode: str) -> None:
     data = encoded(pixels(mode))
     paper = None if mode == "RGBA" else 1.0
     image = load_image(data, paper=paper)
-    whole = load_whole(data, paper, image.shape[2])
+    whole = load_rows(data, paper, image.shape[2])
     assert whole.shape == image.shape
     for rows in (slice(0, 7), slice(30, 49), slice(30, 49), slice(0, 49)):
         np.testing.assert_array_equal(whole[rows], image[rows])

@@ -1,6 +1,6 @@
-"""What ``test_new_attribute`` runs in a copy of the package whose table has one row more: ``glows``.
+"""Run by ``test_new_attribute`` in a copy of the package with another attribute, ``glows``.
 
-Three numbers a fill, from 0 to 1, that nothing draws; a loss of this file gives them a gradient.
+A fill has three of them, in [0, 1], that nothing draws; a loss in this file gives them a gradient.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a further attribute takes: two edits of the package, tried out on a copy."""
+"""A new attribute takes two edits of the package, which are tried on a copy."""
 
 from __future__ import annotations
 

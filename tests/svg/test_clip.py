@@ -9,7 +9,7 @@ from warpsplat.svg.clip import _zeros, cut_subpath
 from warpsplat.svg.paths import cubics
 
 
-def test_where_cubics_change_their_sign() -> None:
+def test_sign_changes_of_cubics() -> None:
     rng = np.random.default_rng(0)
     for a, b, c, d in rng.uniform(-1, 1, (300, 4)):
         roots = np.roots([d - 3 * c + 3 * b - a, 3 * (c - 2 * b + a), 3 * (b - a), a])
@@ -29,7 +29,7 @@ def test_where_cubics_change_their_sign() -> None:
         ((1, 1, 1, 1), []),
     ],
 )
-def test_where_special_cubics_do(heights: tuple[float, ...], expected: list[float]) -> None:
+def test_sign_changes_of_special_cubics(heights: tuple[float, ...], expected: list[float]) -> None:
     assert _zeros(*heights) == pytest.approx(expected, abs=1e-4)
 
 

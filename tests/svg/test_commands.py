@@ -28,7 +28,7 @@ from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 
 def segments(seed: int, count: int) -> list[Segment]:
-    """A chain of lines, level and upright ones among them, and of cubics, some of them smooth."""
+    """Return a chain of lines, some level or upright, and of cubics, some smooth."""
     rng = np.random.default_rng(seed)
     at, mirrored = (0, 0), (0, 0)
     chain = []
@@ -48,7 +48,7 @@ def segments(seed: int, count: int) -> list[Segment]:
 
 
 def every_text(pen: Pair | None, chain: list[Segment]) -> list[str]:
-    """All ways to write a chain."""
+    """Return all ways to write a chain."""
     texts, options = [], []
     mirrored = chain[0].start
     for segment in chain:
@@ -72,8 +72,8 @@ def test_no_other_text_is_shorter(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_it_is_read_as_it_is(seed: int) -> None:
-    """By the reader of path data: exactly the points, lines as cubics with handles at the thirds."""
+def test_path_data_is_read_exactly(seed: int) -> None:
+    """Lines become cubics with handles at the thirds."""
     chain = segments(seed, 30)
     (drawn,) = cubics(shortest(None, chain), keep_dots=True)
     want = [chain[0].start]
@@ -110,7 +110,7 @@ def test_a_ring_is_the_shortest_of_its_starts() -> None:
 
 
 def test_a_line_that_closes_is_left_out() -> None:
-    """Of a fill, from wherever it starts; a stroke is closed by the command for it."""
+    """A fill leaves it out, wherever it starts; a stroke has the command that closes it."""
     square = [(0, 0), (100, 0), (103, 50), (0, 50)]
     chain = [Segment(a, None, b) for a, b in zip(square, [*square[1:], square[0]], strict=True)]
     text, end = shortest_ring(None, chain)
@@ -128,8 +128,8 @@ def test_a_line_that_closes_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("per_pixel", GRIDS[2:])
-def test_files_of_drawings_hold_what_they_say(per_pixel: float) -> None:
-    """Read they are the rounded drawing, and written again the same bytes, contours and lines included."""
+def test_files_of_drawings_come_back(per_pixel: float) -> None:
+    """They are read as the rounded drawing, and written again as the same bytes."""
     for made in (logo(), seam()):
         scene = made.scene
         text = write_svg(scene, per_pixel=per_pixel)
@@ -145,7 +145,7 @@ def test_files_of_drawings_hold_what_they_say(per_pixel: float) -> None:
 
 
 def test_lines_of_a_drawing_are_lines() -> None:
-    """However they lie; a curve as long is none."""
+    """In any direction; curves are not."""
     text = write_svg(logo().scene, per_pixel=10)
     star = text.split('<path d="')[3].split('"')[0]
     assert set(star) <= set("Mml-0123456789 ")

@@ -33,7 +33,7 @@ def test_encodings(codec: str, packed: bool, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["hex", "punycode", "none-such", "UTF-16", "unicode_escape"])
-def test_encodings_that_are_none(encoding: str, tmp_path: Path) -> None:
+def test_unknown_encodings(encoding: str, tmp_path: Path) -> None:
     svg = tmp_path / "a.svg"
     svg.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{SMALL}</svg>')
     with pytest.raises(ImageError, match=r"a\.svg: not an SVG"):
@@ -88,8 +88,8 @@ GROUND = '<rect width="40" height="30" fill="red"/>'
         ("<text>a</text>", 0, 0),
     ],
 )
-def test_what_is_drawn_is_counted(body: str, paths: int, nodes: int) -> None:
-    """Once as it is written; not a background, nor what only cuts."""
+def test_paths_and_nodes(body: str, paths: int, nodes: int) -> None:
+    """Each path counts once, except a background, clips and masks."""
     facts = inspect_svg(f'{HEAD}width="40" height="30">{body}</svg>')
     assert (facts.paths, facts.nodes) == (paths, nodes)
     sized = f'{HEAD}width="4in" viewBox="0 0 40 30">{body}</svg>'
@@ -97,7 +97,7 @@ def test_what_is_drawn_is_counted(body: str, paths: int, nodes: int) -> None:
 
 
 def test_reading_is_linear() -> None:
-    """Texts that a search from each position would take minutes for."""
+    """Texts for which a search from each position would take minutes."""
     assert inspect_svg(f"{SMALL}<!--{'<path ' * 200_000}--></svg>").paths == 0
     assert inspect_svg(f'{SMALL}<g style="fill:{" " * 1_000_000}"/></svg>').nodes == 0
     assert path_nodes("1" * 1_000_000 + "e" * 1_000_000) == 0
@@ -105,7 +105,15 @@ def test_reading_is_linear() -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "count"), [("m0 0a1 1 0 012 2 1 1 0 0 0 5 5", 3), ("M1e-1 2e-5L3 4", 2), ("z", 0)]
+    ("data", "count"),
+    [
+        ("m0 0a1 1 0 012 2 1 1 0 0 0 5 5", 3),
+        ("M1e-1 2e-5L3 4", 2),
+        ("z", 0),
+        ("M0 0c1 1 2 2 3 3 1 1 2 2 3 3z", 3),
+        ("M0,0L1-1.5.5,2H3V4Z", 5),
+        ("m0 0a1 1 0 0 1 2 2q1 1 2 2t1 1", 4),
+    ],
 )
-def test_nodes_of_compact_data(data: str, count: int) -> None:
+def test_nodes(data: str, count: int) -> None:
     assert path_nodes(data) == count

@@ -53,7 +53,7 @@ def check(scene: Scene, found: IndexArray) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_overlaps_keeps_its_order_and_runs_grow(seed: int) -> None:
+def test_overlapping_shapes_keep_their_order_and_runs_grow(seed: int) -> None:
     scene = scattered(90, seed=seed)
     found = by_opacity(scene)
     check(scene, found)
@@ -109,7 +109,7 @@ def test_soft_edges_of_neighbours_keep_their_order(gap: float) -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_hardly_any_shapes(count: int) -> None:
+def test_none_or_one_shape(count: int) -> None:
     scene = random_scene(Kind.FILL, count)
     found = by_opacity(scene)
     assert found.dtype == np.intp
@@ -127,7 +127,7 @@ def test_many_shapes_are_ordered_in_blocks(block: int, monkeypatch: pytest.Monke
     assert (runs(scene.take(found)) == whole) == (block >= len(scene))
 
 
-def test_colours_are_brought_together_where_nothing_lies_between() -> None:
+def test_colours_are_grouped() -> None:
     scene = scattered(60, seed=2, levels=1)
     rng = np.random.default_rng(0)
     colors = rng.integers(0, 3, len(scene))

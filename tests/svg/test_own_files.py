@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import ragged_scene, random_scene, started_alike
-from tests.svg.foreign import HEAD
+from tests.svg.foreign import HEAD, ROUND, SMALL
 from warpsplat.metrics import psnr
 from warpsplat.scene import Basis, Kind, Scene
 from warpsplat.svg.read import load_scene
@@ -25,7 +25,7 @@ BOTH = {
 
 
 def check(back: Scene, scene: Scene, per_pixel: float) -> None:
-    """``back`` is what a file of ``scene`` holds."""
+    """Assert that ``back`` is ``scene`` as a file holds it."""
     held = rounded(scene, per_pixel)
     for name in ("kind", "basis", "first"):
         np.testing.assert_array_equal(getattr(back, name), getattr(scene, name))
@@ -37,7 +37,7 @@ def check(back: Scene, scene: Scene, per_pixel: float) -> None:
 
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize(("width", "height"), [(41, 37), (769, 511), (4001, 2999)])
-def test_what_is_written_is_read(kind: Kind, width: int, height: int) -> None:
+def test_files_come_back(kind: Kind, width: int, height: int) -> None:
     outlines = [(kind, basis, beziers) for basis, beziers in BOTH[kind]]
     for seed, per_pixel in enumerate((*GRIDS, 1000.0)):
         scene = ragged_scene(outlines, width, height, seed=seed)
@@ -53,7 +53,7 @@ def test_what_is_written_is_read(kind: Kind, width: int, height: int) -> None:
 
 @pytest.mark.parametrize("basis", list(Basis))
 def test_dots(basis: Basis) -> None:
-    """A stroke without extent is seen, and stays; a fill without is not, whatever is left of it."""
+    """A stroke without extent is visible and stays; such a fill is not."""
     for kind in Kind:
         scene = random_scene(kind, count=2, seed=2, basis=basis)
         scene.points[: scene.first[1]] = [20.0, 18.0]
@@ -75,25 +75,18 @@ def test_cubics_without_extent_are_left_out_of_fills() -> None:
     np.testing.assert_allclose(started_alike(back, left).points, left.points, atol=1e-6)
 
 
-def scene_of(data: str, style: str = "", *, scale: float = 1.0) -> Scene:
-    box = f'width="40" height="30" viewBox="0 0 {40 * scale:g} {30 * scale:g}"'
-    return load_scene(f'{HEAD}{box}><path d="{data}" {style}/></svg>', 40, 30, "a.svg")[0]
+def scene_of(data: str, style: str = "") -> Scene:
+    return load_scene(f'{SMALL}<path d="{data}" {style}/></svg>', 40, 30, "a.svg")[0]
 
 
-ROUND = 'fill="none" stroke="red" stroke-linecap="round" stroke-linejoin="round"'
 RING = "M10 5q5 0 5 5t-5 5-5-5 5-5"
-"""A ring of four quadratics through the middles of a square's sides; the square is its control points."""
+"""A ring of four quadratics through the midpoints of a square's sides; its corners are the control points."""
 CORNERS = [[15, 5], [15, 15], [5, 15], [5, 5]]
-RINGS = {
-    "relative": RING,
-    "closed": RING + "z",
-    "absolute": "M10 5Q15 5 15 10T10 15T5 10T10 5",
-    "mixed": "m10 5q5 0 5 5T10 15 5 10t5-5Z",
-    "decimals": "M10.0 5.0q5.0 0 5 5t-5.0004 5-4.9996-5 5-5",
-}
+ABSOLUTE, MIXED = "M10 5Q15 5 15 10T10 15T5 10T10 5", "m10 5q5 0 5 5T10 15 5 10t5-5Z"
+DECIMALS = "M10.0 5.0q5.0 0 5 5t-5.0004 5-4.9996-5 5-5"
 
 
-@pytest.mark.parametrize("data", RINGS.values(), ids=RINGS.keys())
+@pytest.mark.parametrize("data", [RING, RING + "z", ABSOLUTE, MIXED, DECIMALS])
 def test_smooth_rings_are_splines(data: str) -> None:
     scene = scene_of(data)
     assert scene.basis.tolist() == [SPLINE]
@@ -128,7 +121,7 @@ def test_other_rings_are_cubics(data: str) -> None:
     scene = scene_of(data)
     assert scene.basis.tolist() == [CUBIC]
     text = write_svg(scene, per_pixel=100)
-    given = f'{HEAD}width="40" height="30"><rect width="40" height="30" fill="#fff"/><path d="{data}"/></svg>'
+    given = f'{SMALL}<rect width="40" height="30" fill="#fff"/><path d="{data}"/></svg>'
     assert psnr(*(on_white(render_svg(t, zoom=4)) for t in (text, given))) > 40
 
 

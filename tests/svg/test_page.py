@@ -15,12 +15,10 @@ from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 
 
-def picture(width: int = 60, height: int = 40) -> str:
+def picture() -> str:
     points = np.array([[[10, 10], [20, 10], [30, 10], [50, 30]]], np.float32)
-    scene = Scene.uniform(
-        Kind.STROKE, Canvas(width, height, None), points, widths=np.array([4.0]), opacities=np.ones(1)
-    )
-    return write_svg(scene, per_pixel=5)
+    lines = {"widths": np.array([4.0]), "opacities": np.ones(1)}
+    return write_svg(Scene.uniform(Kind.STROKE, Canvas(60, 40, None), points, **lines), per_pixel=5)
 
 
 def head(text: str) -> tuple[str, ...]:
@@ -38,33 +36,31 @@ def test_sizes_and_pages() -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "named"),
-    [
-        (lambda: parse_size("200"), "200x150mm"),
-        (lambda: parse_size("0x10mm"), "0x10mm"),
-        (lambda: parse_size("99999x10mm"), "99999x10mm"),
-        (lambda: parse_page("b9", 1, 1), "b9"),
-        (lambda: parse_page("a4", 1, 1, 110), "110 mm"),
-        (lambda: parse_size("1x1", "ell"), "ell"),
-    ],
+    ("size", "unit", "named"),
+    [("200", "mm", "200x150mm"), ("0x10mm", "mm", "0x10mm"), ("99999x10mm", "mm", "99999x10mm")]
+    + [("1x1", "ell", "ell")],
 )
-def test_what_is_no_sheet_is_named(call: object, named: str) -> None:
-    with pytest.raises(UsageError, match=re.escape(named)):
-        call()  # type: ignore[operator]
+def test_invalid_sizes_are_named(size: str, unit: str, named: str) -> None:
+    with pytest.raises(UsageError, match=named):
+        parse_size(size, unit)
 
 
-def test_a_picture_keeps_its_size_in_millimetres() -> None:
-    assert head(placed(picture(), "", "", "mm")) == ("15.875mm", "10.583mm", "0 0 300 200")
+def test_invalid_pages_are_named() -> None:
+    with pytest.raises(UsageError, match="b9"):
+        parse_page("b9", 1, 1)
+    with pytest.raises(UsageError, match="110 mm"):
+        parse_page("a4", 1, 1, 110)
 
 
-def test_a_picture_lies_in_the_middle_of_its_sheet() -> None:
+def test_a_picture_is_in_the_middle_of_its_sheet() -> None:
     """Between margins of 10 mm, 300 units are 100 mm wide: the sheet has 3 units a millimetre."""
     text = on_sheet(picture(), Sheet(120, 150, 10))
     assert head(text) == ("120mm", "150mm", "-30 -125 360 450")
     assert text.split(">", 1)[1] == picture().split(">", 1)[1]
+    assert head(placed(picture(), "", "", "mm")) == ("15.875mm", "10.583mm", "0 0 300 200")
 
 
-def test_a_viewer_shows_it_there() -> None:
+def test_a_viewer_shows_it_in_the_middle() -> None:
     sheet = Sheet(25.4, 25.4)  # 96 px
     shown = np.asarray(render_svg(on_sheet(picture(), sheet)).convert("RGBA"))[..., 3] > 128
     rows, columns = np.nonzero(shown)
@@ -75,6 +71,6 @@ def test_a_viewer_shows_it_there() -> None:
 
 
 @pytest.mark.parametrize("placing", [{"size": 3}, {"page": 4}, {"units": True, "page": "a4"}])
-def test_what_is_no_text_is_named(placing: dict[str, object]) -> None:
+def test_values_that_are_no_text_are_named(placing: dict[str, object]) -> None:
     with pytest.raises(UsageError, match="must be text, not "):
         make_settings(**placing)  # as a batch file may give it

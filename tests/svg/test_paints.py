@@ -32,7 +32,7 @@ def test_a_viewer_shows_what_we_render(device: str, seed: int, clear: bool) -> N
     assert likeness(scene, device) > 38
 
 
-def test_alike_gradients_are_written_once() -> None:
+def test_equal_gradients_are_written_once() -> None:
     scene = with_gradients(random_scene(Kind.FILL, 3))
     text = write_svg(scene.take(np.array([0, 0, 1, 2])))
     assert text.count("<linearGradient") == text.count("<radialGradient") == 1

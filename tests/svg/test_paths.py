@@ -24,16 +24,13 @@ def test_path_data_as_the_viewer_reads_it() -> None:
             relative = rng.random() < 0.5
             v = [f"{x:.1f}" for x in rng.uniform(*((-15, 15) if relative else (3, 27)), sizes[command])]
             if command == "a":
-                v[:5] = [
-                    *(f"{x:.1f}" for x in rng.uniform(2, 20, 3)),
-                    *(str(x) for x in rng.integers(0, 2, 2)),
-                ]
+                v[:3] = [f"{x:.1f}" for x in rng.uniform(2, 20, 3)]
+                v[3:5] = [str(x) for x in rng.integers(0, 2, 2)]
             data += (command if relative else command.upper()) + " ".join(v)
         text = f'{HEAD}width="40" height="30"><path {ROUND} stroke-width="2" d="{data}"/></svg>'
         scene, _ = load_scene(text, 40, 30, data)
-        assert psnr(on_white(render_svg(write_svg(scene, per_pixel=1e4))), on_white(render_svg(text))) > 36, (
-            data
-        )
+        written, shown = (on_white(render_svg(t)) for t in (write_svg(scene, per_pixel=1e4), text))
+        assert psnr(written, shown) > 36, data
 
 
 @pytest.mark.parametrize("turn", [0, 30, 77.7])
@@ -42,9 +39,8 @@ def test_an_arc_too_small_for_its_ends_is_half_an_ellipse(turn: float, sweep: in
     (drawn,) = cubics(f"M1 2A3 1.5 {turn} 0 {sweep} 14.1 9.3", keep_dots=False)
     assert len(drawn.points) == 7
     angle = np.radians(turn)
-    own = (drawn.points[::3] - [7.55, 5.65]) @ np.array(
-        [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    )
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    own = (drawn.points[::3] - [7.55, 5.65]) @ rotation
     sizes = np.hypot(own[:, 0] / 3, own[:, 1] / 1.5)
     assert np.allclose(sizes, sizes[0])
     (x, y), (far_x, far_y) = drawn.points[3] - drawn.points[0], drawn.points[6] - drawn.points[0]
@@ -52,11 +48,6 @@ def test_an_arc_too_small_for_its_ends_is_half_an_ellipse(turn: float, sweep: in
 
 
 def test_hostile_path_data_is_read_in_linear_time() -> None:
-    for data in (
-        "M0 0" + "z" * 200_000,
-        "M0 0h9" + "S1 1 2 2" * 50_000,
-        "M" + " " * 500_000,
-        "M" + "1" * 500_000,
-    ):
+    for data in ("0 0" + "z" * 200_000, "0 0h9" + "S1 1 2 2" * 50_000, " " * 500_000, "1" * 500_000):
         with pytest.raises(ImageError):
-            load_scene(f'{HEAD}width="40" height="30"><path d="{data}"/><text/></svg>', 40, 30, "a.svg")
+            load_scene(f'{HEAD}width="40" height="30"><path d="M{data}"/><text/></svg>', 40, 30, "a.svg")

@@ -1,4 +1,4 @@
-"""What no path can show stays in the file, in its place, and looks the same there."""
+"""Elements that no path can show are kept in their place, and look the same."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def shows(text: str, width: int = 40, height: int = 30) -> np.ndarray:
 
 @pytest.mark.parametrize("name", KEPT)
 def test_it_looks_the_same(name: str, device: str) -> None:
-    """In the file, and but for what blends in our renderer."""
+    """In the file, and, except for blending, in our renderer."""
     text = f'{HEAD}width="40" height="30">{BELOW}{KEPT[name]}{ABOVE}</svg>'
     with pytest.raises(ImageError, match="not supported"):
         load_scene(text, 40, 30, "a.svg")
@@ -126,7 +126,7 @@ def test_units_of_the_root(root: str) -> None:
 
 
 def test_markup_is_untouched(tmp_path: Path) -> None:
-    """Its very text, with comments; names are said once, ours are others."""
+    """The text is the same, with comments; identifiers are unique."""
     own = '<g  filter = "url(#f)"><!-- so --><path\n d="M5 5h9v9z" fill="url(#g0)"/></g>'
     ramp = '<linearGradient id="g0"><stop stop-color="red"/><stop offset="1"/></linearGradient>'
     shape = '<path d="M3 3h20v5z" fill="url(#g0)"/>'
@@ -153,8 +153,8 @@ def test_entities_and_name_spaces() -> None:
     assert psnr(shows(text), shows(written)) > 40
 
 
-def test_style_sheets_hold_for_what_is_kept_only() -> None:
-    """Those inside of it as well; and what a root says of its own size, for the root only."""
+def test_style_sheets_apply_to_kept_elements_only() -> None:
+    """Even those inside them; the root's own size applies to the root only."""
     sheet = "<style>path{stroke:blue} svg{fill:#070}</style>"
     text = (
         f'{HEAD}width="40" height="30" style="width:9px; stroke-width:3; height:100%">{BLUR}{BELOW}'
@@ -188,7 +188,7 @@ def test_neighbours_share_a_picture() -> None:
     assert markup.index(">a<") < markup.index(">b<")
 
 
-def test_what_shows_nothing_here_is_said() -> None:
+def test_invisible_elements_are_reported() -> None:
     body = f'{BELOW}<image href="elsewhere.png" width="9" height="9"/>{ABOVE}'
     read = load_kept(f'{HEAD}width="40" height="30">{body}</svg>', 40, 30, "a.svg")
     assert read.kept == "<image>; 1 of 1 such places show nothing here"
@@ -223,7 +223,7 @@ def test_entities_of_elements_are_refused() -> None:
 
 
 def test_places_of_elements() -> None:
-    """Whatever stands in quotes, comments and text of two bytes a letter."""
+    """Despite quotes, comments and letters of two bytes."""
     text = (
         f'{HEAD}width="40" height="30"><!-- <g> é --><g a="/>é" b=\'"\'><path d="M0 0"/>é<path d="M1 1" >'
         "</path ></g ><text><![CDATA[<g>]]></text></svg>"

@@ -1,4 +1,4 @@
-"""Foreign SVGs: checked, measured and drawn without harm."""
+"""Foreign SVGs are checked, measured and drawn without harm."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CRASHES = {
 
 
 @pytest.mark.parametrize("name", CRASHES)
-def test_what_ends_resvg_is_one_line(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_crashes_of_resvg_are_one_line(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     svg, image = tmp_path / "a.svg", tmp_path / "a.png"
     svg.write_text(f"{SMALL}{CRASHES[name]}</svg>")
     Image.new("RGB", (40, 30)).save(image)
@@ -120,7 +120,7 @@ def test_absurd_sizes_are_refused_before_drawing(
         draw_png(f"{HEAD}{attributes}>{PATH}</svg>", zoom=zoom)
 
 
-def test_pillows_limit_is_not_that_of_our_pictures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_pillows_limit_does_not_apply_to_renderings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert render_svg(f"{SMALL}{PATH}</svg>").size == (40, 30)
     assert on_white(render_own(write_svg(disc(10, 30, 15)))).shape == (30, 30, 3)

@@ -1,4 +1,4 @@
-"""The file: numbers, paths, what comes back, and how independent viewers show it."""
+"""Files: numbers, paths, reading them back, and how independent viewers show them."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_numbers_of_a_file_are_short(kind: Kind, per_pixel: float) -> None:
 
 
 def without_sharing(text: str) -> str:
-    """The file with each opacity and colour at its path."""
+    """Return the file with each opacity and colour at its path."""
     root = ElementTree.fromstring(text)
     for parent in (root, *root.findall(f"{{{NAMESPACE}}}g")):
         for index, child in reversed(list(enumerate(parent))):
@@ -144,7 +144,7 @@ def test_neighbours_of_one_opacity_share_a_group_where_it_is_shorter(kind: Kind,
 
 
 def test_groups_are_never_longer_than_none() -> None:
-    """Of any opacities, in any order, of fills and strokes by turns."""
+    """For any opacities, in any order, of fills and strokes."""
     rng = np.random.default_rng(0)
     for levels in (1, 2, 3, 10, 100):
         scene = mixed_scene(seed=levels).append(mixed_scene(seed=levels + 1))
@@ -161,7 +161,7 @@ def test_groups_are_never_longer_than_none() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
-    """No longer than from any other; and the same text wherever its points start."""
+    """No other start is shorter, and the order of its points does not matter."""
     rng = np.random.default_rng(seed)
     ring = np.round(rng.uniform(-150, 400, (9, 2)) * 2).astype(np.int64)
     half = [(int(x), int(y)) for x, y in ring]
@@ -177,7 +177,7 @@ def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
 
 @pytest.mark.parametrize(("per_pixel", "decimals"), [(0.125, 1), (1, 1), (3, 1), (4, 0), (100, 0)])
 def test_decimals_of_widths(per_pixel: float, decimals: int) -> None:
-    """Of the file and of what is held alike: a quarter of a pixel, or finer."""
+    """In the file and in rounded scenes: a quarter of a pixel, or finer."""
     assert width_decimals(per_pixel) == decimals
     scene = random_scene(Kind.STROKE, count=20)
     text = write_svg(scene, per_pixel=per_pixel)
@@ -197,7 +197,7 @@ def test_opacities_that_round_to_1_are_left_out(opacity: float) -> None:
 
 
 def test_shown_at_another_size() -> None:
-    """A part of a file shown larger or smaller looks as the same part of the whole one."""
+    """A part of a file at another scale looks as that part of the whole file."""
     text = write_svg(random_scene(Kind.FILL, count=6, width=61, height=83), per_pixel=3)
     big = on_white(render_svg(text, zoom=2))
     shown = on_white(render_own(resized(text, 100, 120, 2.0)))

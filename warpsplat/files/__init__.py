@@ -1,1 +1,1 @@
-"""Reading what a user names, writing what was made."""
+"""Input and output files."""

@@ -53,8 +53,13 @@ def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) ->
         raise ImageError(f"{name}: no permission to read it") from None
     except (OSError, ValueError) as error:  # a loop of links, a name with a NUL, a name too long
         raise ImageError(f"{name}: cannot be read: {cause_of(error)}") from error
-    if len(data) > limit:
-        raise ImageError(f"{name}: is larger than {limit // (1 << 20)} MiB")
-    if not data:
-        raise ImageError(f"{name}: {'nothing came' if path == STANDARD else 'the file is empty'}")
+    check_data(data, name, limit)
     return data
+
+
+def check_data(data: bytes, name: str, limit: int) -> None:
+    """Raise ``ImageError`` for no data, or more than ``limit`` bytes; ``name``: for messages."""
+    if len(data) > limit:
+        raise ImageError(f"{name}: is larger than {limit >> 20} MiB")
+    if not data:
+        raise ImageError(f"{name}: is empty")

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
 from warpsplat.errors import cause_of
+
+if TYPE_CHECKING:
+    from PIL.ImageCms import ImageCmsTransform
 
 log = logging.getLogger(__name__)
 
@@ -33,13 +36,16 @@ Levels = npt.NDArray[np.uint8]
 class Profile:
     """A conversion of an image's colours to sRGB; made by ``profile_of``."""
 
-    def __init__(self, mode: str, convert: Callable[[Image.Image], Image.Image]) -> None:
-        """``convert`` makes RGB of an image of ``mode``: RGB, L or CMYK."""
-        self._mode, self._convert = mode, convert
+    def __init__(self, mode: str, transform: ImageCmsTransform) -> None:
+        """``transform`` makes RGB of an image of ``mode``: RGB, L or CMYK."""
+        self._mode, self._transform = mode, transform
 
     def rgb(self, image: Image.Image) -> Image.Image:
         """Return an image, or a part of it, as RGB, without opacity."""
-        return self._convert(image if image.mode == self._mode else image.convert(self._mode))
+        from PIL import ImageCms
+
+        image = image if image.mode == self._mode else image.convert(self._mode)
+        return ImageCms.applyTransform(image, self._transform) or image
 
     def rgba(self, image: Image.Image) -> Image.Image:
         """Return an image, or a part of it, as RGBA."""
@@ -52,6 +58,19 @@ class Profile:
         """Return sRGB in [0, 1] of 256 levels of grey, shape (256,)."""
         ramp = Image.fromarray(np.arange(256, dtype=np.uint8)[None])
         return np.asarray(self.rgb(ramp), np.float32)[0].mean(axis=1) / np.float32(255)
+
+    def is_srgb(self) -> bool:
+        """Return whether the conversion changes nothing."""
+        if self._mode == "CMYK":
+            return False
+        levels = np.linspace(0, 255, GRID).round().astype(np.uint8)
+        if self._mode == "L":
+            grid: Levels = np.arange(256, dtype=np.uint8)[None]
+            shown = np.repeat(grid[..., None], 3, axis=2)
+        else:
+            grid = shown = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
+        found = np.asarray(self.rgb(Image.fromarray(grid)))
+        return bool((np.abs(found.astype(int) - shown) <= SAME).all())
 
 
 def profile_of(image: Image.Image, name: str | None = "the image") -> Profile | None:
@@ -87,11 +106,8 @@ def _profile(data: bytes, image: Image.Image) -> Profile | None:
         ImageCms.Intent.RELATIVE_COLORIMETRIC,
         ImageCms.Flags.BLACKPOINTCOMPENSATION,
     )
-
-    def convert(part: Image.Image) -> Image.Image:
-        return ImageCms.applyTransform(part, transform) or part
-
-    return None if _changes_nothing(mode, convert) else Profile(mode, convert)
+    profile = Profile(mode, transform)
+    return None if profile.is_srgb() else profile
 
 
 def color_mode(image: Image.Image) -> str:
@@ -99,16 +115,3 @@ def color_mode(image: Image.Image) -> str:
     if image.mode in {"1", "L", "LA", "La", "F"} or image.mode.startswith("I"):
         return "L"
     return image.mode if image.mode == "CMYK" else "RGB"
-
-
-def _changes_nothing(mode: str, convert: Callable[[Image.Image], Image.Image]) -> bool:
-    if mode == "CMYK":
-        return False
-    levels = np.linspace(0, 255, GRID).round().astype(np.uint8)
-    if mode == "L":
-        grid: Levels = np.arange(256, dtype=np.uint8)[None]
-        shown = np.repeat(grid[..., None], 3, axis=2)
-    else:
-        grid = shown = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
-    found = np.asarray(convert(Image.fromarray(grid)))
-    return bool((np.abs(found.astype(int) - shown) <= SAME).all())

@@ -12,7 +12,8 @@ from PIL import Image, ImageOps
 
 from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.image import boxed, check_size, composited, load_image, reduced
-from warpsplat.files.inputs import MAX_INPUT, input_name, read_input
+from warpsplat.files.inputs import MAX_INPUT, check_data, input_name, read_input
+from warpsplat.portable.filters import grey
 from warpsplat.scene import FloatArray
 
 
@@ -49,10 +50,7 @@ def source_bytes(source: str | os.PathLike[str] | bytes | Readable, what: str = 
         data = data.encode()
     if not isinstance(data, bytes):
         raise ImageError(f"{name}: gives {type(data).__name__}, not bytes")
-    if len(data) > MAX_INPUT:
-        raise ImageError(f"{name}: is larger than {MAX_INPUT >> 20} MiB")
-    if not data:
-        raise ImageError(f"{name}: nothing came")
+    check_data(data, name, MAX_INPUT)
     return data
 
 
@@ -136,3 +134,26 @@ def _from_array(pixels: npt.NDArray[Any], paper: float | FloatArray | None) -> F
     if opacity is None:
         return color
     return composited([(slice(None), color, opacity)], (width, height), paper)
+
+
+def load_importance(
+    source: ImageSource, width: int, height: int, name: str | None = None, factor: int = 1
+) -> FloatArray:
+    """Read the mask of an image of ``width`` x ``height`` px: grey in [0, 1], shape (mask height, mask
+    width).
+
+    A mask may be any image of the same proportions. Colours count by their luma (ITU-R BT.601), transparent
+    pixels as black. ``factor``: how many times smaller to read it.
+
+    Raises:
+        ImageError: As ``image_of``, or the mask has other proportions.
+    """
+    name = name or source_name(source, "the mask")
+    mask = image_of(source, name, paper=0.0, factor=factor)
+    tall, wide = factor * mask.shape[0], factor * mask.shape[1]
+    # A side of a reduced mask may be off by up to a pixel.
+    if min(abs(wide - tall * width / height), abs(tall - wide * height / width)) >= factor:
+        raise ImageError(
+            f"{name}: {wide}x{tall} pixels; a mask must have the proportions of its {width}x{height} image"
+        )
+    return np.asarray(grey(mask), np.float32)

@@ -107,9 +107,10 @@ def _gathered(band: Floats, taps: _Taps, axis: int) -> Floats:
     return total
 
 
-def _resized(image: Floats, down: _Taps, across: _Taps) -> Floats:
-    """Return an image resized by the taps of its height and of its width."""
-    image = np.ascontiguousarray(image)
+def _resized(image: Floats, size: tuple[int, int], taps: Callable[[int, int, Any], _Taps]) -> Floats:
+    """Return an image at another size by the ``taps`` of its sides (before, after, dtype)."""
+    image = np.ascontiguousarray(_floats(image))
+    across, down = (taps(image.shape[1 - i], size[i], image.dtype) for i in (0, 1))
     channels = image.shape[2] if image.ndim == 3 else 1
     height, width = down.indices.shape[1], across.indices.shape[1]
     rows, channel = image.reshape(image.shape[0], -1), np.arange(channels)
@@ -129,23 +130,17 @@ def resize_area(image: Floats, size: tuple[int, int]) -> Floats:
 
     As OpenCV's ``INTER_AREA``, except where one side grows while the other shrinks, which OpenCV samples.
     """
-    return _resize(image, size, _area_taps)
+    return _resized(image, size, _area_taps)
 
 
 def resize_linear(image: Floats, size: tuple[int, int]) -> Floats:
     """Return an image at another size (width, height) [px], interpolated linearly at pixel centres."""
-    return _resize(image, size, functools.partial(_point_taps, cubic=False))
+    return _resized(image, size, functools.partial(_point_taps, cubic=False))
 
 
 def resize_cubic(image: Floats, size: tuple[int, int]) -> Floats:
     """Return an image at another size (width, height) [px], interpolated by cubics at pixel centres."""
-    return _resize(image, size, functools.partial(_point_taps, cubic=True))
-
-
-def _resize(image: Floats, size: tuple[int, int], taps: Callable[[int, int, Any], _Taps]) -> Floats:
-    image = _floats(image)
-    across, down = (taps(image.shape[1 - i], size[i], image.dtype) for i in (0, 1))
-    return _resized(image, down, across)
+    return _resized(image, size, functools.partial(_point_taps, cubic=True))
 
 
 def _beyond(places: Indices, size: int, border: Border) -> Indices:

@@ -14,7 +14,7 @@ from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
 from warpsplat.pydiffvg.shape import Circle, Ellipse, Path, Polygon, Rect, Shape, ShapeGroup
 from warpsplat.scene import Paint
-from warpsplat.svg.shapes import Line
+from warpsplat.svg.shapes import LineStyle
 
 Tensor = torch.Tensor
 
@@ -68,7 +68,7 @@ class GroupStructure(NamedTuple):
     """Whether the transform scales all directions alike."""
     one_width: bool
     """Whether all its shapes share one tensor as their width."""
-    line: Line | None
+    line: LineStyle | None
 
 
 @dataclass(frozen=True)

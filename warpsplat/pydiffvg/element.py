@@ -21,11 +21,11 @@ from warpsplat.pydiffvg.save_svg import path_data, rgb_text
 from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import outline, parse_transform
-from warpsplat.svg.gradients import Flat, Gradient, parse_link, resolve_paint
+from warpsplat.svg.gradients import FlatColor, Gradient, parse_link, resolve_paint
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.paths import Subpath, cubics
 from warpsplat.svg.style import DRAWN
-from warpsplat.svg.values import Viewport, fraction, length
+from warpsplat.svg.values import SvgViewport, fraction, length
 
 Tensor = torch.Tensor
 GROUPS = {"svg", "g", "a"}
@@ -35,7 +35,7 @@ class Context(NamedTuple):
     """Data that the elements of a document share."""
 
     document: Document
-    viewport: Viewport
+    viewport: SvgViewport
     device: torch.device
     retrieve: Callable[[str | None], tuple[dict[str, Any], bool]]
     """``SvgOptimizationSettings.retrieve``."""
@@ -96,7 +96,7 @@ class OptimizableElement:
         document, viewport, device, retrieve = self._context
         text = self._style[name]
         paint = resolve_paint(text, self._style, document, viewport, subpaths, torch.eye(3).numpy())
-        if isinstance(paint, Flat):
+        if isinstance(paint, FlatColor):
             color = torch.tensor(paint.color, device=device)
             self._optimize([color], self._settings["color_lr"], self._settings["optimize_color"], COLORS)
             return color

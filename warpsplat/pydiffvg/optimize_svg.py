@@ -22,7 +22,7 @@ from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 from warpsplat.svg.document import Document
 from warpsplat.svg.geometry import view_box_map
 from warpsplat.svg.inspect import NAMESPACE, read_svg_text, view_box
-from warpsplat.svg.values import Viewport
+from warpsplat.svg.values import SvgViewport
 
 Tensor = torch.Tensor
 Store = dict[str, Any]
@@ -135,7 +135,7 @@ class OptimizableSvg:
             self._view = torch.eye(3) if view is None else torch.tensor(view).float()
             self.settings.global_override(["transforms", "translation_mult"], max(self.canvas))
             context = Context(
-                self.document, Viewport(*(box[2:] if box else size)), self.device, self.settings.retrieve
+                self.document, SvgViewport(*(box[2:] if box else size)), self.device, self.settings.retrieve
             )
             with np.errstate(all="ignore"):  # overflows are found where the values are used
                 self.root = OptimizableElement(context, self.document.root)

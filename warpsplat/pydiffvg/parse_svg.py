@@ -16,9 +16,9 @@ from warpsplat.errors import ImageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
 from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
 from warpsplat.scene import Cap, Join, Rule
-from warpsplat.svg.gradients import Flat, Gradient
+from warpsplat.svg.gradients import FlatColor, Gradient
 from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size, view_box
-from warpsplat.svg.shapes import Line
+from warpsplat.svg.shapes import LineStyle
 from warpsplat.svg.shapes import Shape as Drawn
 from warpsplat.svg.structure import read_shapes
 
@@ -110,7 +110,7 @@ def _group(parts: list[Drawn], first: int) -> tuple[list[Path], ShapeGroup]:
     return paths, group
 
 
-def _is_plain(line: Line) -> bool:
+def _is_plain(line: LineStyle) -> bool:
     return line.cap == Cap.ROUND and line.join == Join.ROUND and not line.dashes
 
 
@@ -121,7 +121,7 @@ def _color(part: Drawn) -> Color:
         ImageError: a paint that pydiffvg does not have.
     """
     paint = part.paint
-    if isinstance(paint, Flat):
+    if isinstance(paint, FlatColor):
         return torch.tensor([*paint.color, part.opacity * paint.opacity])
     if not isinstance(paint, Gradient):
         raise ImageError("shows a picture, which is no paint of pydiffvg")

@@ -14,7 +14,7 @@ import torch
 
 from warpsplat.pydiffvg.color import Color
 from warpsplat.svg.paths import Subpath, cubics
-from warpsplat.svg.shapes import Line
+from warpsplat.svg.shapes import LineStyle
 
 Tensor = torch.Tensor
 
@@ -101,7 +101,7 @@ class ShapeGroup:
     shape_to_canvas: Tensor = field(default_factory=lambda: torch.eye(3))
     """Affine map of the shapes and their strokes to canvas units, shape (3, 3)."""
     id: str = ""
-    line: Line | None = None
+    line: LineStyle | None = None
     """Caps, joins and dashes of strokes read from a file; None: round and solid. DiffVG has no such field."""
 
 

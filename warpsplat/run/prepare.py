@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.drawing.subjects import choose_subject
-from warpsplat.files.importance import load_importance
-from warpsplat.files.sources import ImageSource, held, image_of, source_name
+from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.native import release_memory

@@ -6,9 +6,8 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from warpsplat.files.image import ImageFacts, boxed
+from warpsplat.files.image import ImageFacts, boxed, load_rows
 from warpsplat.files.sources import ImageSource
-from warpsplat.files.whole import load_whole
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.options import limits_of
 from warpsplat.fit.settings import Settings, solid_color
@@ -113,7 +112,7 @@ class Memory:
         paper, channels = solid_color(settings.background), target.shape[2]
         whole = None
         if isinstance(source, bytes) and not facts.deep and whole_score(facts, settings, factor) <= limit:
-            whole = functools.partial(load_whole, source, paper, channels)
+            whole = functools.partial(load_rows, source, paper, channels)
         given = "max-memory is" if settings.max_memory else "memory for it is"
         takes = in_words(need(facts, settings, mask=self.mask).most)
         why = f"{facts.width}x{facts.height} pixels take about {takes}, {given} {in_words(limit)}"

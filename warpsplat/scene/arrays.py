@@ -12,17 +12,12 @@ import numpy.typing as npt
 
 from warpsplat.scene.attributes import (
     ATTRIBUTES,
+    CHOICES,
     NO_DASHES,
     NO_PICTURE,
     TRAITS,
     Attribute,
-    Basis,
-    Cap,
-    Join,
-    Kind,
     Paint,
-    Rule,
-    Spread,
     Unit,
 )
 from warpsplat.scene.scene import Scene
@@ -39,8 +34,6 @@ FARTHEST = 1e9
 """Largest coordinate or length [canvas units]."""
 
 MOST_LAYERS = 1_000_000
-
-CHOICES = {one.__name__.lower(): one for one in (Kind, Basis, Rule, Cap, Join, Paint, Spread)}
 
 
 def to_arrays(scene: Scene) -> dict[str, Array]:
@@ -69,7 +62,7 @@ def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
     if len(values["stop_first"]) != len(values["first"]):
         raise ValueError("stop_first is not that of the shapes")
     limits: dict[str, tuple[float, float]] = {
-        **{name: (min(kinds), max(kinds)) for name, kinds in CHOICES.items()},
+        **{choice.__name__.lower(): (min(choice), max(choice)) for choice in CHOICES},
         "closed": (0, 1),
         "twin": (0, 1),
         "layer": (0, MOST_LAYERS),

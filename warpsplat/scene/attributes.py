@@ -16,7 +16,7 @@ from warpsplat.kernels import constants
 
 
 class Kind(IntEnum):
-    """How a path is painted."""
+    """Fill or stroke."""
 
     FILL = constants.FILL
     """Painted inside its contours; open ones are closed by a straight line."""
@@ -76,6 +76,10 @@ class Spread(IntEnum):
     PAD = constants.PAD
     REFLECT = constants.REFLECT
     REPEAT = constants.REPEAT
+
+
+CHOICES = (Kind, Basis, Rule, Cap, Join, Paint, Spread)
+"""The types of traits; the fields of ``Scene`` have their names in lower case."""
 
 
 class Unit(Enum):

@@ -100,9 +100,7 @@ class Scene:
     dash: IntArray = None  # type: ignore[assignment]
     """Row of ``dashes`` of each shape, or NO_DASHES, shape (shape,)."""
     twin: IntArray = None  # type: ignore[assignment]
-    """1 for a shape with the points of the one before, from a path that is filled and stroked, shape
-    (shape,).
-    """
+    """1 for a shape with the points of the one before: a path filled and stroked; shape (shape,)."""
     layer: IntArray = None  # type: ignore[assignment]
     """Number of each shape's layer, ascending, shape (shape,)."""
     paint: IntArray = None  # type: ignore[assignment]

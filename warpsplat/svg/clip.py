@@ -16,7 +16,7 @@ from warpsplat.svg.geometry import Matrix, about, moved, outline, parse_transfor
 from warpsplat.svg.gradients import parse_link
 from warpsplat.svg.paths import Points, Subpath, cubics, line
 from warpsplat.svg.shapes import Shape
-from warpsplat.svg.values import Viewport, check_length
+from warpsplat.svg.values import SvgViewport, check_length
 
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""
@@ -206,7 +206,7 @@ def polygon(corners: Points) -> Subpath:
     return Subpath(np.array([(z.real, z.imag) for z in points]), True, False)
 
 
-def clip_rectangle(link: str, document: Document, matrix: Matrix, viewport: Viewport) -> Points | None:
+def clip_rectangle(link: str, document: Document, matrix: Matrix, viewport: SvgViewport) -> Points | None:
     """Return the corners of a ``clip-path`` that is one rectangle (SVG 1.1, 14.3); None: there is no clip.
 
     Raises:

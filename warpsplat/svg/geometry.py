@@ -13,7 +13,7 @@ from warpsplat.portable import elementary
 from warpsplat.portable.linear import product
 from warpsplat.svg.inspect import NUMBER, view_box
 from warpsplat.svg.paths import Points, Subpath
-from warpsplat.svg.values import Viewport, length, numbers
+from warpsplat.svg.values import SvgViewport, length, numbers
 
 Matrix = npt.NDArray[np.float64]
 
@@ -22,7 +22,7 @@ DOWN = {"y", "cy", "y1", "y2", "fy", "height", "ry"}
 """Attributes whose percentages refer to the viewport's width, and to its height; all others: its diagonal."""
 
 
-def attribute(attributes: Mapping[str, str], name: str, viewport: Viewport) -> float | None:
+def attribute(attributes: Mapping[str, str], name: str, viewport: SvgViewport) -> float | None:
     """Return a length among the attributes [user units]; None if it is missing or not a length."""
     text = attributes.get(name)
     if text is None:
@@ -31,7 +31,7 @@ def attribute(attributes: Mapping[str, str], name: str, viewport: Viewport) -> f
     return length(text, reference, name, viewport.font_size)
 
 
-def outline(tag: str, attributes: Mapping[str, str], viewport: Viewport) -> str:
+def outline(tag: str, attributes: Mapping[str, str], viewport: SvgViewport) -> str:
     """Return the path data of a shape element; empty: it draws nothing."""
 
     def get(name: str) -> float:
@@ -183,7 +183,7 @@ def parse_transform(text: str) -> Matrix:
 PLACES = {"left": 0.0, "top": 0.0, "center": 0.5, "right": 1.0, "bottom": 1.0}
 
 
-def about(origin: str, viewport: Viewport, matrix: Matrix) -> Matrix:
+def about(origin: str, viewport: SvgViewport, matrix: Matrix) -> Matrix:
     """Return a transform about its ``transform-origin``.
 
     Raises:

@@ -17,11 +17,11 @@ from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, ti
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Subpath
 from warpsplat.svg.style import Style
-from warpsplat.svg.values import Color, Viewport, check_length, fraction, parse_color
+from warpsplat.svg.values import Color, SvgViewport, check_length, fraction, parse_color
 
 
 @dataclass(frozen=True)
-class Flat:
+class FlatColor:
     """One colour."""
 
     color: Color
@@ -43,13 +43,13 @@ class Gradient:
     """``pad``, ``reflect`` or ``repeat``."""
     offsets: tuple[float, ...]
     """Offsets of the stops, ascending, in [0, 1]."""
-    stops: tuple[Flat, ...]
+    stops: tuple[FlatColor, ...]
 
 
-Colouring = Flat | Gradient
+Colouring = FlatColor | Gradient
 
 GRADIENTS = {"linearGradient", "radialGradient"}
-BLACK = Flat((0.0, 0.0, 0.0))
+BLACK = FlatColor((0.0, 0.0, 0.0))
 """The paint in place of an invalid colour, the only one that viewers agree on."""
 
 LINK = re.compile(r"""url\(\s*(["']?)\s*#?""")
@@ -71,7 +71,12 @@ def parse_link(text: str) -> tuple[str, str] | None:
 
 
 def resolve_paint(
-    text: str, style: Style, document: Document, viewport: Viewport, subpaths: list[Subpath], matrix: Matrix
+    text: str,
+    style: Style,
+    document: Document,
+    viewport: SvgViewport,
+    subpaths: list[Subpath],
+    matrix: Matrix,
 ) -> Colouring | None:
     """Return the paint of a shape; None: it has none.
 
@@ -101,22 +106,22 @@ def resolve_paint(
     return _gradient(element, document, viewport, subpaths, matrix, fallback)
 
 
-def flat_paint(text: str, style: Style) -> Flat | None:
+def flat_paint(text: str, style: Style) -> FlatColor | None:
     """Return a colour, or None for ``none``; raises as ``parse_color``."""
     text = text.strip().lower()
     if text == "none":
         return None
     color = parse_color(style["color"] if text == "currentcolor" else text)
-    return Flat(*color) if color else BLACK
+    return FlatColor(*color) if color else BLACK
 
 
 def _gradient(
     element: Element,
     document: Document,
-    viewport: Viewport,
+    viewport: SvgViewport,
     subpaths: list[Subpath],
     matrix: Matrix,
-    fallback: Flat | None,
+    fallback: FlatColor | None,
 ) -> Colouring | None:
     chain = _chain(element, document)
     if chain.stops is None:
@@ -138,7 +143,7 @@ def _gradient(
     extent = box[1] - box[0]
     if of_box and not (extent > 0).all():
         return fallback
-    unit = Viewport(1.0, 1.0, viewport.font_size) if of_box else viewport
+    unit = SvgViewport(1.0, 1.0, viewport.font_size) if of_box else viewport
 
     def get(name: str, default: str) -> float:
         value = attribute({name: given(name) or default}, name, unit)
@@ -173,7 +178,7 @@ PLACES = {"x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "fr"}
 
 
 class _Chain(NamedTuple):
-    """What a gradient and those that it links to, directly or not, have."""
+    """The stops and attributes of a gradient and of those that it links to, directly or not."""
 
     stops: Element | None
     """The first gradient with stops; None: there is none before an element that is no gradient."""
@@ -236,10 +241,10 @@ def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tupl
     return product(translation(x, y), np.diag([radius, radius, 1.0])), focus
 
 
-def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[Flat, ...]]:
+def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[FlatColor, ...]]:
     """Return the offsets, each at least the one before, and the colours of a gradient's stops."""
     offsets: list[float] = []
-    stops: list[Flat] = []
+    stops: list[FlatColor] = []
     for child in element:
         if name_of(child) != "stop":
             continue
@@ -250,5 +255,5 @@ def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tup
         offsets.append(max(given, before))
         color = flat_paint("black" if style["stop-color"] == "none" else style["stop-color"], style)
         assert color
-        stops.append(Flat(color.color, color.opacity * fraction(style["stop-opacity"])))
+        stops.append(FlatColor(color.color, color.opacity * fraction(style["stop-opacity"])))
     return tuple(offsets), tuple(stops)

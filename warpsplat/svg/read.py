@@ -27,7 +27,7 @@ from warpsplat.scene import (
     Spread,
 )
 from warpsplat.scene.scene import IntArray, starts_of
-from warpsplat.svg.gradients import Flat, Gradient
+from warpsplat.svg.gradients import FlatColor, Gradient
 from warpsplat.svg.paths import Points, Subpath, line
 from warpsplat.svg.shapes import Shape, opacity_of
 from warpsplat.svg.structure import read_shapes
@@ -72,7 +72,7 @@ def _outlines(shapes: list[Shape]) -> list[_Outline]:
 
 def _is_background(shape: Shape, width: int, height: int) -> bool:
     """Return whether a shape is an opaque upright rectangle that covers the canvas."""
-    if not (shape.is_rect and isinstance(shape.paint, Flat) and opacity_of(shape) == 1):
+    if not (shape.is_rect and isinstance(shape.paint, FlatColor) and opacity_of(shape) == 1):
         return False
     corners = shape.subpaths[0].points[::3]
     upright = (np.isclose(np.diff(corners, axis=0), 0, atol=1e-6).sum(axis=1) >= 1).all()
@@ -145,7 +145,7 @@ def scene_of(
         dashes=tuple(styles),
         layer=_layers([shape.level for shape in shapes]),
         colors=np.array(
-            [s.paint.color if isinstance(s.paint, Flat) else (0.0, 0.0, 0.0) for s in shapes], np.float32
+            [s.paint.color if isinstance(s.paint, FlatColor) else (0.0, 0.0, 0.0) for s in shapes], np.float32
         ).reshape(-1, 3),
     )
     return _with_pictures(_with_gradients(scene, shapes), shapes), has_background

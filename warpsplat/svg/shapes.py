@@ -17,19 +17,19 @@ from warpsplat.scene import Cap, Join, Picture, Rule
 from warpsplat.svg.css import ANIMATED
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
-from warpsplat.svg.gradients import Colouring, Flat, resolve_paint
+from warpsplat.svg.gradients import Colouring, FlatColor, resolve_paint
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Points, Subpath, cubics
 from warpsplat.svg.style import Style
-from warpsplat.svg.values import Viewport, fraction, length, lengths, parse_color
+from warpsplat.svg.values import SvgViewport, fraction, length, lengths, parse_color
 
 MAX_EXTENT = 1e5
 """Largest distance of a shape from the canvas's corner [px]: beyond, float32 is too coarse."""
 
 
 @dataclass(frozen=True)
-class Line:
-    """How a stroke is drawn, in canvas units."""
+class LineStyle:
+    """Geometry of a stroke, in canvas units."""
 
     width: float
     cap: Cap
@@ -53,7 +53,7 @@ class Shape:
     paint: Colouring | Picture
     opacity: float
     """A factor on the paint's opacity."""
-    line: Line | None
+    line: LineStyle | None
     """None: a fill."""
     rule: Rule = Rule.NONZERO
     is_twin: bool = False
@@ -77,20 +77,20 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Place:
+class Placement:
     """The style and coordinates that an element is drawn with."""
 
     style: Style
     matrix: Matrix
     """Map of its units to canvas units."""
-    viewport: Viewport
+    viewport: SvgViewport
     context: tuple[str, str]
     """The values of ``context-fill`` and ``context-stroke``."""
     is_linked: bool = False
     """Whether a link shows it; others may show it as well."""
 
 
-def element_shapes(element: Element, document: Document, place: Place) -> list[Shape]:
+def element_shapes(element: Element, document: Document, place: Placement) -> list[Shape]:
     """Return the shapes that an element draws, in painter's order.
 
     Raises:
@@ -143,7 +143,9 @@ _cubics_with_dots = functools.partial(_cubics, keep_dots=True)
 ANIMATIONS = {"animate", "animateTransform", "animateMotion", "set"}
 
 
-def _paint(name: str, style: Style, document: Document, place: Place, own: list[Subpath]) -> Colouring | None:
+def _paint(
+    name: str, style: Style, document: Document, place: Placement, own: list[Subpath]
+) -> Colouring | None:
     """Return the paint of a fill or stroke; None: it has none."""
     text = style[name].strip()
     if text in CONTEXTS:
@@ -158,7 +160,7 @@ def _paint(name: str, style: Style, document: Document, place: Place, own: list[
 CONTEXTS = ("context-fill", "context-stroke")
 
 
-def _line(style: Style, place: Place) -> Line | None:
+def _line(style: Style, place: Placement) -> LineStyle | None:
     """Return how a stroke is drawn; None: it is not."""
     viewport, scale = place.viewport, similarity(place.matrix) or 1.0
 
@@ -177,7 +179,7 @@ def _line(style: Style, place: Place) -> Line | None:
         dashes = []
     dashes *= 1 + len(dashes) % 2
     offset = get("stroke-dashoffset", 0.0) % sum(dashes) if dashes else 0.0
-    return Line(
+    return LineStyle(
         width * scale,
         CAPS.get(style["stroke-linecap"], Cap.BUTT),
         JOINS.get(style["stroke-linejoin"], Join.MITER),
@@ -201,7 +203,7 @@ def _strokes_first(order: str) -> bool:
     return "stroke" in words and "fill" not in words[: words.index("stroke")]
 
 
-def _check(style: Style, subpaths: list[Subpath], line: Line | None) -> None:
+def _check(style: Style, subpaths: list[Subpath], line: LineStyle | None) -> None:
     """Raise ``ImageError`` for an element that a scene cannot hold."""
     if any(style[name] != "none" for name in ("marker-start", "marker-mid", "marker-end")):
         raise ImageError("uses markers, not supported")
@@ -232,4 +234,4 @@ def _is_of_pixels(subpaths: list[Subpath]) -> bool:
 
 def opacity_of(shape: Shape) -> float:
     """Return a shape's opacity; that of a gradient's stops comes on top."""
-    return shape.opacity * (shape.paint.opacity if isinstance(shape.paint, Flat) else 1.0)
+    return shape.opacity * (shape.paint.opacity if isinstance(shape.paint, FlatColor) else 1.0)

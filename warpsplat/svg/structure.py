@@ -23,14 +23,14 @@ from warpsplat.svg.geometry import (
     translation,
     view_box_map,
 )
-from warpsplat.svg.gradients import Flat
+from warpsplat.svg.gradients import FlatColor
 from warpsplat.svg.groups import LEVEL_ID
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
 from warpsplat.svg.kept import Keeping, Part, shapes_of
 from warpsplat.svg.paths import Points
-from warpsplat.svg.shapes import CONTEXTS, Place, Shape, element_shapes
+from warpsplat.svg.shapes import CONTEXTS, Placement, Shape, element_shapes
 from warpsplat.svg.style import DRAWN, ROOT, Style
-from warpsplat.svg.values import Viewport, fraction, parse_color
+from warpsplat.svg.values import SvgViewport, fraction, parse_color
 
 MAX_LINKED = 100_000
 """Most elements shown through links, which may multiply."""
@@ -75,14 +75,14 @@ class _Unit:
 
 @dataclass(frozen=True)
 class _Context:
-    """What an element inherits."""
+    """Properties that an element inherits."""
 
     style: Style
     """Its parent's."""
     matrix: Matrix
-    viewport: Viewport
+    viewport: SvgViewport
     paints: tuple[str, str]
-    """See ``Place.context``."""
+    """See ``Placement.context``."""
     path: tuple[Element, ...]
     """The links that led here."""
     depth: int
@@ -129,8 +129,8 @@ def read_parts(
 ) -> tuple[list[Part], Document]:
     """Return the shapes as ``read_shapes``, and the document.
 
-    ``keep``: elements that ``read_shapes`` refuses are parts as well; it refuses only what the root or style
-    sheets say.
+    ``keep``: elements that ``read_shapes`` refuses are parts as well; only the root and style sheets may be
+    refused.
     """
     root = inspect_svg(text).root
     try:
@@ -144,11 +144,11 @@ def read_parts(
         raise ImageError(f"not an SVG that can be read: {cause_of(error)[:100]}") from error
 
 
-def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) -> tuple[Matrix, Viewport]:
+def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) -> tuple[Matrix, SvgViewport]:
     """Return the map of user units to canvas units, and the viewport."""
     size = svg_size(root)
     if size is None:
-        raise ImageError("says neither its size nor a viewBox")
+        raise ImageError("has neither its size nor a viewBox")
     if scale is None and abs(size[0] / size[1] - width / height) > 0.02 * width / height:
         raise ImageError(
             f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
@@ -158,8 +158,8 @@ def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) 
     matrix = np.diag([*sides, 1.0])
     view, box = view_box_map(root, *size), view_box(root)
     if view is None or box is None:
-        return matrix, Viewport(*size)
-    return product(matrix, view), Viewport(*box[2:])
+        return matrix, SvgViewport(*size)
+    return product(matrix, view), SvgViewport(*box[2:])
 
 
 class _Walk:
@@ -174,7 +174,7 @@ class _Walk:
         self._seen_linked: set[Element] = set()
         self._work = 0
 
-    def parts_in(self, matrix: Matrix, viewport: Viewport) -> list[Part]:
+    def parts_in(self, matrix: Matrix, viewport: SvgViewport) -> list[Part]:
         """Return all shapes, mapped by ``matrix``, and elements that are kept."""
         self._background(matrix, viewport)
         self._todo = [(self._document.root, _Context(ROOT, matrix, viewport, ("none", "none"), (), 0))]
@@ -222,7 +222,7 @@ class _Walk:
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         end = _End(unit, len(self._shapes), fraction(style["opacity"]), clip)
         if tag in DRAWN:
-            place = Place(style, matrix, viewport, context.paints, bool(context.path))
+            place = Placement(style, matrix, viewport, context.paints, bool(context.path))
             own = element if self._keep and not context.link else None
             self._shapes += [
                 replace(shape, element=own, level=context.level)
@@ -342,7 +342,7 @@ class _Walk:
             parts = [*faded] if end.opacity > 0 else []
         self._shapes[end.first :] = parts
 
-    def _background(self, matrix: Matrix, viewport: Viewport) -> None:
+    def _background(self, matrix: Matrix, viewport: SvgViewport) -> None:
         """Add the root's ``background-color``, which is painted below all shapes."""
         style = self._document.style_of(self._document.root)
         color = parse_color(style["background-color"])
@@ -356,7 +356,7 @@ class _Walk:
         x, y = box[:2] if box else (0.0, 0.0)
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [viewport.width, viewport.height] + [x, y]
         self._shapes.append(
-            Shape([polygon(moved(matrix, corners))], Flat(*color), 1.0, None, Rule.NONZERO, is_rect=True)
+            Shape([polygon(moved(matrix, corners))], FlatColor(*color), 1.0, None, Rule.NONZERO, is_rect=True)
         )
 
 

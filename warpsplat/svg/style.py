@@ -107,8 +107,9 @@ def element_style(element: ElementTree.Element, rules: Sequence[Declaration], pa
 
 
 def _cascade(attributes: Mapping[str, str], rules: Sequence[Declaration]) -> Style:
-    """Return the values that an element itself is given (CSS 2.1, 6.4): important declarations win, then
-    ``style``, then rules, then attributes.
+    """Return the values given to an element itself (CSS 2.1, 6.4).
+
+    Important declarations win, then ``style``, then rules, then attributes.
     """
     own: Style = {
         name: value.strip()

@@ -19,7 +19,7 @@ OTHER_UNITS = re.compile(
 
 
 @dataclass(frozen=True)
-class Viewport:
+class SvgViewport:
     """The lengths that percentages and font units refer to."""
 
     width: float

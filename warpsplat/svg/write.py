@@ -317,9 +317,7 @@ def own_head(text: str) -> re.Match[str]:
 
 
 def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> str:
-    """Return a file written here magnified by ``scale``, cropped to ``width`` x ``height`` px from row
-    ``top``.
-    """
+    """Return a file written here magnified by ``scale``, cropped to this size [px] from row ``top``."""
     text = _plain(text)
     found = own_head(text)
     unit = float(found[3]) / float(found[1]) / scale
@@ -341,8 +339,7 @@ def minified(text: str) -> str:
 
 
 SHORT = 1500
-"""Files of fewer characters have no comment: the order of their attributes marks them (see ``files.output``).
-"""
+"""Files of fewer characters have no comment: the order of attributes marks them (see ``files.marks``)."""
 
 SHORT_HEAD = re.compile(
     rf'<svg viewBox="0 0 ([\d.]+) ([\d.]+)" xmlns="{re.escape(NAMESPACE)}" height="(\d+)" width="(\d+)">'
