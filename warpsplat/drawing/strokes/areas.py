@@ -16,6 +16,9 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray
 
 INNER = np.ones((5, 5), np.uint8)  # around the pixels of an area that have its colour, where it is that broad
+NARROW = 1.6  # width down to which a part of an area belongs to it, over the width of the lines
+TIP = 3.0  # how far narrower corners and tips may reach, over the same; what reaches further is a line
+NEARBY = 15  # [px] side of the window whose mean colour is that of an area or of the paper
 
 
 @dataclass(frozen=True)
@@ -56,10 +59,6 @@ def _inner(inside: np.ndarray) -> np.ndarray:
     return inner if inner.any() else inside
 
 
-NARROW = 1.6  # width down to which a part of an area belongs to it, over the width of the lines
-TIP = 3.0  # how far narrower corners and tips may reach, over the same; what reaches further is a line
-
-
 def split_areas(ink: Ink) -> tuple[Ink, Areas | None]:
     """Return ink without its filled areas, and these; None where there are none.
 
@@ -91,9 +90,6 @@ def _cover(shown: FloatArray, area: Bools, lines: Bools) -> FloatArray:
     way = full - paper
     share = ((shown - paper) * way).sum(axis=2) / np.maximum((way**2).sum(axis=2), 1e-6)
     return np.asarray(np.where(deep, 1, np.where(near & ~lines, np.clip(share, 0, 1), 0)), np.float32)
-
-
-NEARBY = 15  # [px] side of the window whose mean colour is that of an area or of the paper
 
 
 def _mean_nearby(shown: FloatArray, where: Bools) -> FloatArray:

@@ -12,6 +12,10 @@ from warpsplat.drawing.trace.grids import Bools, Floats, depth
 from warpsplat.portable import filters
 
 USUAL = 0.75  # quantile of the width along all lines that counts as theirs: much of the rest is texture
+BROAD = 2.0  # half the width from which on ink is an area, over the width of the lines
+FILLING = 1.2  # [px] width of the lines that fill areas, at the least
+OVERLAP = 0.15  # of neighbouring rings, over their width
+SMALLEST = 8  # points of a ring, at the least
 
 
 def pen_width(mask: Bools) -> float:
@@ -19,12 +23,6 @@ def pen_width(mask: Bools) -> float:
     away = filters.distance(mask)
     ridge = mask & (away >= cv2.dilate(away, np.ones((3, 3), np.uint8)))
     return max(1.0, 2 * float(np.quantile(away[ridge], USUAL)) - 1) if ridge.any() else 1.0
-
-
-BROAD = 2.0  # half the width from which on ink is an area, over the width of the lines
-FILLING = 1.2  # [px] width of the lines that fill areas, at the least
-OVERLAP = 0.15  # of neighbouring rings, over their width
-SMALLEST = 8  # points of a ring, at the least
 
 
 def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:

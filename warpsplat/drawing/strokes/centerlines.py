@@ -117,16 +117,7 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Strokes:
 
 
 def _center_lines(ink: Ink, split: _Split, graph: Graph, radii: Floats, fine: int, pens: Ints) -> list[Line]:
-    """Return the lines along the edges of a skeleton.
-
-    Args:
-        ink: Of the image.
-        split: Of it.
-        graph: The skeleton of its thin part, ``fine`` times as large.
-        radii: Half the width of the ink at each pixel of that.
-        fine: How many times.
-        pens: Of the edges.
-    """
+    """Return the lines along a skeleton that is ``fine`` times as large as the ink; ``pens``: its edges'."""
     around = cv2.dilate(ink.cover - split.thin.cover, np.ones((5, 5), np.uint8)) > 0
     away = None if split.apart is None else distance_from(split.apart)
     lines = []

@@ -15,6 +15,11 @@ STRAIGHT = 0.6427876  # cosine of the turn up to which a line goes on through a 
 End = tuple[int, int]
 """An edge's number, and 0 where it begins or 1 where it ends."""
 
+REACH = 4.0  # length of line that tells in which direction it leaves a junction, over half the ink's width
+BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
+FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
+SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
+
 
 def find_chains(graph: Graph, pens: Ints) -> list[tuple[list[Edge], int]]:
     """Return edges of one pen that go straight on into one another, in order and direction, and their pen.
@@ -61,11 +66,6 @@ def _continued(graph: Graph, pens: Ints) -> dict[End, End]:
             if -bend >= STRAIGHT and ends[i] not in found and ends[j] not in found:
                 found[ends[i]], found[ends[j]] = ends[j], ends[i]
     return found
-
-
-REACH = 4.0  # length of line that tells in which direction it leaves a junction, over half the ink's width
-BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
-FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
 
 
 def _way(edge: Edge, end: int, radius: float) -> Floats:
@@ -140,9 +140,6 @@ def _unbent(graph: Graph, edge: Edge) -> Floats:
         before, after = scale * before, scale * after
     inner = (along > 0) & (along < total) if edge.nodes[0] != edge.nodes[1] else along >= 0
     return np.asarray(edge.points[inner & (along >= before) & (along <= total - after)])
-
-
-SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
 
 
 def smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Floats, bool]:

@@ -65,7 +65,7 @@ def round_dots(ink: Ink, width: float) -> tuple[list[Dot], Bools]:
     return dots, filters.resize_area(covered, ink.mask.shape[::-1]) > 0.5
 
 
-BESIDE, NARROWER = 1.6, 0.65
+RIM, NARROWER = 1.6, 0.65
 """How far beside a dot its ink is measured, over its width, and how broad it may be there, over the same."""
 
 
@@ -76,7 +76,7 @@ def _goes_on(away: Floats, ends: Floats, width: float) -> bool:
     right, bottom = np.ceil(ends.max(axis=0)).astype(int) + reach
     near = away[top:bottom, left:right]
     around, inner = np.zeros(near.shape, np.uint8), np.zeros(near.shape, np.uint8)
-    _draw(around, ends - (left, top), BESIDE * width)
+    _draw(around, ends - (left, top), RIM * width)
     _draw(inner, ends - (left, top), width)
     ring = (around > 0) & (inner == 0)
     return bool(ring.any() and near[ring].max() > NARROWER * 0.5 * width)

@@ -52,8 +52,8 @@ FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 
 DARK = 0.6  # contrast of a small dot that is no dirt, over that of strong ink
 NOISELESS = 0.01  # standard deviation of the noise up to which nothing is blurred
-NEAR = 9  # [px] side of the window in which ink is compared with the strongest beside it
-BESIDE = 31  # [px] side of the window in which there is full ink
+STRONGEST_WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
+FULL_WINDOW = 31  # [px] side of the window in which there is full ink
 
 
 def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
@@ -79,7 +79,7 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
     contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed, alone=mixed)
     seed = max(floor, limits.seed * strong)
-    strongest = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
+    strongest = cv2.dilate(contrast, np.ones((STRONGEST_WINDOW, STRONGEST_WINDOW), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(strongest, seed), floor)
     seeds = contrast > seed
     if not is_textured:
@@ -89,9 +89,9 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
         seeds |= mass > max(SURE, 2 * grain)
     sure = contrast > (np.inf if is_textured else DARK * strong)
     mask = _without_specks(mask, seeds, sure, limits)
-    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8))
+    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((FULL_WINDOW, FULL_WINDOW), np.uint8))
     # Ink that is lighter than elsewhere is thinner than a pixel, to some extent.
-    full = np.maximum(filters.box_blur(full, NEAR), limits.full * strong)
+    full = np.maximum(filters.box_blur(full, STRONGEST_WINDOW), limits.full * strong)
     kernel = np.ones((5, 5), np.uint8)
     around = cv2.dilate(mask.astype(np.uint8), kernel) > 0
     cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)

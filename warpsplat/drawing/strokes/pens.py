@@ -12,6 +12,11 @@ from warpsplat.scene import FloatArray
 
 WHOLE = 0.85  # cover of a line's pixels from which on they have its colour
 LEAST_COVER = 0.1  # cover from which on its colour can be told
+ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
+SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
+MOST = 8  # pens
+STEP = 0.12  # deviation of the logarithm of a line's width from which on it is drawn in steps
+SHORTEST = 3.0  # length of a step, over the line's width, at the least
 
 
 def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
@@ -38,11 +43,6 @@ def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
             color = np.clip(paper + (color - paper) / share, 0, 1)
         colors[number] = color
     return colors, np.array([len(line) for line in lines], np.float64)
-
-
-ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
-SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
-MOST = 8  # pens
 
 
 def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
@@ -91,10 +91,6 @@ def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
     sums = np.cumsum(weights[order], axis=0)
     middle = (sums >= 0.5 * sums[-1]).argmax(axis=0)
     return np.asarray(np.take_along_axis(values, np.take_along_axis(order, middle[None], 0), 0)[0])
-
-
-STEP = 0.12  # deviation of the logarithm of a line's width from which on it is drawn in steps
-SHORTEST = 3.0  # length of a step, over the line's width, at the least
 
 
 def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:

@@ -18,6 +18,8 @@ Bools = npt.NDArray[np.bool_]
 NO_REGION = -1
 """Label of a pixel that is in no region, and of everything outside the image."""
 
+SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
+
 
 def channel_max(values: Floats) -> Floats:
     """Return the maximum over the last axis, ten times as fast as NumPy where that axis is short."""
@@ -97,9 +99,6 @@ def crossings(labels: Ints) -> Bools:
     """Find the corners where two labels meet as on a chessboard, shape (height - 1, width - 1)."""
     a, b, c, d = labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]
     return np.asarray((a == d) & (b == c) & (a != b))
-
-
-SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
 
 
 def prefers_main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:

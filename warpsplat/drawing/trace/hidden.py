@@ -16,6 +16,7 @@ NEAREST, DEEPEST, DEPTH_STEP = 0.5, 16.0, 0.5
 """How far beyond its boundary what hides a region is measured: first, at the most, and between [px]."""
 
 MARGIN = 0.7  # [px] between a hidden line and where it would be seen
+CUT_OFF = 1.0  # [px squared] area of its region that a hidden outline may cut off
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,6 @@ class Cover:
             reach[is_hidden] = depth
         near = middle + NEAREST * np.stack([steps[:, 1], -steps[:, 0]], axis=1)
         return np.where(reach[:, None] > NEAREST, middle + 0.5 * reach[:, None] * outward, near)
-
-
-CUT_OFF = 1.0  # [px squared] area of its region that a hidden outline may cut off
 
 
 def shortest_way(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, through_holes: bool) -> Floats:

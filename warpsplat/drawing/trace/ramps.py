@@ -17,6 +17,12 @@ from warpsplat.scene import Paint
 SAMPLES = 4000  # pixels of a region that a ramp is fitted to, at the most
 LEAST_SLOPES = 8  # pixels where the slope is known, at the least
 RADIAL_HANDICAP = 0.1  # by which the residual of a radial gradient must be smaller, over that of a linear one
+SPAN = 3  # [px] over which the slope is taken, each way
+BLUR = 1.5  # [px] standard deviation of the filter before that
+BINS = 48  # places along a ramp where its colour is measured
+STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
+OFF = 1.0  # [levels] of the colours between two stops from the straight way, at the most
+MOST_STOPS = 8
 
 
 @dataclass(frozen=True)
@@ -63,10 +69,6 @@ def _sampled(mask: Bools) -> tuple[Ints, Ints]:
     rows, columns = np.nonzero(mask)
     pick = np.linspace(0, len(rows) - 1, min(SAMPLES, len(rows))).astype(np.intp)
     return rows[pick], columns[pick]
-
-
-SPAN = 3  # [px] over which the slope is taken, each way
-BLUR = 1.5  # [px] standard deviation of the filter before that
 
 
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
@@ -117,9 +119,6 @@ def _radial(points: Floats, colors: Floats, center: Floats) -> Ramp:
     return Ramp(Paint.RADIAL, frame, *_profile(distance / reach, colors))
 
 
-BINS = 48  # places along a ramp where its colour is measured
-
-
 def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
     """Fit stops to the colours along ``t`` in 0..1: their offsets, their colours, and the residual."""
     knots = np.linspace(0, 1, BINS + 1)
@@ -134,9 +133,6 @@ def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
 
 def _interpolated(t: Floats, offsets: Floats, colors: Floats) -> Floats:
     return np.stack([interp(t, offsets, channel) for channel in colors.T], axis=1)
-
-
-STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
 
 
 def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
@@ -160,10 +156,6 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     beside[:-1] -= 2 * stiff
     beside[1:] -= 2 * stiff
     return solve_banded([here, beside, np.full(count - 2, stiff)], right)
-
-
-OFF = 1.0  # [levels] of the colours between two stops from the straight way, at the most
-MOST_STOPS = 8
 
 
 def _fewest(knots: Floats, values: Floats) -> Floats:

@@ -107,13 +107,7 @@ class OutlineTracer:
         return self.loops.vertices[cracks[1:]][directions[1:] != directions[:-1]].astype(np.float64)
 
     def _points(self, cracks: Ints, *, closed: bool, places: Floats | None = None) -> Floats:
-        """Return the good points of a stretch, without those where three regions meet.
-
-        Args:
-            cracks: Of the stretch.
-            closed: Whether it is a whole loop.
-            places: A point for each crack, instead of those of the boundary.
-        """
+        """Return the good points of a stretch, or of other ``places``, without those at T-junctions."""
         if places is None:
             places = self.boundary.points[cracks]
         others = self.loops.others[cracks]

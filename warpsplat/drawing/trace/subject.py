@@ -118,12 +118,7 @@ MOSTLY_FREQUENT = 0.97  # least share of the pixels in such colours
 
 
 def _cell(image: FloatArray, counts: Ints) -> int | None:
-    """Return the side of the cells that pixel art is made of [px]; None for other images.
-
-    Args:
-        image: As ``guess_subject`` takes it.
-        counts: How many pixels have each of its colours.
-    """
+    """Return the side of the cells of pixel art [px]; None for other images. ``counts``: of its colours."""
     height, width = image.shape[:2]
     if not 2 <= len(counts) <= PIXEL_COLORS:
         return None
@@ -198,12 +193,9 @@ NEAR_COLOR = 6  # [levels] distance of a pixel from a colour that it counts as
 
 
 def _few_colors(levels: Ints, edges: Bools, blurs: int) -> float:
-    """Return the share of the pixels near one of few colours, edges aside: JPEG leaves it large in drawings.
+    """Return the share of the pixels near one of few colours, after ``blurs`` by a median, edges aside.
 
-    Args:
-        levels: Shape (height, width, channel).
-        edges: Shape (height, width).
-        blurs: How often each pixel becomes the median of those around it before.
+    JPEG leaves it large in drawings.
     """
     calm = np.ascontiguousarray(levels.astype(np.uint8))
     for _ in range(blurs):
