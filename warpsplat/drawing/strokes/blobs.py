@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 
@@ -46,5 +44,4 @@ def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:
         mask = (inner & (away > level)).astype(np.uint8)
         found, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         rings += [contour.reshape(-1, 2) + 0.5 for contour in found if len(contour) >= SMALLEST]
-    hollow = replace(ink, mask=ink.mask & ~inner, cover=np.where(inner, 0, ink.cover).astype(np.float32))
-    return hollow, rings, width
+    return ink.without(inner), rings, width

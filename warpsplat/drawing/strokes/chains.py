@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.drawing.strokes.skeleton import Edge, Graph
-from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
 from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.portable.elementary import exp, hypot
 from warpsplat.portable.sequences import convolve, interp
@@ -95,8 +95,7 @@ def traced(graph: Graph, edges: list[Edge], radii: Floats) -> tuple[Floats, Floa
     """
     parts = [_unbent(graph, edge) for edge in edges]
     points = np.concatenate(parts)
-    rows, columns = (np.clip(points[:, a].astype(np.intp), 0, radii.shape[1 - a] - 1) for a in (1, 0))
-    widths = 2 * radii[rows, columns]
+    widths = 2 * at_pixels(radii, points)
     first = edges[0].nodes[0]
     closed = first == edges[-1].nodes[1] and len(parts[0]) > 0 and _is_smooth_ring(graph, edges)
     if not closed:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from warpsplat.drawing.strokes.ink import Ink
-from warpsplat.drawing.trace.grids import Bools, Floats, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, depth, dilated
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import principal_direction
@@ -113,12 +112,6 @@ def _draw(image: np.ndarray, ends: Floats, width: float) -> None:
     cv2.line(image, start, end, 1, max(1, round(width)))
 
 
-def without(ink: Ink, covered: Bools) -> Ink:
-    """Return ink without what is ``covered``, shape (height, width)."""
-    cover = np.where(covered, 0, ink.cover).astype(np.float32)
-    return replace(ink, mask=ink.mask & ~covered, cover=cover)
-
-
 VISIBLE, VISIBLE_SHARE = 0.8, 0.09
 """Half the width of bare ink from which on it is seen [px], and over the width of the broadest dot."""
 
@@ -196,8 +189,8 @@ def _fineness(ink: Ink) -> int:
 def _inked(ink: Ink, fine: int) -> Bools:
     """Return where ink is, on the fine grid."""
     size = (ink.mask.shape[1] * fine, ink.mask.shape[0] * fine)
-    near = cv2.dilate(ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return np.asarray(filters.resize_cubic(np.where(near, ink.cover, 0), size) > 0.5)
+    cover = np.where(dilated(ink.mask, 3), ink.cover, 0)
+    return np.asarray(filters.resize_cubic(cover, size) > 0.5)
 
 
 def _drawn(lines: list[tuple[Floats, Floats, bool]], shape: tuple[int, int], fine: int) -> np.ndarray:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from warpsplat.drawing.strokes.ridges import FAINT, NOISY, SURE, across, middles, with_thin
-from warpsplat.drawing.trace.grids import Bools
+from warpsplat.drawing.trace.grids import Bools, dilated, eroded
 from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
 
@@ -27,6 +27,11 @@ class Ink:
     """The paper's colour, sRGB in [0, 1], shape (3,); None: transparent."""
     textured: bool = False
     """Whether crayons leave what cannot be told from thin lines and dots."""
+
+    def without(self, covered: Bools) -> Ink:
+        """Return the ink without what is ``covered``, shape (height, width)."""
+        cover = np.where(covered, 0, self.cover).astype(np.float32)
+        return replace(self, mask=self.mask & ~covered, cover=cover)
 
 
 @dataclass(frozen=True)
@@ -92,10 +97,8 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     full = cv2.dilate(np.where(mask, contrast, 0), np.ones((FULL_WINDOW, FULL_WINDOW), np.uint8))
     # Ink that is lighter than elsewhere is thinner than a pixel, to some extent.
     full = np.maximum(filters.box_blur(full, STRONGEST_WINDOW), limits.full * strong)
-    kernel = np.ones((5, 5), np.uint8)
-    around = cv2.dilate(mask.astype(np.uint8), kernel) > 0
-    cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
-    cover[cv2.erode(mask.astype(np.uint8), kernel) > 0] = 1
+    cover = np.where(dilated(mask, 5), np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
+    cover[eroded(mask, 5)] = 1
     return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper, is_textured)
 
 
@@ -196,7 +199,7 @@ SMALLEST_DARK = 2  # [px] of a dark one
 
 def _without_specks(mask: Bools, seeds: Bools, dark: Bools, limits: _Limits) -> Bools:
     """Return the parts of ``mask`` with enough seeds that are no specks, or ``dark``, without pinholes."""
-    edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
+    edge = mask & ~eroded(mask, 3)
     width = 2 * float(mask.sum()) / max(1, int(edge.sum()))
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     sizes = stats[:, cv2.CC_STAT_AREA]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.drawing.strokes.ink import Ink
-from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
 from warpsplat.portable.elementary import exp, log
 from warpsplat.portable.filters import lab
 from warpsplat.scene import FloatArray
@@ -29,15 +29,12 @@ def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
     Returns:
         sRGB in [0, 1], shape (line, 3), and [px], shape (line,).
     """
-    height, width = ink.mask.shape
     colors = np.zeros((len(lines), 3), np.float32)
     paper = np.median(ink.shown[~ink.mask], axis=0) if not ink.mask.all() else np.ones(3)
     for number, line in enumerate(lines):
-        columns = np.clip(line[:, 0].astype(np.intp), 0, width - 1)
-        rows = np.clip(line[:, 1].astype(np.intp), 0, height - 1)
-        cover = ink.cover[rows, columns]
+        cover = at_pixels(ink.cover, line)
         best = cover >= np.quantile(cover, 0.7)
-        color = np.median(ink.shown[rows[best], columns[best]], axis=0)
+        color = np.median(at_pixels(ink.shown, line[best]), axis=0)
         share = float(np.median(cover[best]))
         if LEAST_COVER < share < WHOLE:  # mixed with the paper, as it covers no pixel
             color = np.clip(paper + (color - paper) / share, 0, 1)

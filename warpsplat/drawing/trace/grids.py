@@ -31,6 +31,23 @@ def depth(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     return filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
 
 
+def dilated(mask: npt.NDArray[Any], side: int) -> Bools:
+    """Return the pixels within a square of ``side`` px around those of a mask."""
+    return np.asarray(cv2.dilate(np.asarray(mask, np.uint8), np.ones((side, side), np.uint8)) > 0)
+
+
+def eroded(mask: npt.NDArray[Any], side: int) -> Bools:
+    """Return the pixels of a mask around which all of a square of ``side`` px is in it, or off the image."""
+    return np.asarray(cv2.erode(np.asarray(mask, np.uint8), np.ones((side, side), np.uint8)) > 0)
+
+
+def at_pixels(values: npt.NDArray[Any], points: Floats) -> npt.NDArray[Any]:
+    """Return the values of the pixels that points (point, 2) lie in, or of the nearest ones of the image."""
+    height, width = values.shape[:2]
+    columns, rows = points.astype(np.intp).T
+    return values[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
+
+
 class Sets:
     """Disjoint sets of 0 .. count - 1 (union-find)."""
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, eroded
 from warpsplat.portable.elementary import hypot
 
 NEAREST, DEEPEST, DEPTH_STEP = 0.5, 16.0, 0.5
@@ -53,7 +53,7 @@ class Cover:
         width, height = np.ceil(polygon.max(axis=0)).astype(np.intp) - low + 1
         mask = np.zeros((height, width), np.uint8)
         cv2.fillPoly(mask, [np.round(polygon - low - 0.5).astype(np.int32)], 1)
-        rows, columns = np.nonzero(cv2.erode(mask, np.ones((3, 3), np.uint8)))
+        rows, columns = np.nonzero(eroded(mask, 3))
         return bool(self.hides(rank, np.stack([columns, rows], axis=1) + low + 0.5).all())
 
     def middles(self, rank: int, begins: Ints, steps: Ints, trends: Floats) -> Floats:

@@ -49,8 +49,8 @@ class OutlineTracer:
     holed: Bools
     """Regions that are or contain something transparent, shape (region,)."""
 
-    def outlines(self, loop: int) -> list[Outline]:
-        """Return the contour of a loop; none where it is hidden altogether."""
+    def outline(self, loop: int) -> Outline:
+        """Return the contour of a loop; empty where it is hidden altogether."""
         low, high = int(self.loops.first[loop]), int(self.loops.first[loop + 1])
         cracks, rank = np.arange(low, high), int(self.ranks[self.loops.region[loop]])
         others = self.loops.others[low:high]
@@ -61,15 +61,15 @@ class OutlineTracer:
                 return []
             if self.loops.is_hole[loop]:  # left open, a little smaller than what lies over it
                 between = 0.5 * (self.boundary.points[cracks] + self._middles(rank, cracks))
-                return [[Polyline(self._points(cracks, closed=True, places=between), closed=True)]]
+                return [Polyline(self._points(cracks, closed=True, places=between), closed=True)]
             kinds[:] = SEEN
         if (kinds == kinds[0]).all():
-            return [[self._ring(cracks) if kinds[0] == SEEN else self._vertices_at_turns(cracks)]]
+            return [self._ring(cracks) if kinds[0] == SEEN else self._vertices_at_turns(cracks)]
         first = int(np.flatnonzero(kinds != np.roll(kinds, 1))[0])
         cracks, kinds = np.roll(cracks, -first), np.roll(kinds, -first)
         bounds = [*np.flatnonzero(np.diff(kinds, prepend=-1)).tolist(), len(kinds)]
         stretches: list[Stretch] = [(int(kinds[a]), cracks[a:b]) for a, b in itertools.pairwise(bounds)]
-        return [self._chain(rank, stretches)]
+        return self._chain(rank, stretches)
 
     def _ring(self, cracks: Ints) -> Polyline | Floats:
         """Return a loop that is seen all around."""

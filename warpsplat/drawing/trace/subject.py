@@ -8,7 +8,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth, dilated
 from warpsplat.drawing.trace.pixels import cell_size
 from warpsplat.portable.sequences import convolve
 from warpsplat.scene import FloatArray
@@ -69,7 +69,7 @@ def _guess(image: FloatArray) -> Guess:
     if _is_line_art(part):
         return Guess("line", "thin ink on paper")
     paper = (part == colors[counts.argmax()]).all(axis=2)
-    beside = cv2.dilate(edges.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    beside = dilated(edges, 3)
     if (paper | ~beside).mean() < GRAINY:
         few = _few_colors(part, np.zeros_like(edges), blurs=2)
         why = f"{few:.0%} of the pixels, without their grain, have one of {MOST_COLORS} colours"
@@ -171,7 +171,7 @@ def _is_line_art(levels: Ints) -> bool:
     blank = np.abs(grey.astype(np.int32) - paper) <= PAPER_NOISE
     if blank.mean() < LEAST_PAPER or ink.mean() < LEAST_INK:
         return False
-    beside = cv2.dilate(ink.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    beside = dilated(ink, 5)
     if (~blank & ~beside).mean() > max(0.005, 0.1 * ink.mean()):
         return False
     return bool(np.quantile(depth(ink)[ink], 0.97) <= max(LINE, LINE_SHARE * max(grey.shape)))
