@@ -83,8 +83,8 @@ def _cover(shown: FloatArray, area: Bools, lines: Bools) -> FloatArray:
     """Return the share of each pixel that areas cover, at their edge by its colour between paper and area."""
     deep = eroded(area, 3)
     full, paper = (_mean_nearby(shown, where) for where in (deep, ~dilated(area | lines, 5)))
-    way = full - paper
-    share = ((shown - paper) * way).sum(axis=2) / np.maximum((way**2).sum(axis=2), 1e-6)
+    contrast = full - paper
+    share = ((shown - paper) * contrast).sum(axis=2) / np.maximum((contrast**2).sum(axis=2), 1e-6)
     return np.asarray(
         np.where(deep, 1, np.where(dilated(area, 3) & ~lines, np.clip(share, 0, 1), 0)), np.float32
     )
@@ -135,8 +135,8 @@ def with_ends_in_areas(points: Floats, widths: Floats, away: Floats) -> tuple[Fl
         wide, apart = float(widths[-1]), float(at_pixels(away, points[-1:])[0])
         if apart <= wide + 1:
             back = points[-1] - points[max(0, len(points) - 1 - max(SMALLEST, round(2 * wide)))]
-            way = back / max(float(hypot(*back)), 1e-9)
-            points = np.concatenate([points, points[-1:] + (apart + wide) * way])
+            direction = back / max(float(hypot(*back)), 1e-9)
+            points = np.concatenate([points, points[-1:] + (apart + wide) * direction])
             widths = np.append(widths, wide)
         points, widths = points[::-1], widths[::-1]
     return points, widths

@@ -96,8 +96,8 @@ def _as_dot(own: Bools, radius: float) -> Dot | None:
     half = max(0.0, (len(places) - math.pi * radius * radius) / (4 * radius))
     if half > (LONGEST - 1) * radius:
         return None
-    way = principal_direction(places) if half else np.zeros(2)
-    ends = places.mean(axis=0) + np.stack([-half * way, half * way])
+    direction = principal_direction(places) if half else np.zeros(2)
+    ends = places.mean(axis=0) + np.stack([-half * direction, half * direction])
     shown = np.zeros(own.shape, np.uint8)
     _draw(shown, ends, 2 * radius)
     both = int((own & (shown > 0)).sum())

@@ -58,11 +58,11 @@ def _with_joined_lines(cubics: list[Floats], lines: list[bool]) -> Pieces:
 
 def _is_straight_on(one: Floats, other: Floats) -> bool:
     """Return whether the joint of two lines is on the line from the first's start to the second's end."""
-    way, here = other[3] - one[0], one[3] - one[0]
-    size = float(hypot(*way))
-    if size < 1e-6 or (here * way).sum() < 0 or ((other[3] - one[3]) * way).sum() < 0:
+    chord, here = other[3] - one[0], one[3] - one[0]
+    size = float(hypot(*chord))
+    if size < 1e-6 or (here * chord).sum() < 0 or ((other[3] - one[3]) * chord).sum() < 0:
         return False
-    return bool(abs(here[0] * way[1] - here[1] * way[0]) <= OFF_LINE * size)
+    return bool(abs(here[0] * chord[1] - here[1] * chord[0]) <= OFF_LINE * size)
 
 
 def joints_of(contour: Pieces) -> Ints:

@@ -1,4 +1,4 @@
-"""What lies above a region and hides it, and the shortest ways under it."""
+"""What lies above a region and hides it, and the shortest paths under it."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Cover:
 
     def hides_line(self, rank: int, start: Floats, end: Floats) -> bool:
         """Return whether a straight line with a margin is hidden, its ends aside."""
-        way = end - start
-        size = float(hypot(*way))
+        vector = end - start
+        size = float(hypot(*vector))
         if size < 1.5:
             return True
-        unit = way / size
+        unit = vector / size
         normal = MARGIN * np.array([-unit[1], unit[0]])
         points = start + np.arange(0.75, size - 0.5, 0.5)[:, None] * unit
         beside = [points, points[1:-1] + normal, points[1:-1] - normal]
@@ -77,8 +77,8 @@ class Cover:
         return np.where(reach[:, None] > NEAREST, middle + 0.5 * reach[:, None] * outward, near)
 
 
-def shortest_way(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, through_holes: bool) -> Floats:
-    """Return the corners of a way from the first to the last goal, hidden from a region of this rank.
+def shortest_path(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, through_holes: bool) -> Floats:
+    """Return the corners of a path from the first to the last goal, hidden from a region of this rank.
 
     Args:
         cover: What hides the region.
@@ -86,16 +86,16 @@ def shortest_way(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, th
         goals: Its ends and, beyond each crack between, a hidden point; shape (crack + 2, 2).
         vertices: Of the region's boundary, one more than there are cracks, the last one twice; shape
             (crack + 2, 2).
-        through_holes: Whether the way must not cross a part of the region that is seen through what is above.
+        through_holes: Whether what is above has holes, through which the path must not be seen.
     """
     cross = vertices[:-1, 0] * vertices[1:, 1] - vertices[:-1, 1] * vertices[1:, 0]
     swept = np.concatenate([[0.0], np.cumsum(cross)])
 
     def is_free(i: int, j: int) -> bool:
-        """Return whether the way may go straight from goal i to goal j."""
+        """Return whether the path may go straight from goal i to goal j."""
         # Cutting short must not cut off the region itself, which lies on the right.
-        way = vertices[j], goals[j], goals[i], vertices[i]
-        beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(way))
+        corners = vertices[j], goals[j], goals[i], vertices[i]
+        beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(corners))
         if beside > 2 * CUT_OFF or not cover.hides_line(rank, goals[i], goals[j]):
             return False
         if not through_holes:

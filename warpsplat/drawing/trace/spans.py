@@ -128,12 +128,12 @@ def _smoothed(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[
     columns %= count
     weights = weights[columns] * (number < counts[:, None])
     is_curved = (counts > 4) & (along[low + counts - 1] - along[low] > 2)
-    middles, ways = _parabolas(t, weights, is_curved, ring[columns])
-    size = hypot(*ways.T)
+    middles, slopes = _parabolas(t, weights, is_curved, ring[columns])
+    size = hypot(*slopes.T)
     still = size < 1e-9
-    ways[still] = (ring[np.minimum(places + 1, count - 1)] - ring[places - 1])[still]
-    size = np.where(still, hypot(*ways.T), size)
-    return middles, ways / np.maximum(size, 1e-9)[:, None]
+    slopes[still] = (ring[np.minimum(places + 1, count - 1)] - ring[places - 1])[still]
+    size = np.where(still, hypot(*slopes.T), size)
+    return middles, slopes / np.maximum(size, 1e-9)[:, None]
 
 
 def _parabolas(t: Floats, weights: Floats, is_curved: Bools, points: Floats) -> tuple[Floats, Floats]:

@@ -1,6 +1,7 @@
 """Regions as shapes that lie on one another.
 
-Each boundary is drawn by the upper one of its two regions; the lower one goes on under it, the shortest way.
+Each boundary is drawn by the upper one of its two regions; the lower one goes on under it,
+by the shortest path.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
-from warpsplat.drawing.trace.hidden import Cover, shortest_way
+from warpsplat.drawing.trace.hidden import Cover, shortest_path
 from warpsplat.drawing.trace.outlines import Boundary
 from warpsplat.drawing.trace.planar import STEPS, Loops
 from warpsplat.drawing.trace.spans import Polyline
@@ -153,7 +154,7 @@ class OutlineTracer:
                 goals = np.concatenate([start[None], self._middles(rank, cracks), end[None]])
                 vertices = self.loops.vertices[[*cracks, cracks[-1], cracks[-1]]].astype(np.float64)
                 holed = bool(self.holed[self.loops.others[cracks]].any())
-                parts.append(shortest_way(self.cover, rank, goals, vertices, through_holes=holed))
+                parts.append(shortest_path(self.cover, rank, goals, vertices, through_holes=holed))
         return parts
 
     def _ends(self, cracks: Ints) -> tuple[Floats, Floats]:
@@ -174,24 +175,24 @@ class OutlineTracer:
         tail = points[-5:]
         if len(tail) < 2:
             return vertex
-        middle, way = tail.mean(axis=0), principal_direction(tail)
-        way = way if (way * (tail[-1] - tail[0])).sum() > 0 else -way
+        middle, direction = tail.mean(axis=0), principal_direction(tail)
+        direction = direction if (direction * (tail[-1] - tail[0])).sum() > 0 else -direction
         if kind == EDGE:
-            return self._extended_to_edge(middle, way, vertex)
-        ahead, behind = ((place - middle) * way for place in (vertex, tail[-1]))
-        reached = middle + way * max(float(ahead.sum()), float(behind.sum()) + 0.1)
+            return self._extended_to_edge(middle, direction, vertex)
+        ahead, behind = ((place - middle) * direction for place in (vertex, tail[-1]))
+        reached = middle + direction * max(float(ahead.sum()), float(behind.sum()) + 0.1)
         if hypot(*(reached - vertex)) > 1.0:
             reached = vertex
-        further = reached + UNDER * way
+        further = reached + UNDER * direction
         return further if self.cover.hides(rank, further[None])[0] else reached
 
-    def _extended_to_edge(self, middle: Floats, way: Floats, vertex: Floats) -> Floats:
+    def _extended_to_edge(self, middle: Floats, direction: Floats, vertex: Floats) -> Floats:
         """Return where a line meets the edge of the image, or ``vertex`` if that is far away."""
         size = self.cover.ranks.shape[::-1]
         axis = 0 if vertex[0] in (0, size[0]) else 1
-        if abs(way[axis]) < 0.3:
+        if abs(direction[axis]) < 0.3:
             return vertex
-        reached = middle + way * (vertex[axis] - middle[axis]) / way[axis]
+        reached = middle + direction * (vertex[axis] - middle[axis]) / direction[axis]
         reached[axis] = vertex[axis]
         reached[1 - axis] = np.clip(reached[1 - axis], 0, size[1 - axis])
         return reached if hypot(*(reached - vertex)) < 1.5 else vertex

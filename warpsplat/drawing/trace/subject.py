@@ -1,4 +1,4 @@
-"""What an image shows, from its statistics: which way of vectorizing suits it."""
+"""Guess from its statistics what an image shows, and so how to vectorize it."""
 
 from __future__ import annotations
 
