@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
 from dataclasses import replace
 
@@ -14,6 +13,7 @@ from warpsplat.scene.joints import Joint
 from warpsplat.scene.scene import starts_of
 
 Outline = tuple[np.ndarray, list[Joint]]
+Point = tuple[float, float]
 
 ARC = 0.5522847498
 """Handles of a quarter of a circle, over its radius."""
@@ -27,11 +27,23 @@ def turned(points: np.ndarray, angle: float, centre: tuple[float, float]) -> np.
     return (points - centre) @ turn + centre
 
 
-def polygon(*corners: tuple[float, float]) -> Outline:
-    points = []
-    for a, b in itertools.pairwise([*corners, corners[0]]):
-        points += [np.add(a, np.subtract(b, a) * k / 3) for k in range(3)]
-    return np.array(points), LINE * len(corners)
+def outline(start: Point, *pieces: tuple[Point, ...]) -> Outline:
+    """A ring of lines (end,) and cubics (handle, handle, end), smooth where two cubics meet."""
+    points, joints = [], []
+    before = 1
+    for piece in pieces:
+        if len(piece) == 1:
+            points += [np.add(start, np.subtract(piece[0], start) * k / 3) for k in range(3)]
+            joints += LINE
+        else:
+            points += [start, *piece[:2]]
+            joints += [Joint.CORNER if before == 1 else Joint.SMOOTH, Joint.FREE, Joint.FREE]
+        start, before = piece[-1], len(piece)
+    return np.array(points), joints
+
+
+def polygon(*corners: Point) -> Outline:
+    return outline(corners[0], *((corner,) for corner in (*corners[1:], corners[0])))
 
 
 def star(x: float, y: float, outer: float, inner: float) -> Outline:
@@ -109,57 +121,13 @@ def logo(background: FloatArray | None = WHITE, spread: float = 0.0) -> Drawing:
 def seam(spread: float = 0.0) -> Drawing:
     """Two regions that fill the canvas and share a wavy edge, which a third one meets, 48 x 32 px."""
     top, middle, bottom = (20.0, 0.0), (24.0, 16.0), (22.0, 32.0)
-    down = [top, (16, 6), (21.0, 11.0), middle, (27, 21), (24, 27), bottom]
-    line = [np.array(middle) + np.subtract((48, 16), middle) * k / 3 for k in range(4)]
-    left = np.array(
-        [
-            *down,
-            (44 / 3, 32),
-            (22 / 3, 32),
-            (0, 32),
-            (0, 64 / 3),
-            (0, 32 / 3),
-            (0, 0),
-            (20 / 3, 0),
-            (40 / 3, 0),
-        ]
-    )
-    left_joints = [Joint.CORNER, Joint.FREE, Joint.FREE, Joint.SMOOTH, Joint.FREE, Joint.FREE, *LINE * 3]
-    upper = np.array(
-        [
-            top,
-            (88 / 3, 0),
-            (116 / 3, 0),
-            (48, 0),
-            (48, 16 / 3),
-            (48, 32 / 3),
-            *line[:0:-1],
-            middle,
-            *down[2:0:-1],
-        ]
-    )
-    upper_joints = [*LINE * 3, Joint.CORNER, Joint.FREE, Joint.FREE]
-    lower = np.array(
-        [
-            middle,
-            *line[1:],
-            (48, 64 / 3),
-            (48, 80 / 3),
-            (48, 32),
-            (118 / 3, 32),
-            (92 / 3, 32),
-            bottom,
-            *down[5:3:-1],
-        ]
-    )
-    lower_joints = [*LINE * 3, Joint.CORNER, Joint.FREE, Joint.FREE]
-    made = drawing(
-        Canvas(48, 32, WHITE),
-        (BLUE, [(left, left_joints)]),
-        (GOLD, [(upper, upper_joints)]),
-        (RED, [(lower, lower_joints)]),
-        spread=spread,
-    )
+    above, below = ((16.0, 6.0), (21.0, 11.0)), ((27.0, 21.0), (24.0, 27.0))
+    corner, side, end = (48.0, 0.0), (48.0, 16.0), (48.0, 32.0)
+    left = outline(top, (*above, middle), (*below, bottom), ((0, 32),), ((0, 0),), (top,))
+    upper = outline(top, (corner,), (side,), (middle,), (*above[::-1], top))
+    lower = outline(middle, (side,), (end,), (bottom,), (*below[::-1], middle))
+    canvas = Canvas(48, 32, WHITE)
+    made = drawing(canvas, (BLUE, [left]), (GOLD, [upper]), (RED, [lower]), spread=spread)
     if not spread:
         return made
     exact = seam().scene.points

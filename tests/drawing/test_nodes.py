@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon, seam
+from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, Outline, disc, drawing, logo, polygon, seam
 from tests.drawing.test_fit_outlines import assert_clean, psnr
 from tests.drawing.test_merge import halves
 from warpsplat.drawing.cells import (
@@ -21,14 +22,13 @@ from warpsplat.drawing.cells import (
     joined,
     sum_within,
 )
-from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.drawing.nodes import Edit, Outlines, applied, turned
-from warpsplat.drawing.tidy import Judge, apart, finish_drawing, rounds_for, tidied
+from warpsplat.drawing.tidy import apart, finish_drawing, rounds_for, tidied
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.renderer import Capacity, Renderer, render
+from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
 from warpsplat.scene.joints import Joint
@@ -43,28 +43,21 @@ def cells_at(places: Sequence[tuple[int, int]]) -> Cells:
 
 
 def split(made: Drawing) -> Drawing:
-    """Each piece in two, of points that shapes share both in the same way."""
+    """Return a drawing with each piece in two."""
     scene, on, following = made.scene, *made.links()
-    points, joints, same = [], [], []
-    numbers = iter(range(10_000, 90_000))
-    known: dict[tuple[float, ...], tuple[int, int, int]] = {}
-    for a, b, is_line in zip(on.tolist(), following.tolist(), made.lines().tolist(), strict=True):
-        first, second = halves(scene.points[[a, a + 1, a + 2, b]].astype(float), 0.5)
-        points += [*first[:3], *second[:3]]
-        inner = Joint.LINE_HANDLE if is_line else Joint.FREE
-        joints += [made.joints[a], inner, inner, Joint.CORNER if is_line else Joint.SMOOTH, inner, inner]
-        key = tuple(np.round(second[0], 3).tolist())
-        if made.same[a] >= 0 and made.same[b] >= 0:
-            again = key in known
-            middle = known.setdefault(key, (next(numbers), next(numbers), next(numbers)))
-            before, here, after = middle[::-1] if again else middle
-        else:
-            before = here = after = -1
-        same += [made.same[a], made.same[a + 1], before, here, after, made.same[a + 2]]
-    scene = replace(
-        scene, points=np.array(points, np.float32), starts=2 * scene.starts, first=2 * scene.first
-    )
-    return Drawing(scene, np.array(joints, np.int32), np.array(same, np.int32))
+    outlines: dict[int, list[Outline]] = {}
+    contours = np.searchsorted(scene.starts, on, side="right").tolist()
+    owners = np.searchsorted(scene.first, on, side="right").tolist()
+    ends = zip(on.tolist(), following.tolist(), made.lines().tolist(), contours, owners, strict=True)
+    for (owner, _), pieces in itertools.groupby(ends, lambda piece: (piece[4], piece[3])):
+        points, joints = [], []
+        for a, b, is_line, *_ in pieces:
+            first, second = halves(scene.points[[a, a + 1, a + 2, b]].astype(float), 0.5)
+            points += [*first[:3], *second[:3]]
+            inner = [Joint.LINE_HANDLE] * 2 if is_line else [Joint.FREE] * 2
+            joints += [made.joints[a], *inner, Joint.CORNER if is_line else Joint.SMOOTH, *inner]
+        outlines.setdefault(owner - 1, []).append((np.array(points), joints))
+    return drawing(scene.canvas, *((scene.colors[owner], own) for owner, own in outlines.items()))
 
 
 def nodes(made: Drawing) -> int:
@@ -170,27 +163,6 @@ def test_errors_within_an_edit() -> None:
         assert sum_within(sums, cells_at(cells)) == pytest.approx(want)
 
 
-def test_a_drawing_like_the_last_one_needs_no_second_renderer(
-    device: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    backend, made, target = Backend.on(device, 1), split(logo()), np.ones((64, 64, 3), np.float32)
-    judge = Judge(target, backend)
-    built: list[Capacity] = []
-    build = Renderer._build
-
-    def counted(self: Renderer, capacity: Capacity) -> None:
-        built.append(capacity)
-        build(self, capacity)
-
-    monkeypatch.setattr(Renderer, "_build", counted)
-    first = judge.errors(made)
-    before = len(built)
-    np.testing.assert_array_equal(judge.errors(made), first)
-    step = start(target, made, backend, Refinement(), capacity=judge.capacity)
-    step.render()
-    assert len(built) == before + 2
-
-
 def test_large_pictures_have_fewer_rounds() -> None:
     assert [rounds_for(side * side) for side in (64, 1250, 2048, 10_000)] == [16, 16, 6, 4]
 
@@ -205,12 +177,16 @@ def test_turned_outlines_are_the_same() -> None:
     assert again.lines().sum() == made.lines().sum()
 
 
-def test_a_logo_has_its_nodes_again(device: str) -> None:
-    """Half of its nodes are needless; at the end it is as good, clean, and written and read as it is."""
+def test_a_logo_loses_its_needless_nodes_unless_it_is_a_draft(device: str) -> None:
+    """Half of them; at the end it is as good, clean, and written and read as it is."""
     backend = Backend.on(device, 1)
     exact = logo(None)
     target = render(exact.scene, backend=backend)
     made = split(logo(None, spread=0.15))
+    assert not make_settings("draft").tidy and make_settings().tidy
+    draft = finish_drawing(target, made, Run(backend), tidy=False).drawing
+    assert nodes(draft) == nodes(made)
+    assert psnr(draft.scene, target, backend) > max(45, psnr(made.scene, target, backend) + 3)
     finished = finish_drawing(target, made, Run(backend))
     drawn = finished.drawing
     assert nodes(drawn) <= nodes(exact) + 4 < nodes(made) - 20
@@ -219,18 +195,6 @@ def test_a_logo_has_its_nodes_again(device: str) -> None:
     text = write_svg(drawn.scene, per_pixel=finished.per_pixel)
     back, _ = load_scene(text, 64, 64, "a.svg")
     assert write_svg(replace(back, canvas=drawn.scene.canvas), per_pixel=finished.per_pixel) == text
-
-
-def test_a_draft_keeps_its_nodes(device: str) -> None:
-    """What takes most of the time is left out: outlines are fitted and rounded all the same."""
-    backend = Backend.on(device, 1)
-    exact = logo(None)
-    target = render(exact.scene, backend=backend)
-    made = split(logo(None, spread=0.15))
-    assert not make_settings("draft").tidy and make_settings().tidy
-    finished = finish_drawing(target, made, Run(backend), tidy=False)
-    assert nodes(finished.drawing) == nodes(made)
-    assert psnr(finished.drawing.scene, target, backend) > max(45, psnr(made.scene, target, backend) + 3)
 
 
 def test_what_is_seen_stays(device: str) -> None:

@@ -30,6 +30,7 @@ CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
 """What a cubic, a line, the handles of a cubic and a number take in a file."""
 
 Key = tuple[str, int, int]
+AT_ONCE = 512  # candidates that are measured at once, which bounds their memory to some megabytes
 
 
 def key_of(kind: str, at: tuple[float, float]) -> Key:
@@ -304,9 +305,6 @@ def _by_point(
 def thirds_between(ends: Floats) -> Floats:
     """Return the points at the thirds of lines, shape (line, 2, 2), between ``ends`` of the same shape."""
     return (2 * ends + ends[:, ::-1]) / 3
-
-
-AT_ONCE = 512  # candidates that are measured at once, which bounds their memory to some megabytes
 
 
 def _apart(made: Floats, *pieces: Floats) -> Floats:

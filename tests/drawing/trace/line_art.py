@@ -5,20 +5,17 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from tests.drawing.trace import drawings
 from warpsplat.drawing.strokes.ink import find_ink
 from warpsplat.drawing.strokes.lines import trace_ink
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.viewer import render_svg
 
 
-def drawn(paths: str, width: int = 96, height: int = 72, ground: str = "#fff") -> np.ndarray:
+def drawn(paths: str, width: int = 96, height: int = 72, ground: str = "#fff") -> FloatArray:
     """A picture of SVG paths, sRGB in [0, 1], shape (height, width, 3)."""
-    text = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'
-        f'<rect width="{width}" height="{height}" fill="{ground}"/>'
-        f'<g fill="none" stroke="#000" stroke-width="3" stroke-linecap="round">{paths}</g></svg>'
-    )
-    return np.asarray(on_white(render_svg(text)), np.float32) / np.float32(255)
+    pen = '<g fill="none" stroke="#000" stroke-width="3" stroke-linecap="round">'
+    return drawings.draw(f"{drawings.ground(ground, width, height)}{pen}{paths}</g>", width, height)
 
 
 def traced(image: FloatArray) -> Scene:

@@ -1,12 +1,14 @@
-"""Filled areas of ink told apart from its lines."""
+"""Filled areas and dots told apart from lines."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.drawing.trace.line_art import drawn
 from warpsplat.drawing.strokes.areas import is_beside, split_areas, with_ends_in_areas
 from warpsplat.drawing.strokes.centerlines import find_lines
+from warpsplat.drawing.strokes.dots import round_dots
 from warpsplat.drawing.strokes.ink import find_ink
 
 BLOB = '<circle cx="30" cy="36" r="16" fill="#000"/><path d="M30 36H88"/>'
@@ -77,3 +79,20 @@ def test_ends_far_from_areas_stay() -> None:
     assert len(longer) == len(widths) == 21
     assert np.allclose(longer[0], points[0])
     assert np.allclose(longer[-1], [1.5 - 4, 4.5])
+
+
+def test_a_dot_on_a_line() -> None:
+    line = '<path d="M8 36H88" stroke-width="1"/>'
+    image = drawn(line + '<circle cx="48" cy="36" r="5" fill="#000" stroke="none"/>')
+    (dot,), covered = round_dots(find_ink(image), 1.0)
+    assert dot.width == pytest.approx(10, abs=0.6)
+    assert dot.ends.mean(axis=0) == pytest.approx((48, 36), abs=0.2)
+    assert covered[36, 48]
+    assert not covered[36, 60]
+
+
+def test_a_part_of_a_broader_line_is_no_dot() -> None:
+    image = drawn('<circle cx="48" cy="36" r="20" stroke-width="2.9"/>')
+    dots, covered = round_dots(find_ink(image), 1.0)
+    assert not dots
+    assert not covered.any()

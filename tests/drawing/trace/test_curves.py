@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.corners import find_corners
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.ellipses import fit_ellipse
@@ -34,9 +35,7 @@ def polygon(corners: Floats, step: float = 1.0) -> Floats:
 
 
 def sampled(cubics: Floats, count: int = 40) -> Floats:
-    t = np.linspace(0, 1, count)[:, None]
-    weights = np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
-    return np.concatenate([weights @ cubic for cubic in cubics])
+    return points_at(cubics, np.linspace(0, 1, count)).reshape(-1, 2)
 
 
 def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpsplat.drawing.trace import pixels
-from warpsplat.drawing.trace.pixels import find_cells, outlines, polygons, trace_pixels
+from warpsplat.drawing.trace.pixels import find_cells, outlines, trace_pixels
 from warpsplat.errors import ImageError
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray
@@ -100,14 +100,6 @@ def test_a_colour_of_many_corners_has_several_shapes(most: int, monkeypatch: pyt
     assert (scene.point_counts() <= 3 * most).all()
     shown = np.asarray(render_svg(write_svg(scene, per_pixel=per_pixel)).convert("RGB"))
     assert (shown == np.round(255 * image)).all()
-
-
-def test_ever_smaller_parts_end_with_cells(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pixels, "MOST_CORNERS", 1)
-    inside = np.ones((3, 2), np.bool_)
-    assert sorted(polygons(inside)) == sorted(
-        [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]] for x in range(2) for y in range(3)
-    )
 
 
 def test_no_hairlines_at_a_zoom_that_ends_cells_within_pixels() -> None:

@@ -102,9 +102,8 @@ def test_tips_that_jpeg_tints_are_no_regions(quality: int, tips: int, inner: flo
 
 
 def test_every_pixel_has_a_region() -> None:
-    """Of any picture: regions are numbered without gaps and each is connected to its like."""
     found = find_regions(levels(photograph()))
-    assert set(np.unique(found.labels).tolist()) == set(range(len(found.paint)))
+    assert set(np.unique(found.labels).tolist()) == set(range(len(found.paint))), "without gaps"
 
 
 def test_regions_seen_least_go_first() -> None:

@@ -9,13 +9,15 @@ import numpy as np
 
 from warpsplat.drawing.strokes.blobs import BROAD, SMALLEST, pen_width
 from warpsplat.drawing.strokes.ink import Ink
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, depth, dilated, eroded
 from warpsplat.drawing.trace.subject import LINE, LINE_SHARE
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray
 
-INNER = np.ones((5, 5), np.uint8)  # around the pixels of an area that have its colour, where it is that broad
+NARROW = 1.6  # width down to which a part of an area belongs to it, over the width of the lines
+TIP = 3.0  # how far narrower corners and tips may reach, over the same; what reaches further is a line
+NEARBY = 15  # [px] side of the window whose mean colour is that of an area or of the paper
 
 
 @dataclass(frozen=True)
@@ -37,27 +39,23 @@ class Areas:
             shown: The image, shape (height, width, 3).
             numbers: Of the areas.
         """
-        inside = _inner(np.isin(self.labels, numbers).astype(np.uint8))
-        return np.asarray(np.median(shown[inside > 0], axis=0), np.float32)
+        inside = _inner(np.isin(self.labels, numbers))
+        return np.asarray(np.median(shown[inside], axis=0), np.float32)
 
     def outlines(self) -> list[Floats]:
         """Return points along the inner edge of each area, which have its colour, shape (point, 2) each."""
         found: list[Floats] = []
         for number in range(1, len(self) + 1):
-            inside = _inner((self.labels == number).astype(np.uint8))
+            inside = _inner(self.labels == number).astype(np.uint8)
             rings, _ = cv2.findContours(inside, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
             found.append(np.concatenate([ring.reshape(-1, 2) for ring in rings]) + 0.5)
         return found
 
 
-def _inner(inside: np.ndarray) -> np.ndarray:
-    """Return a mask without its edge, or all of it where that leaves nothing."""
-    inner = cv2.erode(inside, INNER)
+def _inner(inside: Bools) -> Bools:
+    """Return a mask without its edge, whose colour is mixed; all of it where that leaves nothing."""
+    inner = eroded(inside, 5)
     return inner if inner.any() else inside
-
-
-NARROW = 1.6  # width down to which a part of an area belongs to it, over the width of the lines
-TIP = 3.0  # how far narrower corners and tips may reach, over the same; what reaches further is a line
 
 
 def split_areas(ink: Ink) -> tuple[Ink, Areas | None]:
@@ -83,17 +81,13 @@ def split_areas(ink: Ink) -> tuple[Ink, Areas | None]:
 
 def _cover(shown: FloatArray, area: Bools, lines: Bools) -> FloatArray:
     """Return the share of each pixel that areas cover, at their edge by its colour between paper and area."""
-    kernel = np.ones((3, 3), np.uint8)
-    deep = cv2.erode(area.astype(np.uint8), kernel) > 0
-    near = cv2.dilate(area.astype(np.uint8), kernel) > 0
-    blank = cv2.dilate((area | lines).astype(np.uint8), np.ones((5, 5), np.uint8)) == 0
-    full, paper = (_mean_nearby(shown, where) for where in (deep, blank))
-    way = full - paper
-    share = ((shown - paper) * way).sum(axis=2) / np.maximum((way**2).sum(axis=2), 1e-6)
-    return np.asarray(np.where(deep, 1, np.where(near & ~lines, np.clip(share, 0, 1), 0)), np.float32)
-
-
-NEARBY = 15  # [px] side of the window whose mean colour is that of an area or of the paper
+    deep = eroded(area, 3)
+    full, paper = (_mean_nearby(shown, where) for where in (deep, ~dilated(area | lines, 5)))
+    contrast = full - paper
+    share = ((shown - paper) * contrast).sum(axis=2) / np.maximum((contrast**2).sum(axis=2), 1e-6)
+    return np.asarray(
+        np.where(deep, 1, np.where(dilated(area, 3) & ~lines, np.clip(share, 0, 1), 0)), np.float32
+    )
 
 
 def _mean_nearby(shown: FloatArray, where: Bools) -> FloatArray:
@@ -129,7 +123,7 @@ def is_beside(points: Floats, widths: Floats, away: Floats) -> bool:
         widths: There [px], shape (point,).
         away: Distance of each pixel from the areas [px], shape (height, width).
     """
-    return bool((_at(away, points) <= widths + 1).all())
+    return bool((at_pixels(away, points) <= widths + 1).all())
 
 
 def with_ends_in_areas(points: Floats, widths: Floats, away: Floats) -> tuple[Floats, Floats]:
@@ -138,18 +132,11 @@ def with_ends_in_areas(points: Floats, widths: Floats, away: Floats) -> tuple[Fl
     Arguments are those of ``is_beside``.
     """
     for _ in range(2):  # the end, and the other one
-        wide, apart = float(widths[-1]), float(_at(away, points[-1:])[0])
+        wide, apart = float(widths[-1]), float(at_pixels(away, points[-1:])[0])
         if apart <= wide + 1:
             back = points[-1] - points[max(0, len(points) - 1 - max(SMALLEST, round(2 * wide)))]
-            way = back / max(float(hypot(*back)), 1e-9)
-            points = np.concatenate([points, points[-1:] + (apart + wide) * way])
+            direction = back / max(float(hypot(*back)), 1e-9)
+            points = np.concatenate([points, points[-1:] + (apart + wide) * direction])
             widths = np.append(widths, wide)
         points, widths = points[::-1], widths[::-1]
     return points, widths
-
-
-def _at(values: Floats, points: Floats) -> Floats:
-    """Return the values of the pixels that points lie in, or of the nearest pixels of the image."""
-    height, width = values.shape
-    columns, rows = points.astype(np.intp).T
-    return np.asarray(values[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 
@@ -12,6 +10,10 @@ from warpsplat.drawing.trace.grids import Bools, Floats, depth
 from warpsplat.portable import filters
 
 USUAL = 0.75  # quantile of the width along all lines that counts as theirs: much of the rest is texture
+BROAD = 2.0  # half the width from which on ink is an area, over the width of the lines
+FILLING = 1.2  # [px] width of the lines that fill areas, at the least
+OVERLAP = 0.15  # of neighbouring rings, over their width
+SMALLEST = 8  # points of a ring, at the least
 
 
 def pen_width(mask: Bools) -> float:
@@ -19,12 +21,6 @@ def pen_width(mask: Bools) -> float:
     away = filters.distance(mask)
     ridge = mask & (away >= cv2.dilate(away, np.ones((3, 3), np.uint8)))
     return max(1.0, 2 * float(np.quantile(away[ridge], USUAL)) - 1) if ridge.any() else 1.0
-
-
-BROAD = 2.0  # half the width from which on ink is an area, over the width of the lines
-FILLING = 1.2  # [px] width of the lines that fill areas, at the least
-OVERLAP = 0.15  # of neighbouring rings, over their width
-SMALLEST = 8  # points of a ring, at the least
 
 
 def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:
@@ -48,5 +44,4 @@ def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:
         mask = (inner & (away > level)).astype(np.uint8)
         found, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         rings += [contour.reshape(-1, 2) + 0.5 for contour in found if len(contour) >= SMALLEST]
-    hollow = replace(ink, mask=ink.mask & ~inner, cover=np.where(inner, 0, ink.cover).astype(np.float32))
-    return hollow, rings, width
+    return ink.without(inner), rings, width

@@ -17,13 +17,13 @@ from warpsplat.drawing.strokes.areas import (
 )
 from warpsplat.drawing.strokes.blobs import BROAD, hollowed, pen_width
 from warpsplat.drawing.strokes.chains import find_chains, smoothed, traced
-from warpsplat.drawing.strokes.dots import Dot, bare_dots, round_dots, without
+from warpsplat.drawing.strokes.dots import Dot, bare_dots, round_dots
 from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.strokes.measure import measured
 from warpsplat.drawing.strokes.pens import find_pens, line_colors
 from warpsplat.drawing.strokes.ridges import FAINT, across, middles, with_thin
 from warpsplat.drawing.strokes.skeleton import Graph, find_graph
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, dilated, eroded
 from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
 
@@ -74,7 +74,7 @@ def _split(ink: Ink, *, mixed: bool) -> _Split:
         thin, areas = split_areas(ink)
         return _Split(thin, areas=areas, apart=areas.labels > 0 if areas else None)
     dots, covered = ([], None) if ink.textured else round_dots(ink, pen_width(ink.mask))
-    hollow, rings, width = hollowed(ink if covered is None else without(ink, covered))
+    hollow, rings, width = hollowed(ink if covered is None else ink.without(covered))
     return _Split(hollow, rings, width, dots, apart=covered if dots else None)
 
 
@@ -117,16 +117,7 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Strokes:
 
 
 def _center_lines(ink: Ink, split: _Split, graph: Graph, radii: Floats, fine: int, pens: Ints) -> list[Line]:
-    """Return the lines along the edges of a skeleton.
-
-    Args:
-        ink: Of the image.
-        split: Of it.
-        graph: The skeleton of its thin part, ``fine`` times as large.
-        radii: Half the width of the ink at each pixel of that.
-        fine: How many times.
-        pens: Of the edges.
-    """
+    """Return the lines along a skeleton that is ``fine`` times as large as the ink; ``pens``: its edges'."""
     around = cv2.dilate(ink.cover - split.thin.cover, np.ones((5, 5), np.uint8)) > 0
     away = None if split.apart is None else distance_from(split.apart)
     lines = []
@@ -137,9 +128,9 @@ def _center_lines(ink: Ink, split: _Split, graph: Graph, radii: Floats, fine: in
         points, widths, closed = line
         points, widths = measured(points / fine, widths / fine, closed, split.thin.cover)
         if split.rings:
-            columns, rows = np.clip(points.T.astype(np.intp), 0, np.array(around.shape[::-1])[:, None] - 1)
-            if around[rows, columns].mean() > 0.5:  # most of the line goes around what rings fill
-                widths = np.maximum(widths, split.ring_width)
+            # Most of the line may go around what rings fill.
+            is_around = at_pixels(around, points).mean() > 0.5
+            widths = np.maximum(widths, split.ring_width) if is_around else widths
         if away is not None and is_beside(points, widths, away):
             continue
         if away is not None and not closed:
@@ -154,19 +145,16 @@ def _dot(dot: Dot, pen: int) -> Line:
 
 def _pen_at(dot: Dot, ink: Ink, pens: FloatArray) -> int:
     """Return the pen whose colour is the most like that in the middle of a dot."""
-    size = np.array(ink.mask.shape[::-1])
-    column, row = np.clip(dot.ends.mean(axis=0).astype(np.intp), 0, size - 1)
-    return int(np.linalg.norm(pens - ink.shown[row, column], axis=1).argmin())
+    color = at_pixels(ink.shown, dot.ends.mean(axis=0)[None])
+    return int(np.linalg.norm(pens - color, axis=1).argmin())
 
 
 def _enlarged(ink: Ink, factor: int) -> Bools:
     """Return the ink's mask at ``factor`` times the size, with its edge where half a pixel is covered."""
     size = (ink.mask.shape[1] * factor, ink.mask.shape[0] * factor)
     cover = filters.resize_cubic(ink.cover, size)
-    mask, kernel = ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)
-    held = cv2.resize(cv2.dilate(mask, kernel), size, interpolation=cv2.INTER_NEAREST) > 0
-    core = cv2.erode(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST), kernel) > 0
-    inked = ((cover > 0.5) & held) | core
+    held = np.kron(dilated(ink.mask, 3), np.ones((factor, factor), np.bool_))
+    inked = ((cover > 0.5) & held) | eroded(np.kron(ink.mask, np.ones((factor, factor), np.bool_)), 3)
     if ink.textured:
         return inked
     thin = middles(across(ink.cover, factor), FAINT, factor)

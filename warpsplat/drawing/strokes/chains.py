@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.drawing.strokes.skeleton import Edge, Graph
-from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
 from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.portable.elementary import exp, hypot
 from warpsplat.portable.sequences import convolve, interp
@@ -14,6 +14,11 @@ STRAIGHT = 0.6427876  # cosine of the turn up to which a line goes on through a 
 
 End = tuple[int, int]
 """An edge's number, and 0 where it begins or 1 where it ends."""
+
+REACH = 4.0  # length of line that tells in which direction it leaves a junction, over half the ink's width
+BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
+FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
+SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
 
 
 def find_chains(graph: Graph, pens: Ints) -> list[tuple[list[Edge], int]]:
@@ -50,9 +55,9 @@ def _continued(graph: Graph, pens: Ints) -> dict[End, End]:
         ends = [(n, e) for n in sorted(set(numbers)) for e in (0, 1) if graph.edges[n].nodes[e] == node]
         if len(ends) == 2 and ends[0][0] == ends[1][0]:
             continue
-        ways = [_way(graph.edges[n], e, float(graph.radii[node])) for n, e in ends]
+        directions = [_heading(graph.edges[n], e, float(graph.radii[node])) for n, e in ends]
         bends = sorted(
-            (-_straightness(ways[i], ways[j]), i, j)
+            (-_straightness(directions[i], directions[j]), i, j)
             for i in range(len(ends))
             for j in range(i)
             if pens[ends[i][0]] == pens[ends[j][0]]
@@ -63,12 +68,7 @@ def _continued(graph: Graph, pens: Ints) -> dict[End, End]:
     return found
 
 
-REACH = 4.0  # length of line that tells in which direction it leaves a junction, over half the ink's width
-BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
-FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
-
-
-def _way(edge: Edge, end: int, radius: float) -> Floats:
+def _heading(edge: Edge, end: int, radius: float) -> Floats:
     """Return the unit vector in which an edge leaves its node, beyond what the junction bends."""
     points = edge.points if end == 0 else edge.points[::-1]
     along = arc_lengths(points)
@@ -76,8 +76,8 @@ def _way(edge: Edge, end: int, radius: float) -> Floats:
     if along[-1] < high:
         low, high = 0.3 * along[-1], along[-1]
     near = points[np.searchsorted(along, low) : np.searchsorted(along, high) + 1]
-    way = near[-1] - near[0] if len(near) > 1 else points[-1] - points[0]
-    return np.asarray(way / max(float(hypot(*way)), 1e-9))
+    direction = near[-1] - near[0] if len(near) > 1 else points[-1] - points[0]
+    return np.asarray(direction / max(float(hypot(*direction)), 1e-9))
 
 
 def _straightness(one: Floats, other: Floats) -> float:
@@ -95,8 +95,7 @@ def traced(graph: Graph, edges: list[Edge], radii: Floats) -> tuple[Floats, Floa
     """
     parts = [_unbent(graph, edge) for edge in edges]
     points = np.concatenate(parts)
-    rows, columns = (np.clip(points[:, a].astype(np.intp), 0, radii.shape[1 - a] - 1) for a in (1, 0))
-    widths = 2 * radii[rows, columns]
+    widths = 2 * at_pixels(radii, points)
     first = edges[0].nodes[0]
     closed = first == edges[-1].nodes[1] and len(parts[0]) > 0 and _is_smooth_ring(graph, edges)
     if not closed:
@@ -112,12 +111,12 @@ def traced(graph: Graph, edges: list[Edge], radii: Floats) -> tuple[Floats, Floa
 
 def _ahead(points: Floats, place: Floats, radius: float) -> Floats:
     """Return where a line that goes on with ``points`` begins, if it comes straight from beside ``place``."""
-    way = points[0] - points[min(len(points) - 1, max(4, round(2 * radius)))]
-    way = way / max(float(hypot(*way)), 1e-9)
+    direction = points[0] - points[min(len(points) - 1, max(4, round(2 * radius)))]
+    direction = direction / max(float(hypot(*direction)), 1e-9)
     away = place - points[0]
-    if abs(float(away[0] * way[1] - away[1] * way[0])) > max(radius, 1.5):
+    if abs(float(away[0] * direction[1] - away[1] * direction[0])) > max(radius, 1.5):
         return place
-    return np.asarray(points[0] + max(float((away * way).sum()), 0.0) * way)
+    return np.asarray(points[0] + max(float((away * direction).sum()), 0.0) * direction)
 
 
 def _is_smooth_ring(graph: Graph, edges: list[Edge]) -> bool:
@@ -126,7 +125,7 @@ def _is_smooth_ring(graph: Graph, edges: list[Edge]) -> bool:
     if len(graph.at[node]) <= 2:
         return True
     radius = float(graph.radii[node])
-    return _straightness(_way(edges[0], 0, radius), _way(edges[-1], 1, radius)) >= STRAIGHT
+    return _straightness(_heading(edges[0], 0, radius), _heading(edges[-1], 1, radius)) >= STRAIGHT
 
 
 def _unbent(graph: Graph, edge: Edge) -> Floats:
@@ -140,9 +139,6 @@ def _unbent(graph: Graph, edge: Edge) -> Floats:
         before, after = scale * before, scale * after
     inner = (along > 0) & (along < total) if edge.nodes[0] != edge.nodes[1] else along >= 0
     return np.asarray(edge.points[inner & (along >= before) & (along <= total - after)])
-
-
-SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
 
 
 def smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Floats, bool]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from warpsplat.drawing.strokes.ink import Ink
-from warpsplat.drawing.trace.grids import Bools, Floats, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, depth, dilated
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import principal_direction
@@ -65,7 +64,7 @@ def round_dots(ink: Ink, width: float) -> tuple[list[Dot], Bools]:
     return dots, filters.resize_area(covered, ink.mask.shape[::-1]) > 0.5
 
 
-BESIDE, NARROWER = 1.6, 0.65
+RIM, NARROWER = 1.6, 0.65
 """How far beside a dot its ink is measured, over its width, and how broad it may be there, over the same."""
 
 
@@ -76,7 +75,7 @@ def _goes_on(away: Floats, ends: Floats, width: float) -> bool:
     right, bottom = np.ceil(ends.max(axis=0)).astype(int) + reach
     near = away[top:bottom, left:right]
     around, inner = np.zeros(near.shape, np.uint8), np.zeros(near.shape, np.uint8)
-    _draw(around, ends - (left, top), BESIDE * width)
+    _draw(around, ends - (left, top), RIM * width)
     _draw(inner, ends - (left, top), width)
     ring = (around > 0) & (inner == 0)
     return bool(ring.any() and near[ring].max() > NARROWER * 0.5 * width)
@@ -97,8 +96,8 @@ def _as_dot(own: Bools, radius: float) -> Dot | None:
     half = max(0.0, (len(places) - math.pi * radius * radius) / (4 * radius))
     if half > (LONGEST - 1) * radius:
         return None
-    way = principal_direction(places) if half else np.zeros(2)
-    ends = places.mean(axis=0) + np.stack([-half * way, half * way])
+    direction = principal_direction(places) if half else np.zeros(2)
+    ends = places.mean(axis=0) + np.stack([-half * direction, half * direction])
     shown = np.zeros(own.shape, np.uint8)
     _draw(shown, ends, 2 * radius)
     both = int((own & (shown > 0)).sum())
@@ -111,12 +110,6 @@ def _draw(image: np.ndarray, ends: Floats, width: float) -> None:
     """Draw a line with round ends."""
     start, end = (tuple(place) for place in np.round(ends).astype(int).tolist())
     cv2.line(image, start, end, 1, max(1, round(width)))
-
-
-def without(ink: Ink, covered: Bools) -> Ink:
-    """Return ink without what is ``covered``, shape (height, width)."""
-    cover = np.where(covered, 0, ink.cover).astype(np.float32)
-    return replace(ink, mask=ink.mask & ~covered, cover=cover)
 
 
 VISIBLE, VISIBLE_SHARE = 0.8, 0.09
@@ -196,8 +189,8 @@ def _fineness(ink: Ink) -> int:
 def _inked(ink: Ink, fine: int) -> Bools:
     """Return where ink is, on the fine grid."""
     size = (ink.mask.shape[1] * fine, ink.mask.shape[0] * fine)
-    near = cv2.dilate(ink.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return np.asarray(filters.resize_cubic(np.where(near, ink.cover, 0), size) > 0.5)
+    cover = np.where(dilated(ink.mask, 3), ink.cover, 0)
+    return np.asarray(filters.resize_cubic(cover, size) > 0.5)
 
 
 def _drawn(lines: list[tuple[Floats, Floats, bool]], shape: tuple[int, int], fine: int) -> np.ndarray:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from warpsplat.drawing.strokes.ridges import FAINT, NOISY, SURE, across, middles, with_thin
-from warpsplat.drawing.trace.grids import Bools
+from warpsplat.drawing.trace.grids import Bools, dilated, eroded
 from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
 
@@ -27,6 +27,11 @@ class Ink:
     """The paper's colour, sRGB in [0, 1], shape (3,); None: transparent."""
     textured: bool = False
     """Whether crayons leave what cannot be told from thin lines and dots."""
+
+    def without(self, covered: Bools) -> Ink:
+        """Return the ink without what is ``covered``, shape (height, width)."""
+        cover = np.where(covered, 0, self.cover).astype(np.float32)
+        return replace(self, mask=self.mask & ~covered, cover=cover)
 
 
 @dataclass(frozen=True)
@@ -52,8 +57,8 @@ FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 
 DARK = 0.6  # contrast of a small dot that is no dirt, over that of strong ink
 NOISELESS = 0.01  # standard deviation of the noise up to which nothing is blurred
-NEAR = 9  # [px] side of the window in which ink is compared with the strongest beside it
-BESIDE = 31  # [px] side of the window in which there is full ink
+STRONGEST_WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
+FULL_WINDOW = 31  # [px] side of the window in which there is full ink
 
 
 def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
@@ -79,7 +84,7 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
     contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed, alone=mixed)
     seed = max(floor, limits.seed * strong)
-    strongest = cv2.dilate(contrast, np.ones((NEAR, NEAR), np.uint8))
+    strongest = cv2.dilate(contrast, np.ones((STRONGEST_WINDOW, STRONGEST_WINDOW), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(strongest, seed), floor)
     seeds = contrast > seed
     if not is_textured:
@@ -89,13 +94,11 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
         seeds |= mass > max(SURE, 2 * grain)
     sure = contrast > (np.inf if is_textured else DARK * strong)
     mask = _without_specks(mask, seeds, sure, limits)
-    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((BESIDE, BESIDE), np.uint8))
+    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((FULL_WINDOW, FULL_WINDOW), np.uint8))
     # Ink that is lighter than elsewhere is thinner than a pixel, to some extent.
-    full = np.maximum(filters.box_blur(full, NEAR), limits.full * strong)
-    kernel = np.ones((5, 5), np.uint8)
-    around = cv2.dilate(mask.astype(np.uint8), kernel) > 0
-    cover = np.where(around, np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
-    cover[cv2.erode(mask.astype(np.uint8), kernel) > 0] = 1
+    full = np.maximum(filters.box_blur(full, STRONGEST_WINDOW), limits.full * strong)
+    cover = np.where(dilated(mask, 5), np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
+    cover[eroded(mask, 5)] = 1
     return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper, is_textured)
 
 
@@ -196,7 +199,7 @@ SMALLEST_DARK = 2  # [px] of a dark one
 
 def _without_specks(mask: Bools, seeds: Bools, dark: Bools, limits: _Limits) -> Bools:
     """Return the parts of ``mask`` with enough seeds that are no specks, or ``dark``, without pinholes."""
-    edge = mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
+    edge = mask & ~eroded(mask, 3)
     width = 2 * float(mask.sum()) / max(1, int(edge.sum()))
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     sizes = stats[:, cv2.CC_STAT_AREA]

@@ -18,6 +18,8 @@ from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
 TOLERANCE = 0.45  # [px] largest distance of a centre line from its curve
+THINNEST, LONG = 0.3, 6.0
+"""Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,6 @@ def rejoined(before: Scene, after: Scene) -> Scene:
     held = np.concatenate([ends[shared], handles[shared]])
     points[held] = before.points[held]
     return replace(after, points=points)
-
-
-THINNEST, LONG = 0.3, 6.0
-"""Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
 
 
 def _strokes(line: Line, *, thin: bool) -> list[_Stroke]:

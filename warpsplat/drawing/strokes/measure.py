@@ -55,8 +55,8 @@ def measured(points: Floats, widths: Floats, closed: bool, cover: Floats) -> tup
 def _normals(points: Floats, closed: bool) -> Floats:
     """Return unit vectors across a line, shape (point, 2)."""
     padded = np.pad(points, ((2, 2), (0, 0)), mode="wrap" if closed else "edge")
-    ways = padded[4:] - padded[:-4]
-    return np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(hypot(*ways.T), 1e-9)[:, None]
+    along = padded[4:] - padded[:-4]
+    return np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(hypot(*along.T), 1e-9)[:, None]
 
 
 def _windows(values: Floats, reach: int, closed: bool) -> Floats:

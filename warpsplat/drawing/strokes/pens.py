@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.drawing.strokes.ink import Ink
-from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
 from warpsplat.portable.elementary import exp, log
 from warpsplat.portable.filters import lab
 from warpsplat.scene import FloatArray
 
 WHOLE = 0.85  # cover of a line's pixels from which on they have its colour
 LEAST_COVER = 0.1  # cover from which on its colour can be told
+ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
+SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
+MOST = 8  # pens
+STEP = 0.12  # deviation of the logarithm of a line's width from which on it is drawn in steps
+SHORTEST = 3.0  # length of a step, over the line's width, at the least
 
 
 def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
@@ -24,25 +29,17 @@ def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
     Returns:
         sRGB in [0, 1], shape (line, 3), and [px], shape (line,).
     """
-    height, width = ink.mask.shape
     colors = np.zeros((len(lines), 3), np.float32)
     paper = np.median(ink.shown[~ink.mask], axis=0) if not ink.mask.all() else np.ones(3)
     for number, line in enumerate(lines):
-        columns = np.clip(line[:, 0].astype(np.intp), 0, width - 1)
-        rows = np.clip(line[:, 1].astype(np.intp), 0, height - 1)
-        cover = ink.cover[rows, columns]
+        cover = at_pixels(ink.cover, line)
         best = cover >= np.quantile(cover, 0.7)
-        color = np.median(ink.shown[rows[best], columns[best]], axis=0)
+        color = np.median(at_pixels(ink.shown, line[best]), axis=0)
         share = float(np.median(cover[best]))
         if LEAST_COVER < share < WHOLE:  # mixed with the paper, as it covers no pixel
             color = np.clip(paper + (color - paper) / share, 0, 1)
         colors[number] = color
     return colors, np.array([len(line) for line in lines], np.float64)
-
-
-ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
-SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
-MOST = 8  # pens
 
 
 def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
@@ -91,10 +88,6 @@ def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
     sums = np.cumsum(weights[order], axis=0)
     middle = (sums >= 0.5 * sums[-1]).argmax(axis=0)
     return np.asarray(np.take_along_axis(values, np.take_along_axis(order, middle[None], 0), 0)[0])
-
-
-STEP = 0.12  # deviation of the logarithm of a line's width from which on it is drawn in steps
-SHORTEST = 3.0  # length of a step, over the line's width, at the least
 
 
 def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:

@@ -17,6 +17,8 @@ FAINT, SURE = 0.12, 0.25
 """Ink across a line from which on it goes on, and that it must have somewhere [px of full ink]."""
 
 NOISY = 3.0  # the same in standard deviations of the noise, over SPREAD
+MIDDLE = 0.5  # share that the middle of a line has of the largest amount beside it
+LONG = 5  # [px] of a thin line that goes on from one place only, at the least
 
 
 def across(ink: FloatArray, fine: int = 1) -> FloatArray:
@@ -45,16 +47,10 @@ def across(ink: FloatArray, fine: int = 1) -> FloatArray:
     return np.asarray(np.maximum(-bend, 0) * scale, np.float32)
 
 
-MIDDLE = 0.5  # share that the middle of a line has of the largest amount beside it
-
-
 def middles(mass: FloatArray, least: float, fine: int = 1) -> Bools:
     """Return the pixels in the middle of lines with at least so much ink across; arguments as ``across``."""
     most = cv2.dilate(mass, np.ones((2 * fine + 1, 2 * fine + 1), np.uint8))
     return np.asarray((mass > least) & (mass > MIDDLE * most), np.bool_)
-
-
-LONG = 5  # [px] of a thin line that goes on from one place only, at the least
 
 
 def with_thin(mask: Bools, thin: Bools, fine: int = 1) -> Bools:

@@ -13,6 +13,12 @@ from warpsplat.portable.elementary import hypot
 STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
 """Rows and columns to the neighbours of a pixel, the straight ones first."""
 
+SPUR = (
+    1.5  # length of a free end up to which it is a burr of the outline, over half the width where it begins
+)
+MERGED = 1.6  # length of an edge up to which its two nodes are one, over half the width there
+SHORT_LOOP = 4.0  # length of an edge below which it goes when its nodes are merged, over the same
+
 
 @dataclass
 class Edge:
@@ -125,10 +131,7 @@ def _walks(
 ) -> tuple[list[tuple[list[int], int, int]], list[list[int]]]:
     """Return the paths of pixels from node to node, with these, and the rings without a node.
 
-    Args:
-        near: Neighbours of each pixel.
-        node_of: Its node, -1 for none.
-        members: The pixels of nodes.
+    ``near``: neighbours of each pixel; ``node_of``: its node or -1; ``members``: the pixels of nodes.
     """
     seen = [node >= 0 for node in node_of]
 
@@ -157,11 +160,6 @@ def _walks(
     return walks, rings
 
 
-SPUR = (
-    1.5  # length of a free end up to which it is a burr of the outline, over half the width where it begins
-)
-
-
 def _without_burrs(graph: Graph) -> Graph:
     """Return the graph without free ends that are no longer than the line is wide; lone lines stay."""
     free = [len(edges) == 1 for edges in graph.at]
@@ -181,10 +179,6 @@ def _without_burrs(graph: Graph) -> Graph:
     return Graph(kept, graph.places, graph.radii)
 
 
-NEAR = 1.6  # length of an edge up to which its two nodes are one, over half the width there
-SHORT_LOOP = 4.0  # length of an edge below which it goes when its nodes are merged, over the same
-
-
 def _with_merged_nodes(graph: Graph) -> Graph:
     """Merge nodes that the width of the lines has drawn apart, so that crossings have four arms."""
     sets = Sets(len(graph.places))
@@ -192,7 +186,7 @@ def _with_merged_nodes(graph: Graph) -> Graph:
     rest = []
     for edge in graph.edges:
         a, b = edge.nodes
-        reach = NEAR * float(max(graph.radii[a], graph.radii[b]))
+        reach = MERGED * float(max(graph.radii[a], graph.radii[b]))
         if a != b and meets[a] and meets[b] and edge.length() <= max(reach, 1.5):
             sets.join(a, b)
         else:

@@ -13,6 +13,17 @@ from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, compon
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
 from warpsplat.drawing.trace.palette import Parts
 
+ORPHAN_ROUNDS = 4  # each of which takes one more row of pixels off an orphan's border
+
+SMALL, TINY = (60, REACH), (12, 2 * REACH)
+"""Pixels of the largest region that may be given up, and how far away the regions may lie that it is mixed of
+[px]: the tips of stars are long."""
+
+INVISIBLE = 120.0  # [levels] sum of the residuals of a region that is given up, at the most
+INVISIBLE_PIXEL, MOST_COUNTED = 40.0, 8  # [levels] the same for each pixel, of which no more than these count
+MOSTLY = 0.4  # share of mixtures in a noisy region, from which on these are no part of it: JPEG tints the
+# tips of stars, and not all of a long one is near what it is a tip of
+
 
 def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
     """Give the unlabelled pixels to the part with the largest share in them, or else to the nearest one."""
@@ -33,9 +44,6 @@ def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
         labels[empty] = labels.reshape(-1)[take]
         fills[empty] = fills.reshape(-1, fills.shape[2])[take]
     return parts.paint[labels], fills
-
-
-ORPHAN_ROUNDS = 4  # each of which takes one more row of pixels off an orphan's border
 
 
 def without_orphans(image: Floats, painted: Ints, fills: Floats, *, sure: Bools) -> tuple[Ints, Floats]:
@@ -60,16 +68,6 @@ def without_orphans(image: Floats, painted: Ints, fills: Floats, *, sure: Bools)
         found = np.isfinite(best)
         orphan[rows[found], columns[found]] = False
     return painted, fills
-
-
-SMALL, TINY = (60, REACH), (12, 2 * REACH)
-"""Pixels of the largest region that may be given up, and how far away the regions may lie that it is mixed of
-[px]: the tips of stars are long."""
-
-INVISIBLE = 120.0  # [levels] sum of the residuals of a region that is given up, at the most
-INVISIBLE_PIXEL, MOST_COUNTED = 40.0, 8  # [levels] the same for each pixel, of which no more than these count
-MOSTLY = 0.4  # share of mixtures in a noisy region, from which on these are no part of it: JPEG tints the
-# tips of stars, and not all of a long one is near what it is a tip of
 
 
 def without_specks(image: Floats, painted: Ints, fills: Floats, noise: float) -> tuple[Ints, Floats, Bools]:

@@ -13,6 +13,11 @@ from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene.joints import Joint
 
+OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
+SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
+MOST_MOVED = 0.6  # [px] that a handle moves when its smooth joint is made straight, at the most
+MOST_MERGED = 1500  # shapes among which those of one colour are merged, in quadratic time
+
 
 def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
     """Join curves and corners (point, 2) with lines to a closed contour; None if there is nothing to join."""
@@ -51,20 +56,13 @@ def _with_joined_lines(cubics: list[Floats], lines: list[bool]) -> Pieces:
     return Pieces(np.asarray(kept), np.asarray(is_line, np.bool_))
 
 
-OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
-
-
 def _is_straight_on(one: Floats, other: Floats) -> bool:
     """Return whether the joint of two lines is on the line from the first's start to the second's end."""
-    way, here = other[3] - one[0], one[3] - one[0]
-    size = float(hypot(*way))
-    if size < 1e-6 or (here * way).sum() < 0 or ((other[3] - one[3]) * way).sum() < 0:
+    chord, here = other[3] - one[0], one[3] - one[0]
+    size = float(hypot(*chord))
+    if size < 1e-6 or (here * chord).sum() < 0 or ((other[3] - one[3]) * chord).sum() < 0:
         return False
-    return bool(abs(here[0] * way[1] - here[1] * way[0]) <= OFF_LINE * size)
-
-
-SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
-MOST_MOVED = 0.6  # [px] that a handle moves when its smooth joint is made straight, at the most
+    return bool(abs(here[0] * chord[1] - here[1] * chord[0]) <= OFF_LINE * size)
 
 
 def joints_of(contour: Pieces) -> Ints:
@@ -97,9 +95,6 @@ class Fill:
         """Return the bounding box of the control points: left, top, right, bottom."""
         points = np.concatenate([contour.cubics.reshape(-1, 2) for contour in self.contours])
         return np.concatenate([points.min(axis=0), points.max(axis=0)])
-
-
-MOST_MERGED = 1500  # shapes among which those of one colour are merged, in quadratic time
 
 
 def merged(shapes: list[Fill]) -> list[Fill]:

@@ -20,6 +20,12 @@ APART = 2.0  # [px] of outline between two corners, at the least
 Corner = tuple[float, Floats]
 """The arc length where a corner lies, and its point."""
 
+ROUNDED = 1.1  # [px] of outline on each side of a corner that its antialiasing bends
+SIDE = 6.0  # [px] of outline on each side that tells where a corner is
+MOST_OFF, MOST_OFF_SHORT = 4.0, 1.2  # [px] of a corner with long and short sides: the tips of stars are off
+BLUNT = 3.5  # [px] of outline between two corners that may be one
+MOST_OFF_BLUNT = 3.0  # [px] distance of that one from their middle, at the most
+
 
 def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corner]:
     """Return the corners of a polyline, in order along it.
@@ -69,11 +75,6 @@ def _peaks(strength: Floats, here: Floats, total: float, closed: bool) -> list[i
     return sorted(found)
 
 
-ROUNDED = 1.1  # [px] of outline on each side of a corner that its antialiasing bends
-SIDE = 6.0  # [px] of outline on each side that tells where a corner is
-FAR, NEAR = 4.0, 1.2  # [px] that a corner with long or short sides may be off: the tips of stars are
-
-
 def _located(points: Floats, along: Floats, closed: bool, corners: list[int]) -> list[Corner]:
     """Return corners where their two sides meet."""
     total = float(along[-1])
@@ -90,14 +91,10 @@ def _located(points: Floats, along: Floats, closed: bool, corners: list[int]) ->
             _side(points, along, closed, low, here - ROUNDED),
             _side(points, along, closed, here + ROUNDED, high),
             points[i],
-            FAR if min(here - low, high - here) > 0.6 * SIDE else NEAR,
+            MOST_OFF if min(here - low, high - here) > 0.6 * SIDE else MOST_OFF_SHORT,
         )
         result.append((here, point))
     return result
-
-
-BLUNT = 3.5  # [px] of outline between two corners that may be one
-BLUNT_FAR = 3.0  # [px] distance of that one from their middle, at the most
 
 
 def _with_sharp_tips(points: Floats, along: Floats, closed: bool, corners: list[Corner]) -> list[Corner]:
@@ -114,7 +111,7 @@ def _with_sharp_tips(points: Floats, along: Floats, closed: bool, corners: list[
                 before, beyond = max(before, 0.0), min(beyond, total)
             middle = at_length(points, along, closed, np.array([(low + high) / 2]))[0]
             one = _side(points, along, closed, before, low - 0.5)
-            point = _meeting(one, _side(points, along, closed, high + 0.5, beyond), middle, BLUNT_FAR)
+            point = _meeting(one, _side(points, along, closed, high + 0.5, beyond), middle, MOST_OFF_BLUNT)
             if point is not middle:
                 result[number] = ((low + high) / 2 % total if closed else (low + high) / 2, point)
                 del result[after]

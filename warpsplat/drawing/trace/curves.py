@@ -69,12 +69,12 @@ def _fitted(spans: list[Span], tolerance: float) -> Iterator[Pieces]:
     for _, group in itertools.groupby(range(len(spans)), lambda i: chunks[i]):
         own = [(spans[i], *pairs[i]) for i in group]
         start, end = (np.concatenate([span.knots[ij[k]] for span, *ij in own]) for k in (0, 1))
-        way, back = (np.concatenate([span.tangents[ij[k]] for span, *ij in own]) for k in (0, 1))
+        ahead, back = (np.concatenate([span.tangents[ij[k]] for span, *ij in own]) for k in (0, 1))
         points = np.concatenate([_samples(*candidates) for candidates in own])
         # Towards a knot its own place counts, not the noisy point there.
         points[:, 0], points[:, -1] = start, end
         line_error = _line_errors(start, end, points)
-        cubics, cubic_error = fit_cubics(start, way, -back, end, points)
+        cubics, cubic_error = fit_cubics(start, ahead, -back, end, points)
         low = 0
         for _, first, last in own:
             part = slice(low, low + len(first))
@@ -151,13 +151,13 @@ ROUNDS = 3  # of fitting handles and finding the parameters of the points
 
 
 def fit_cubics(
-    start: Floats, way: Floats, back: Floats, end: Floats, points: Floats
+    start: Floats, ahead: Floats, back: Floats, end: Floats, points: Floats
 ) -> tuple[Floats, Floats]:
     """Fit cubics of given ends and tangents to points (Schneider 1990).
 
     Args:
         start: Shape (cubic, 2).
-        way: Unit tangents there, shape (cubic, 2).
+        ahead: Unit tangents there, shape (cubic, 2).
         back: Unit tangents at the end, pointing back, shape (cubic, 2).
         end: Shape (cubic, 2).
         points: Shape (cubic, sample, 2).
@@ -168,25 +168,27 @@ def fit_cubics(
     steps = hypot(*np.moveaxis(np.diff(points, axis=1), 2, 0))
     t = np.concatenate([np.zeros((len(points), 1)), np.cumsum(steps, axis=1)], axis=1)
     t /= np.maximum(t[:, -1:], 1e-9)
-    cubics = _with_handles(start, way, back, end, points, t)
+    cubics = _with_handles(start, ahead, back, end, points, t)
     for _ in range(ROUNDS - 1):
         t = _nearer(cubics, points, t)
-        cubics = _with_handles(start, way, back, end, points, t)
+        cubics = _with_handles(start, ahead, back, end, points, t)
     off = hypot(*np.moveaxis(points_at(cubics, t) - points, 2, 0))
     return cubics, off.max(axis=1)
 
 
-def _with_handles(start: Floats, way: Floats, back: Floats, end: Floats, points: Floats, t: Floats) -> Floats:
+def _with_handles(
+    start: Floats, ahead: Floats, back: Floats, end: Floats, points: Floats, t: Floats
+) -> Floats:
     """Return cubics with handles of lengths found by least squares, a third of the chord where that fails."""
     s = 1 - t
     near_start, near_end = s * s * (1 + 2 * t), t * t * (3 - 2 * t)
     b1, b2 = 3 * s * s * t, 3 * s * t * t
     a11, a22 = (b1 * b1).sum(axis=1), (b2 * b2).sum(axis=1)
-    a12 = (b1 * b2).sum(axis=1) * (way * back).sum(axis=1)
+    a12 = (b1 * b2).sum(axis=1) * (ahead * back).sum(axis=1)
     y1, y2 = np.zeros(len(t)), np.zeros(len(t))
     for axis in (0, 1):
         rest = points[..., axis] - near_start * start[:, None, axis] - near_end * end[:, None, axis]
-        y1 += (b1 * rest).sum(axis=1) * way[:, axis]
+        y1 += (b1 * rest).sum(axis=1) * ahead[:, axis]
         y2 += (b2 * rest).sum(axis=1) * back[:, axis]
     det = a11 * a22 - a12**2
     safe = np.where(np.abs(det) > 1e-9, det, 1)
@@ -195,7 +197,7 @@ def _with_handles(start: Floats, way: Floats, back: Floats, end: Floats, points:
     bad = (np.abs(det) <= 1e-9) | (first < 0.02 * chord) | (second < 0.02 * chord)
     bad |= (first > 3 * chord) | (second > 3 * chord)
     first, second = np.where(bad, chord / 3, first), np.where(bad, chord / 3, second)
-    return np.stack([start, start + first[:, None] * way, end + second[:, None] * back, end], axis=1)
+    return np.stack([start, start + first[:, None] * ahead, end + second[:, None] * back, end], axis=1)
 
 
 def _nearer(cubics: Floats, points: Floats, t: Floats) -> Floats:
@@ -218,10 +220,10 @@ def _with_level_lines(spans: list[Pieces], closed: bool, tolerance: float) -> Pi
     lines = np.concatenate([pieces.lines for pieces in spans])
     count = len(cubics)
     for k in np.flatnonzero(lines).tolist():
-        way = cubics[k, 3] - cubics[k, 0]
+        chord = cubics[k, 3] - cubics[k, 0]
         for axis in (0, 1):
-            limit = min(LEVEL_OFF * tolerance, LEVEL_SLOPE * abs(way[1 - axis]) + 0.02)
-            if 0 < abs(way[axis]) <= limit and abs(way[1 - axis]) > LEAST_LEVEL:
+            limit = min(LEVEL_OFF * tolerance, LEVEL_SLOPE * abs(chord[1 - axis]) + 0.02)
+            if 0 < abs(chord[axis]) <= limit and abs(chord[1 - axis]) > LEAST_LEVEL:
                 value = 0.5 * (cubics[k, 0, axis] + cubics[k, 3, axis])
                 if closed or k > 0:
                     _move_end(cubics[(k - 1) % count, ::-1, axis], value)

@@ -12,7 +12,7 @@ from warpsplat.drawing.trace.regions import Regions
 
 
 def fewer_regions(regions: Regions, most: int) -> Regions:
-    """Merge regions, the pair that changes the picture least first, until there are no more than ``most``."""
+    """Merge regions, the pair that changes the image least first, until there are no more than ``most``."""
     count = len(regions.paint)
     if count <= most:
         return regions

@@ -18,6 +18,8 @@ Bools = npt.NDArray[np.bool_]
 NO_REGION = -1
 """Label of a pixel that is in no region, and of everything outside the image."""
 
+SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
+
 
 def channel_max(values: Floats) -> Floats:
     """Return the maximum over the last axis, ten times as fast as NumPy where that axis is short."""
@@ -27,6 +29,23 @@ def channel_max(values: Floats) -> Floats:
 def depth(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Return the distance of each pixel from those outside the mask, or the image [px], (height, width)."""
     return filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
+
+
+def dilated(mask: npt.NDArray[Any], side: int) -> Bools:
+    """Return the pixels within a square of ``side`` px around those of a mask."""
+    return np.asarray(cv2.dilate(np.asarray(mask, np.uint8), np.ones((side, side), np.uint8)) > 0)
+
+
+def eroded(mask: npt.NDArray[Any], side: int) -> Bools:
+    """Return the pixels of a mask around which all of a square of ``side`` px is in it, or off the image."""
+    return np.asarray(cv2.erode(np.asarray(mask, np.uint8), np.ones((side, side), np.uint8)) > 0)
+
+
+def at_pixels(values: npt.NDArray[Any], points: Floats) -> npt.NDArray[Any]:
+    """Return the values of the pixels that points (point, 2) lie in, or of the nearest ones of the image."""
+    height, width = values.shape[:2]
+    columns, rows = points.astype(np.intp).T
+    return values[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
 
 
 class Sets:
@@ -97,9 +116,6 @@ def crossings(labels: Ints) -> Bools:
     """Find the corners where two labels meet as on a chessboard, shape (height - 1, width - 1)."""
     a, b, c, d = labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]
     return np.asarray((a == d) & (b == c) & (a != b))
-
-
-SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
 
 
 def prefers_main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:

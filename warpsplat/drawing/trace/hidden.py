@@ -1,4 +1,4 @@
-"""What lies above a region and hides it, and the shortest ways under it."""
+"""What lies above a region and hides it, and the shortest paths under it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, eroded
 from warpsplat.portable.elementary import hypot
 
 NEAREST, DEEPEST, DEPTH_STEP = 0.5, 16.0, 0.5
 """How far beyond its boundary what hides a region is measured: first, at the most, and between [px]."""
 
 MARGIN = 0.7  # [px] between a hidden line and where it would be seen
+CUT_OFF = 1.0  # [px squared] area of its region that a hidden outline may cut off
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,11 @@ class Cover:
 
     def hides_line(self, rank: int, start: Floats, end: Floats) -> bool:
         """Return whether a straight line with a margin is hidden, its ends aside."""
-        way = end - start
-        size = float(hypot(*way))
+        vector = end - start
+        size = float(hypot(*vector))
         if size < 1.5:
             return True
-        unit = way / size
+        unit = vector / size
         normal = MARGIN * np.array([-unit[1], unit[0]])
         points = start + np.arange(0.75, size - 0.5, 0.5)[:, None] * unit
         beside = [points, points[1:-1] + normal, points[1:-1] - normal]
@@ -52,7 +53,7 @@ class Cover:
         width, height = np.ceil(polygon.max(axis=0)).astype(np.intp) - low + 1
         mask = np.zeros((height, width), np.uint8)
         cv2.fillPoly(mask, [np.round(polygon - low - 0.5).astype(np.int32)], 1)
-        rows, columns = np.nonzero(cv2.erode(mask, np.ones((3, 3), np.uint8)))
+        rows, columns = np.nonzero(eroded(mask, 3))
         return bool(self.hides(rank, np.stack([columns, rows], axis=1) + low + 0.5).all())
 
     def middles(self, rank: int, begins: Ints, steps: Ints, trends: Floats) -> Floats:
@@ -76,11 +77,8 @@ class Cover:
         return np.where(reach[:, None] > NEAREST, middle + 0.5 * reach[:, None] * outward, near)
 
 
-CUT_OFF = 1.0  # [px squared] area of its region that a hidden outline may cut off
-
-
-def shortest_way(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, through_holes: bool) -> Floats:
-    """Return the corners of a way from the first to the last goal, hidden from a region of this rank.
+def shortest_path(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, through_holes: bool) -> Floats:
+    """Return the corners of a path from the first to the last goal, hidden from a region of this rank.
 
     Args:
         cover: What hides the region.
@@ -88,16 +86,16 @@ def shortest_way(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, th
         goals: Its ends and, beyond each crack between, a hidden point; shape (crack + 2, 2).
         vertices: Of the region's boundary, one more than there are cracks, the last one twice; shape
             (crack + 2, 2).
-        through_holes: Whether the way must not cross a part of the region that is seen through what is above.
+        through_holes: Whether what is above has holes, through which the path must not be seen.
     """
     cross = vertices[:-1, 0] * vertices[1:, 1] - vertices[:-1, 1] * vertices[1:, 0]
     swept = np.concatenate([[0.0], np.cumsum(cross)])
 
     def is_free(i: int, j: int) -> bool:
-        """Return whether the way may go straight from goal i to goal j."""
+        """Return whether the path may go straight from goal i to goal j."""
         # Cutting short must not cut off the region itself, which lies on the right.
-        way = vertices[j], goals[j], goals[i], vertices[i]
-        beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(way))
+        corners = vertices[j], goals[j], goals[i], vertices[i]
+        beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(corners))
         if beside > 2 * CUT_OFF or not cover.hides_line(rank, goals[i], goals[j]):
             return False
         if not through_holes:

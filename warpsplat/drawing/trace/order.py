@@ -10,6 +10,11 @@ from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
 from warpsplat.drawing.trace.planar import STEPS, Loops
 from warpsplat.portable.elementary import hypot
 
+LINE_WIDTH = 7.0  # [px] of the widest region that is a line
+LOOK = 6  # cracks over which the direction of an outline is taken at a T-junction
+STRAIGHT = 0.85  # cosine from which on an outline goes straight on there
+MOST_SORTED = 400  # siblings that are put in order by votes; more are by size
+
 
 @dataclass(frozen=True)
 class Tree:
@@ -80,9 +85,6 @@ def has_inside(tree: Tree, marked: Bools) -> Bools:
     return found
 
 
-LINE_WIDTH = 7.0  # [px] of the widest region that is a line
-
-
 def find_ranks(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Ints:
     """Put the regions in the order of painting.
 
@@ -112,10 +114,6 @@ def find_ranks(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Ints:
     return rank
 
 
-LOOK = 6  # cracks over which the direction of an outline is taken at a T-junction
-STRAIGHT = 0.85  # cosine from which on an outline goes straight on there
-
-
 def _votes(loops: Loops, unpainted: Bools) -> dict[int, dict[int, int]]:
     """Count at how many T-junctions a region a seems to lie above a region b: ``votes[a][b]``.
 
@@ -142,9 +140,6 @@ def _votes(loops: Loops, unpainted: Bools) -> dict[int, dict[int, int]]:
             for other in (int(others[change]), int(others[change - 1])):
                 below[other] = below.get(other, 0) + 1
     return votes
-
-
-MOST_SORTED = 400  # siblings that are put in order by votes; more are by size
 
 
 def _sorted(siblings: list[int], votes: dict[int, dict[int, int]], sizes: Ints, is_line: Bools) -> list[int]:

@@ -14,6 +14,13 @@ from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
 from warpsplat.drawing.trace.planar import INSIDE, LEFT, OUTSIDE, RIGHT, STEPS, Loops
 from warpsplat.drawing.trace.regions import Regions
 
+REACH = 3  # [px] how far from a crack mixed pixels count
+PURE = 0.02  # share of the other region up to which a pixel is not mixed
+FOREIGN = (
+    20.0  # [levels] distance of a pixel from any mixture of the two, from which on it has a third colour
+)
+TREND = 3  # cracks ahead and behind that tell the direction of an outline
+
 
 @dataclass(frozen=True)
 class Boundary:
@@ -54,13 +61,6 @@ def _offsets(loops: Loops, regions: Regions) -> Floats:
     return offsets
 
 
-REACH = 3  # [px] how far from a crack mixed pixels count
-PURE = 0.02  # share of the other region up to which a pixel is not mixed
-FOREIGN = (
-    20.0  # [levels] distance of a pixel from any mixture of the two, from which on it has a third colour
-)
-
-
 def _intrusion(regions: Regions, start: Ints, step: Ints, mine: Floats, theirs: Floats) -> Floats:
     """Return how far the colours ``mine`` reach into the other region, from ``start`` on [px]."""
     height, width = regions.labels.shape
@@ -82,9 +82,6 @@ def _intrusion(regions: Regions, start: Ints, step: Ints, mine: Floats, theirs: 
         total += np.where(active, share, 0)
         before = share
     return total
-
-
-TREND = 3  # cracks ahead and behind that tell the direction of an outline
 
 
 def _trends(loops: Loops) -> Floats:

@@ -11,6 +11,12 @@ from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, channel_max
 from warpsplat.drawing.trace.ramps import Ramp, fit_ramp
 
 CLEAR = 2.5  # [levels] opacity below which nothing is painted
+LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without and with noise
+UNEVEN = 1.6  # [levels] residual of a flat colour from which on a ramp is tried, besides noise
+UNEVEN_NOISE = 3.0  # what a level of noise adds to that
+GAIN = 0.6  # a ramp must leave less than this share of a flat colour's residual
+SAME = 1.5  # [levels] colours that differ by less are one
+SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, and what it adds at the most
 
 
 @dataclass(frozen=True)
@@ -38,12 +44,6 @@ class Parts:
     paint: Ints
     """The colouring of each part, shape (part,)."""
     colorings: list[Coloring]
-
-
-LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without and with noise
-UNEVEN = 1.6  # [levels] residual of a flat colour from which on a ramp is tried, besides noise
-UNEVEN_NOISE = 3.0  # what a level of noise adds to that
-GAIN = 0.6  # a ramp must leave less than this share of a flat colour's residual
 
 
 def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
@@ -83,13 +83,7 @@ def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
 
 
 def _modes(pixels: Floats, owners: Ints, count: int) -> Floats:
-    """Return the most frequent colour of each part, shape (count, channel).
-
-    Args:
-        pixels: Colours, shape (pixel, channel).
-        owners: The part of each pixel, shape (pixel,).
-        count: Of the parts.
-    """
+    """Return the most frequent colour of each part, shape (count, channel), from its ``pixels``."""
     levels = np.round(pixels).astype(np.int64)
     packed = owners.astype(np.int64)
     for channel in levels.T:
@@ -102,10 +96,6 @@ def _modes(pixels: Floats, owners: Ints, count: int) -> Floats:
     colors = np.zeros((count, levels.shape[1]))
     colors[owner[last]] = (keys[last][:, None] >> shifts) & 255
     return colors
-
-
-SAME = 1.5  # [levels] colours that differ by less are one
-SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, and what it adds at the most
 
 
 def _shared_colors(colors: Floats, sizes: Ints, noise: float) -> tuple[Ints, list[Coloring]]:

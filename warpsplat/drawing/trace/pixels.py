@@ -19,6 +19,9 @@ from warpsplat.scene.scene import starts_of
 MOST_CELLS = 1 << 18  # of pixel art: nobody would edit the outlines of more
 
 Point = tuple[int, int]
+STRIP_ROWS = 64  # compared at once, which bounds the memory
+MOST_CORNERS = 32_000  # of a shape
+SAME = 0.5 / 255  # difference below which colours are one in 8 bits
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,6 @@ def find_cells(image: FloatArray) -> PixelArt:
         raise ImageError(f"{shape} cells of {size} px, more than pixel art may have ({MOST_CELLS})")
     palette, colors = np.unique(cells.reshape(-1, image.shape[2]), axis=0, return_inverse=True)
     return PixelArt(colors.reshape(cells.shape[:2]), np.asarray(palette / 255, np.float32), size)
-
-
-STRIP_ROWS = 64  # compared at once, which bounds the memory
 
 
 def cell_size(image: npt.NDArray[Any], converted: Callable[..., npt.NDArray[Any]] = np.asarray) -> int:
@@ -115,9 +115,6 @@ def _take_edge(edges: dict[Point, list[Point]], at: Point, before: Point | None)
     return end
 
 
-MOST_CORNERS = 32_000  # of a shape
-
-
 def polygons(inside: Bools) -> list[list[list[Point]]]:
     """Return the outlines of cells as sets of polygons with no more than ``MOST_CORNERS`` each.
 
@@ -125,7 +122,7 @@ def polygons(inside: Bools) -> list[list[list[Point]]]:
     """
     whole = outlines(inside)
     height, width = inside.shape
-    if sum(map(len, whole)) <= MOST_CORNERS or inside.size == 1:
+    if sum(map(len, whole)) <= MOST_CORNERS:
         return [whole]
     if height >= width:
         halves = [(inside[: height // 2], 0, 0), (inside[height // 2 :], 0, height // 2)]
@@ -144,9 +141,6 @@ def _lines(corners: list[Point], size: int) -> Floats:
     start = np.asarray(corners, np.float64) * size
     way = np.roll(start, -1, axis=0) - start
     return np.stack([start, start + way / 3, start + way * 2 / 3], axis=1).reshape(-1, 2)
-
-
-SAME = 0.5 / 255  # difference below which colours are one in 8 bits
 
 
 def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tuple[Scene, float]:

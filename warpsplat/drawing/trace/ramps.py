@@ -17,6 +17,12 @@ from warpsplat.scene import Paint
 SAMPLES = 4000  # pixels of a region that a ramp is fitted to, at the most
 LEAST_SLOPES = 8  # pixels where the slope is known, at the least
 RADIAL_HANDICAP = 0.1  # by which the residual of a radial gradient must be smaller, over that of a linear one
+SPAN = 3  # [px] over which the slope is taken, to each side
+BLUR = 1.5  # [px] standard deviation of the filter before that
+BINS = 48  # places along a ramp where its colour is measured
+STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
+OFF = 1.0  # [levels] of the colours between two stops from a straight line, at the most
+MOST_STOPS = 8
 
 
 @dataclass(frozen=True)
@@ -65,10 +71,6 @@ def _sampled(mask: Bools) -> tuple[Ints, Ints]:
     return rows[pick], columns[pick]
 
 
-SPAN = 3  # [px] over which the slope is taken, each way
-BLUR = 1.5  # [px] standard deviation of the filter before that
-
-
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
     """Return where the slope of the image is known, shape (n, 2), and it by channel, (n, 2, channel)."""
     weight = filters.gaussian_blur(mask, BLUR)
@@ -86,13 +88,13 @@ def _linear(points: Floats, colors: Floats, slopes: Floats) -> Ramp:
     """Return a gradient along the principal direction of the slopes."""
     x, y = slopes[:, 0], slopes[:, 1]
     mixed = (x * y).sum()
-    way = eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]
-    along = product(points, way)
+    direction = eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]
+    along = product(points, direction)
     low, high = float(along.min()), float(along.max())
     length = max(high - low, 1e-3)
     middle = points.mean(axis=0)
-    origin = middle + (low - float((middle * way).sum())) * way
-    axis = way * length
+    origin = middle + (low - float((middle * direction).sum())) * direction
+    axis = direction * length
     frame = np.concatenate([origin, axis, [-axis[1], axis[0]]])
     return Ramp(Paint.LINEAR, frame, *_profile((along - low) / length, colors))
 
@@ -117,9 +119,6 @@ def _radial(points: Floats, colors: Floats, center: Floats) -> Ramp:
     return Ramp(Paint.RADIAL, frame, *_profile(distance / reach, colors))
 
 
-BINS = 48  # places along a ramp where its colour is measured
-
-
 def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
     """Fit stops to the colours along ``t`` in 0..1: their offsets, their colours, and the residual."""
     knots = np.linspace(0, 1, BINS + 1)
@@ -134,9 +133,6 @@ def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
 
 def _interpolated(t: Floats, offsets: Floats, colors: Floats) -> Floats:
     return np.stack([interp(t, offsets, channel) for channel in colors.T], axis=1)
-
-
-STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
 
 
 def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
@@ -160,10 +156,6 @@ def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
     beside[:-1] -= 2 * stiff
     beside[1:] -= 2 * stiff
     return solve_banded([here, beside, np.full(count - 2, stiff)], right)
-
-
-OFF = 1.0  # [levels] of the colours between two stops from the straight way, at the most
-MOST_STOPS = 8
 
 
 def _fewest(knots: Floats, values: Floats) -> Floats:

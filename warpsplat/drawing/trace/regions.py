@@ -15,6 +15,14 @@ from warpsplat.drawing.trace.seeds import find_seeds, noise_of
 from warpsplat.drawing.trace.thin_parts import add_thin_parts
 from warpsplat.portable import filters
 
+NEGLIGIBLE_NOISE = 0.5  # [levels] noise below which an image counts as clean
+MOST_NOISE = 12.0  # [levels] that tolerances take into account
+MOST_SEED_NOISE = 3.0  # [levels] that seeds take into account: they must stay apart
+SMOOTHED_STEP, SMOOTHED_NOISE = 12.0, 6.0  # [levels] steps that are smoothed, and per level of noise
+RELIABLE = 30  # [px] of the smallest seed that antialiasing cannot produce
+MIXED_SHARE = 0.7  # of a seed's pixels that are mixtures, from which on it is no seed
+WHOLE = 0.99  # share of one region from which on a pixel is no mixture
+
 
 @dataclass(frozen=True)
 class Regions:
@@ -31,11 +39,6 @@ class Regions:
     colorings: list[Coloring]
     noise: float
     """How much flat regions vary [levels]."""
-
-
-NEGLIGIBLE_NOISE = 0.5  # [levels] noise below which an image counts as clean
-MOST_NOISE = 12.0  # [levels] that tolerances take into account
-MOST_SEED_NOISE = 3.0  # [levels] that seeds take into account: they must stay apart
 
 
 def find_regions(image: Floats) -> Regions:
@@ -64,9 +67,6 @@ def find_regions(image: Floats) -> Regions:
     return Regions(image, labels, fills, paint, parts.colorings, noise)
 
 
-SMOOTHED_STEP, SMOOTHED_NOISE = 12.0, 6.0  # [levels] steps that are smoothed, and per level of noise
-
-
 def _smoothed(image: Floats, noise: float) -> Floats:
     """Return the image without the traces of JPEG beside edges."""
     smooth = image.copy()
@@ -77,11 +77,6 @@ def _smoothed(image: Floats, noise: float) -> Floats:
                 part = filters.bilateral(part, 7, SMOOTHED_STEP + SMOOTHED_NOISE * noise, 2.5)
             smooth[..., channels] = part
     return smooth
-
-
-RELIABLE = 30  # [px] of the smallest seed that antialiasing cannot produce
-MIXED_SHARE = 0.7  # of a seed's pixels that are mixtures, from which on it is no seed
-WHOLE = 0.99  # share of one region from which on a pixel is no mixture
 
 
 def _without_mixed_seeds(image: Floats, labels: Ints, noise: float) -> Ints:

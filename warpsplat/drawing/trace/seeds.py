@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, linked_components
+from warpsplat.drawing.trace.grids import (
+    NO_REGION,
+    Bools,
+    Floats,
+    Ints,
+    channel_max,
+    dilated,
+    linked_components,
+)
 
 EDGE = 24  # [levels] step between neighbours that is an edge, whatever the noise
 NOISE_QUANTILE = 70  # [%] of the steps beside edges, that measures the noise
@@ -26,10 +33,8 @@ def noise_of(image: Floats) -> float:
     step = np.zeros(grey.shape, np.float32)
     step[:, 1:] = np.abs(np.diff(grey, axis=1))
     step[1:] = np.maximum(step[1:], np.abs(np.diff(grey, axis=0)))
-    edge = (step > EDGE).astype(np.uint8)
-    near = cv2.dilate(edge, np.ones((13, 13), np.uint8)) > 0
-    apart = cv2.dilate(edge, np.ones((5, 5), np.uint8)) == 0
-    ring = step[near & apart]
+    edge = step > EDGE
+    ring = step[dilated(edge, 13) & ~dilated(edge, 5)]
     return float(np.percentile(ring if len(ring) >= 64 else step, NOISE_QUANTILE))
 
 

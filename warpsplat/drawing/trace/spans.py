@@ -12,6 +12,13 @@ from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.portable.elementary import hypot
 
+FINE_TOLERANCE = 0.3  # [px] up to which corners are looked for at their finest scale
+BENT = 1.0  # [px] of outline beside a corner that its antialiasing bends
+SPACING, MOST_KNOTS = 1.5, 48  # [px] between knots, about; and how many a span has, at the most
+WINDOW = 4.0  # [px] of outline on each side of a knot that tells its place and tangent
+END_WEIGHT = 16.0  # of a corner or junction, which is known exactly
+RANK = 1e-24  # what is left of a sum of squares, over the whole, that counts as 0
+
 
 @dataclass(frozen=True)
 class Polyline:
@@ -39,10 +46,6 @@ class Span:
     """Unit vectors there, shape (knot, 2)."""
     places: Ints
     """Index of the point at each knot, shape (knot,)."""
-
-
-FINE_TOLERANCE = 0.3  # [px] up to which corners are looked for at their finest scale
-BENT = 1.0  # [px] of outline beside a corner that its antialiasing bends
 
 
 def cut_at_corners(run: Polyline, tolerance: float) -> list[Span]:
@@ -80,9 +83,6 @@ def cut_at_corners(run: Polyline, tolerance: float) -> list[Span]:
     return spans
 
 
-SPACING, MOST_KNOTS = 1.5, 48  # [px] between knots, about; and how many a span has, at the most
-
-
 def _with_knots(points: Floats, closed: bool = False) -> Span:
     """Return the span of points, of which a ring's last is its first."""
     along = arc_lengths(points)
@@ -98,10 +98,6 @@ def _with_knots(points: Floats, closed: bool = False) -> Span:
     else:
         knots[0], knots[-1] = points[0], points[-1]
     return Span(points, knots, tangents, places)
-
-
-WINDOW = 4.0  # [px] of outline on each side of a knot that tells its place and tangent
-END_WEIGHT = 16.0  # of a corner or junction, which is known exactly
 
 
 def _smoothed(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[Floats, Floats]:
@@ -132,15 +128,12 @@ def _smoothed(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[
     columns %= count
     weights = weights[columns] * (number < counts[:, None])
     is_curved = (counts > 4) & (along[low + counts - 1] - along[low] > 2)
-    middles, ways = _parabolas(t, weights, is_curved, ring[columns])
-    size = hypot(*ways.T)
+    middles, slopes = _parabolas(t, weights, is_curved, ring[columns])
+    size = hypot(*slopes.T)
     still = size < 1e-9
-    ways[still] = (ring[np.minimum(places + 1, count - 1)] - ring[places - 1])[still]
-    size = np.where(still, hypot(*ways.T), size)
-    return middles, ways / np.maximum(size, 1e-9)[:, None]
-
-
-RANK = 1e-24  # what is left of a sum of squares, over the whole, that counts as 0
+    slopes[still] = (ring[np.minimum(places + 1, count - 1)] - ring[places - 1])[still]
+    size = np.where(still, hypot(*slopes.T), size)
+    return middles, slopes / np.maximum(size, 1e-9)[:, None]
 
 
 def _parabolas(t: Floats, weights: Floats, is_curved: Bools, points: Floats) -> tuple[Floats, Floats]:

@@ -1,6 +1,7 @@
 """Regions as shapes that lie on one another.
 
-Each boundary is drawn by the upper one of its two regions; the lower one goes on under it, the shortest way.
+Each boundary is drawn by the upper one of its two regions; the lower one goes on under it,
+by the shortest path.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
-from warpsplat.drawing.trace.hidden import Cover, shortest_way
+from warpsplat.drawing.trace.hidden import Cover, shortest_path
 from warpsplat.drawing.trace.outlines import Boundary
 from warpsplat.drawing.trace.planar import STEPS, Loops
 from warpsplat.drawing.trace.spans import Polyline
@@ -49,8 +50,8 @@ class OutlineTracer:
     holed: Bools
     """Regions that are or contain something transparent, shape (region,)."""
 
-    def outlines(self, loop: int) -> list[Outline]:
-        """Return the contour of a loop; none where it is hidden altogether."""
+    def outline(self, loop: int) -> Outline:
+        """Return the contour of a loop; empty where it is hidden altogether."""
         low, high = int(self.loops.first[loop]), int(self.loops.first[loop + 1])
         cracks, rank = np.arange(low, high), int(self.ranks[self.loops.region[loop]])
         others = self.loops.others[low:high]
@@ -61,15 +62,15 @@ class OutlineTracer:
                 return []
             if self.loops.is_hole[loop]:  # left open, a little smaller than what lies over it
                 between = 0.5 * (self.boundary.points[cracks] + self._middles(rank, cracks))
-                return [[Polyline(self._points(cracks, closed=True, places=between), closed=True)]]
+                return [Polyline(self._points(cracks, closed=True, places=between), closed=True)]
             kinds[:] = SEEN
         if (kinds == kinds[0]).all():
-            return [[self._ring(cracks) if kinds[0] == SEEN else self._vertices_at_turns(cracks)]]
+            return [self._ring(cracks) if kinds[0] == SEEN else self._vertices_at_turns(cracks)]
         first = int(np.flatnonzero(kinds != np.roll(kinds, 1))[0])
         cracks, kinds = np.roll(cracks, -first), np.roll(kinds, -first)
         bounds = [*np.flatnonzero(np.diff(kinds, prepend=-1)).tolist(), len(kinds)]
         stretches: list[Stretch] = [(int(kinds[a]), cracks[a:b]) for a, b in itertools.pairwise(bounds)]
-        return [self._chain(rank, stretches)]
+        return self._chain(rank, stretches)
 
     def _ring(self, cracks: Ints) -> Polyline | Floats:
         """Return a loop that is seen all around."""
@@ -107,13 +108,7 @@ class OutlineTracer:
         return self.loops.vertices[cracks[1:]][directions[1:] != directions[:-1]].astype(np.float64)
 
     def _points(self, cracks: Ints, *, closed: bool, places: Floats | None = None) -> Floats:
-        """Return the good points of a stretch, without those where three regions meet.
-
-        Args:
-            cracks: Of the stretch.
-            closed: Whether it is a whole loop.
-            places: A point for each crack, instead of those of the boundary.
-        """
+        """Return the good points of a stretch, or of other ``places``, without those at T-junctions."""
         if places is None:
             places = self.boundary.points[cracks]
         others = self.loops.others[cracks]
@@ -159,7 +154,7 @@ class OutlineTracer:
                 goals = np.concatenate([start[None], self._middles(rank, cracks), end[None]])
                 vertices = self.loops.vertices[[*cracks, cracks[-1], cracks[-1]]].astype(np.float64)
                 holed = bool(self.holed[self.loops.others[cracks]].any())
-                parts.append(shortest_way(self.cover, rank, goals, vertices, through_holes=holed))
+                parts.append(shortest_path(self.cover, rank, goals, vertices, through_holes=holed))
         return parts
 
     def _ends(self, cracks: Ints) -> tuple[Floats, Floats]:
@@ -180,24 +175,24 @@ class OutlineTracer:
         tail = points[-5:]
         if len(tail) < 2:
             return vertex
-        middle, way = tail.mean(axis=0), principal_direction(tail)
-        way = way if (way * (tail[-1] - tail[0])).sum() > 0 else -way
+        middle, direction = tail.mean(axis=0), principal_direction(tail)
+        direction = direction if (direction * (tail[-1] - tail[0])).sum() > 0 else -direction
         if kind == EDGE:
-            return self._extended_to_edge(middle, way, vertex)
-        ahead, behind = ((place - middle) * way for place in (vertex, tail[-1]))
-        reached = middle + way * max(float(ahead.sum()), float(behind.sum()) + 0.1)
+            return self._extended_to_edge(middle, direction, vertex)
+        ahead, behind = ((place - middle) * direction for place in (vertex, tail[-1]))
+        reached = middle + direction * max(float(ahead.sum()), float(behind.sum()) + 0.1)
         if hypot(*(reached - vertex)) > 1.0:
             reached = vertex
-        further = reached + UNDER * way
+        further = reached + UNDER * direction
         return further if self.cover.hides(rank, further[None])[0] else reached
 
-    def _extended_to_edge(self, middle: Floats, way: Floats, vertex: Floats) -> Floats:
+    def _extended_to_edge(self, middle: Floats, direction: Floats, vertex: Floats) -> Floats:
         """Return where a line meets the edge of the image, or ``vertex`` if that is far away."""
         size = self.cover.ranks.shape[::-1]
         axis = 0 if vertex[0] in (0, size[0]) else 1
-        if abs(way[axis]) < 0.3:
+        if abs(direction[axis]) < 0.3:
             return vertex
-        reached = middle + way * (vertex[axis] - middle[axis]) / way[axis]
+        reached = middle + direction * (vertex[axis] - middle[axis]) / direction[axis]
         reached[axis] = vertex[axis]
         reached[1 - axis] = np.clip(reached[1 - axis], 0, size[1 - axis])
         return reached if hypot(*(reached - vertex)) < 1.5 else vertex

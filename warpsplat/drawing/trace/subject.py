@@ -1,4 +1,4 @@
-"""What an image shows, from its statistics: which way of vectorizing suits it."""
+"""Guess from its statistics what an image shows, and so how to vectorize it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth, dilated
 from warpsplat.drawing.trace.pixels import cell_size
 from warpsplat.portable.sequences import convolve
 from warpsplat.scene import FloatArray
@@ -69,7 +69,7 @@ def _guess(image: FloatArray) -> Guess:
     if _is_line_art(part):
         return Guess("line", "thin ink on paper")
     paper = (part == colors[counts.argmax()]).all(axis=2)
-    beside = cv2.dilate(edges.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    beside = dilated(edges, 3)
     if (paper | ~beside).mean() < GRAINY:
         few = _few_colors(part, np.zeros_like(edges), blurs=2)
         why = f"{few:.0%} of the pixels, without their grain, have one of {MOST_COLORS} colours"
@@ -118,12 +118,7 @@ MOSTLY_FREQUENT = 0.97  # least share of the pixels in such colours
 
 
 def _cell(image: FloatArray, counts: Ints) -> int | None:
-    """Return the side of the cells that pixel art is made of [px]; None for other images.
-
-    Args:
-        image: As ``guess_subject`` takes it.
-        counts: How many pixels have each of its colours.
-    """
+    """Return the side of the cells of pixel art [px]; None for other images. ``counts``: of its colours."""
     height, width = image.shape[:2]
     if not 2 <= len(counts) <= PIXEL_COLORS:
         return None
@@ -176,7 +171,7 @@ def _is_line_art(levels: Ints) -> bool:
     blank = np.abs(grey.astype(np.int32) - paper) <= PAPER_NOISE
     if blank.mean() < LEAST_PAPER or ink.mean() < LEAST_INK:
         return False
-    beside = cv2.dilate(ink.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    beside = dilated(ink, 5)
     if (~blank & ~beside).mean() > max(0.005, 0.1 * ink.mean()):
         return False
     return bool(np.quantile(depth(ink)[ink], 0.97) <= max(LINE, LINE_SHARE * max(grey.shape)))
@@ -198,12 +193,9 @@ NEAR_COLOR = 6  # [levels] distance of a pixel from a colour that it counts as
 
 
 def _few_colors(levels: Ints, edges: Bools, blurs: int) -> float:
-    """Return the share of the pixels near one of few colours, edges aside: JPEG leaves it large in drawings.
+    """Return the share of the pixels near one of few colours, after ``blurs`` by a median, edges aside.
 
-    Args:
-        levels: Shape (height, width, channel).
-        edges: Shape (height, width).
-        blurs: How often each pixel becomes the median of those around it before.
+    JPEG leaves it large in drawings.
     """
     calm = np.ascontiguousarray(levels.astype(np.uint8))
     for _ in range(blurs):

@@ -21,6 +21,9 @@ COVERED = 0.35  # least share of the part's colour in a pixel that belongs to it
 COVERED_OF_MOST = 0.8  # or this share of the largest one, if that is less
 OTHER_COLOR = 64.0  # [levels] a pixel this far off the part's mixtures has another colour
 NO_EVIDENCE = 256  # [levels] residual where there is no region nearby
+NEARBY = 5  # [px] how far from a thin part the colours lie that it may be mixed of
+MOST_COLORS = 8  # of which triples are tried
+CLEARLY = 0.4  # share of a colour that some pixel must have, for the part to have this colour
 
 
 @dataclass(frozen=True)
@@ -125,20 +128,14 @@ def _components_by_size(mask: Bools) -> Iterator[tuple[Ints, Ints]]:
             yield rows[index], columns[index]
 
 
-BESIDE = 5  # [px] how far from a thin part the colours lie that it may be mixed of
-
-
 def _flat_colors_near(labels: Ints, paint: Ints, thin: _ThinPart, colorings: list[Coloring]) -> list[int]:
     """Return the numbers of the flat colourings, of parts that have a ``paint``, beside a thin part."""
     y, x = thin.rows, thin.columns
-    rows = slice(max(int(y.min()) - BESIDE, 0), int(y.max()) + BESIDE + 1)
-    columns = slice(max(int(x.min()) - BESIDE, 0), int(x.max()) + BESIDE + 1)
+    rows = slice(max(int(y.min()) - NEARBY, 0), int(y.max()) + NEARBY + 1)
+    columns = slice(max(int(x.min()) - NEARBY, 0), int(x.max()) + NEARBY + 1)
     seen = labels[rows, columns]
     seen = seen[(seen != NO_REGION) & (seen < len(paint))]
     return [i for i in np.unique(paint[seen]).tolist() if colorings[i].ramp is None]
-
-
-MOST_COLORS = 8  # of which triples are tried
 
 
 def _is_mixture_of_three(pixels: Floats, colors: list[Floats], limit: float) -> bool:
@@ -159,9 +156,6 @@ def _is_mixture_of_three(pixels: Floats, colors: list[Floats], limit: float) -> 
     off = np.abs(away - shares[0][..., None] * one - shares[1][..., None] * other).max(axis=2)
     inside = (np.minimum(*shares) > -0.05) & (shares[0] + shares[1] < 1.05)
     return bool(((off <= limit) & inside).any(axis=0).all())
-
-
-CLEARLY = 0.4  # share of a colour that some pixel must have, for the part to have this colour
 
 
 def _matching_color(thin: _ThinPart, colorings: list[Coloring], near: list[int], limit: float) -> int | None:

@@ -78,7 +78,7 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     cover = Cover(hiding[regions.labels])
     tracer = OutlineTracer(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque))
     painted = np.flatnonzero((loops.region >= 0) & (ranks[loops.region] >= 0)).tolist()
-    outlines = [(int(loops.region[loop]), outline) for loop in painted for outline in tracer.outlines(loop)]
+    outlines = [(int(loops.region[loop]), tracer.outline(loop)) for loop in painted]
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
     fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
     contours: dict[int, list[Pieces]] = {}
