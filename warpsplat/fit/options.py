@@ -98,8 +98,9 @@ class Option:
             UsageError: it is not accepted.
         """
         if isinstance(value, dict) and self.type is dict:
+            number = dataclasses.replace(self, name="", type=float)
             for key, inner in value.items():
-                dataclasses.replace(self, name=f"{self.name} {key}", type=float).check(inner)
+                number.check(inner, f"{prefix}{self.name} {key}")
         elif not (self._accepted(value) or (value is None and self.default is None)):
             raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}")
 
@@ -127,12 +128,11 @@ def option(default: Any, help: str = "", limits: tuple[float, float] | None = No
         limits: see there.
         declared: further fields of ``Option``.
     """
-    makes = callable(default)
-    made = Option(default=None if makes else default, help=help, limits=limits, **declared)
-    metadata = {"option": made}
-    if makes:
-        return dataclasses.field(default_factory=default, metadata=metadata)
-    return dataclasses.field(default=default, metadata=metadata)
+    if callable(default):
+        made = Option(default=default(), shown_default="", help=help, limits=limits, **declared)
+        return dataclasses.field(default_factory=default, metadata={"option": made})
+    made = Option(default=default, help=help, limits=limits, **declared)
+    return dataclasses.field(default=default, metadata={"option": made})
 
 
 research = functools.partial(option, research=True)
