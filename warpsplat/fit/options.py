@@ -23,36 +23,23 @@ from warpsplat.errors import UsageError, shown
 class Option:
     """A setting as it is given. What a declaration leaves out follows from the field's type and default."""
 
-    name: str = ""
-    """The flag without its dashes, and the key of batch files."""
-    field: str = ""
-    """The field that it sets."""
-    value: Any = None
-    """What the flag stands for, if it is a switch for one value of the field."""
+    name: str = ""  # the flag without its dashes, and the key of batch files
+    field: str = ""  # that it sets
+    value: Any = None  # that the flag stands for, if it is a switch for one value of the field
     type: Any = str
     default: Any = None
-    shown_default: str | None = None
-    """The default as help shows it, if not as it is; empty where none is shown."""
-    help: str = ""
-    """A line; empty if it cannot be given by this name."""
-    research: bool = False
-    """Whether it is for researchers: a key of batch files and a keyword of ``make_settings``, but no flag."""
-    refine: bool = False
-    """Whether ``refine`` takes it as well."""
-    limits: tuple[float, float] | None = None
-    """Least and largest value of a number, or length of a text. A number without is positive."""
+    shown_default: str | None = None  # the default as help shows it, if not as it is
+    help: str = ""  # empty if it cannot be given by this name
+    research: bool = False  # a key of batch files and a keyword of make_settings, but no flag
+    refine: bool = False  # whether refine takes it as well
+    limits: tuple[float, float] | None = None  # of a number, else positive; of the length of a text
     choices: tuple[str, ...] = ()
-    pattern: str = ".*"
-    """Regular expression for a text, which ``wanted`` describes."""
-    wanted: str = ""
-    """Values that are accepted, in words."""
+    pattern: str = ".*"  # regular expression for a text, which "wanted" describes
+    wanted: str = ""  # values that are accepted, in words
     metavar: str = ""
-    subjects: tuple[str, ...] = ()
-    """Subjects that it is for, if not for all."""
-    parse: Callable[[Any], Any] | None = None
-    """Makes a value of what users write: of times, sizes and lists."""
-    shorthands: tuple[Option, ...] = ()
-    """Further options that set the field."""
+    subjects: tuple[str, ...] = ()  # that it is for, if not for all
+    parse: Callable[[Any], Any] | None = None  # makes a value of what users write: times, sizes, lists
+    shorthands: tuple[Option, ...] = ()  # further options that set the field
 
     @property
     def keyword(self) -> str:
