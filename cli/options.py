@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,6 +40,13 @@ overwrite_option = click.option(
 )
 
 
+def decorated(function: Function, options: Iterable[Callable[[Function], Function]]) -> Function:
+    """Return a function with options, in the order of its help."""
+    for option in reversed([*options]):
+        function = option(function)
+    return function
+
+
 def checkpoint_options(function: Function) -> Function:
     """Add the options of checkpoints, which are keywords of ``warpsplat.vectorize``."""
     options = [
@@ -62,9 +69,7 @@ def checkpoint_options(function: Function) -> Function:
             help="How often the state is kept.",
         ),
     ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+    return decorated(function, options)
 
 
 def verbosity_options(function: Function) -> Function:
@@ -79,9 +84,7 @@ def verbosity_options(function: Function) -> Function:
         click.option("-v", "--verbose", count=True, callback=follow, help="Say more, on stderr."),
         click.option("-q", "--quiet", is_flag=True, callback=follow, help="Say nothing but errors."),
     ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+    return decorated(function, options)
 
 
 class Numbers(click.ParamType):
@@ -115,35 +118,29 @@ class Numbers(click.ParamType):
 
 def flag(option: Option, *, several: bool = False) -> Callable[[Function], Function]:
     """Return the flag of an option in the table; ``several``: allow several numbers of shapes."""
-    default = option.default_text
-    shown = f"{option.help}  [default: {default}]" if default else option.help
-    if option.value is not None:
-        shown = f"{option.help}  [default]" if default else option.help
-        return click.option(
-            f"--{option.name}", option.field, flag_value=option.value, type=click.UNPROCESSED, help=shown
-        )
+    name, default, words = f"--{option.name}", option.default_text, option.help
+    if option.value is not None:  # one of several flags for a field
+        words += "  [default]" if default else ""
+        return click.option(name, option.field, flag_value=option.value, type=click.UNPROCESSED, help=words)
+    words += f"  [default: {default}]" if default else ""
     if option.type is bool:
-        return click.option(f"--{option.name}", is_flag=True, default=None, help=shown)
+        return click.option(name, is_flag=True, default=None, help=words)
     kind: click.ParamType | type = str if option.parse else option.type
     if option.choices:
         kind = click.Choice(option.choices)
     if option.name == "curves":
         kind = Numbers(several=several)
-    return click.option(f"--{option.name}", type=kind, metavar=option.metavar or None, help=shown)
+    return click.option(name, type=kind, metavar=option.metavar or None, help=words)
 
 
 def quality_options(function: Function, *, several: bool = False) -> Function:
-    """Add the options that decide the result; ``several``: see ``flag``."""
-    for option in reversed(OPTIONS):
-        function = flag(option, several=several)(function)
-    return function
+    """What decides the result; ``several``: see ``flag``."""
+    return decorated(function, (flag(option, several=several) for option in OPTIONS))
 
 
 def refine_options(function: Function) -> Function:
     """Those of them that ``refine`` has."""
-    for option in reversed(OPTIONS):
-        function = flag(option)(function) if option.refine else function
-    return function
+    return decorated(function, (flag(option) for option in OPTIONS if option.refine))
 
 
 several_quality_options = functools.partial(quality_options, several=True)
@@ -161,6 +158,4 @@ def run_options(function: Function) -> Function:
         threads_option,
         verbosity_options,
     ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+    return decorated(function, options)

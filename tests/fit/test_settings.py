@@ -65,28 +65,20 @@ def test_density_may_be_given_in_part() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        *(
-            ({"curves": bad}, "curves must be a whole number from 1 to 100000")
-            for bad in (0, 1.5, "many", True)
-        ),
-        ({"seed": -1}, "seed must be a whole number from 0 to"),
+        *(({"curves": bad}, "curves must be a whole number from 1 to ") for bad in (0, 1.5, "many", True)),
         ({"precision": 9}, "precision must be a whole number from 0 to 6, not 9"),
         ({"coarse": 1.5}, "coarse must be a number from 0 to 1, not 1.5"),
-        ({"texture": "no"}, "texture must be a number from 0 to 1, not 'no'"),
         ({"softness": float("nan")}, "softness must be a number from 0 to 100, not nan"),
         *(({"target_psnr": bad}, "target-psnr must be a positive") for bad in (0, float("inf"), True)),
-        ({"viewer": 1}, "viewer must be true or false, not 1"),
         ({"closed": "yes"}, "closed must be true or false"),
         ({"kind": "round"}, "kind must be a Kind, not 'round'"),
         *(({"basis": bad}, "basis must be one of cubic, spline, not") for bad in ("quartic", 7)),
-        ({"order": "size"}, "order must be one of age, area, not 'size'"),
         ({"quality": "best"}, "quality must be one of draft, balanced, high, not 'best'"),
         ({"background": "red"}, "background must be auto, none or a colour as #ffffff, not 'red'"),
         ({"title": "x" * 1001}, "title must be a text of at most 1000 characters"),
         ({"rates": 3}, "rates must be a mapping"),
         ({"rates": {"points": -1}}, "rates points must be a number from 0 to"),
         ({"rates": {"point": 1.0}}, "unknown setting 'point' in rates; did you mean 'points'?"),
-        ({"density": 3}, "density must be a mapping"),
         ({"density": {"stop": 2}}, "density stop must be a number from 0 to 1, not 2"),
         ({"density": {"intervall": 3}}, "unknown setting 'intervall' in density; did you mean 'interval'?"),
         ({"colour": 3}, "unknown setting 'colour'; did you mean 'colors'?"),
@@ -99,7 +91,6 @@ def test_density_may_be_given_in_part() -> None:
         ({"mixed": True, "renderer": "splat"}, "mixed and the renderer splat do not go together"),
         ({"subject": "drawing", "open": True}, "subject drawing and open do not go together"),
         ({"subject": "drawing", "paint": "auto"}, "subject drawing and paint auto do not go together"),
-        ({"subject": "pixel", "mixed": True}, "subject pixel and mixed do not go together"),
         ({"subject": "line", "max_bytes": 900}, "subject line and max-bytes do not go together"),
         ({"size": "9x9mm", "page": "a4"}, "size and page do not go together"),
     ],

@@ -43,7 +43,7 @@ Layer = Mapping[str, Value]
 
 
 def layer_of(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, Value]:
-    """The values of KEYS and of a matrix in a mapping of a batch file."""
+    """Return the values of KEYS and of a matrix in a mapping of a batch file."""
     layer: dict[str, Value] = {}
     for key, (line, node) in entries.items():
         if key == MATRIX:
@@ -68,7 +68,7 @@ def _single(file: BatchFile, key: str, line: int, node: yaml.Node) -> Value:
 
 
 def _nested(file: BatchFile, key: str, node: yaml.Node) -> dict[str, Any]:
-    """The mapping of a key of NESTED, each value checked by itself."""
+    """Return the mapping of a key of NESTED, each value checked by itself."""
     values = {}
     for name, (line, inner) in file.mapping(node, key, NESTED[key]).items():
         values[name] = file.value(inner)
@@ -88,10 +88,10 @@ def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[Value]]:
 
 
 def checked(key: str, value: Any, place: Place) -> None:
-    """Find out whether ``key`` can have a value, as far as that can be said of it alone.
+    """Check a value by itself.
 
     Raises:
-        UsageError: it cannot; the message names the place and the key.
+        UsageError: ``key`` cannot have it; the message names the place and the key.
     """
     name = f"{key}: {next(iter(value))}" if key in NESTED else key
     inner = next(iter(value.values())) if key in NESTED else value
@@ -116,8 +116,7 @@ def _check_kinds(layer: Layer) -> None:
 
 
 def assigned(text: str) -> tuple[str, Any]:
-    """The key and value of ``--set``: ``key=value``, or ``rates.points=0.5`` for a key within a mapping; the
-    value as YAML has it.
+    """Return the key and value of ``--set``: ``key=value`` with a value as in YAML, or ``rates.points=0.5``.
 
     Raises:
         UsageError: neither, or an unknown key.
@@ -136,7 +135,7 @@ def assigned(text: str) -> tuple[str, Any]:
 
 
 def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Value]:
-    """What the command line says.
+    """Return what the command line gives.
 
     Args:
         flags: values by key, those that are not None were given.
@@ -168,12 +167,11 @@ def _given(flag: str, key: str, value: Any) -> Value:
 
 
 def merged(layers: Sequence[Layer]) -> dict[str, Value]:
-    """Later layers over earlier ones, within mappings as well; a kind replaces the other kind."""
+    """Return later layers over earlier ones, within mappings as well; a kind replaces the other kind."""
     whole: dict[str, Value] = {}
     for layer in layers:
-        if any(kind in layer for kind in KINDS):
-            for kind in KINDS:
-                whole.pop(kind, None)
+        if layer.keys() & KINDS.keys():
+            whole = {key: item for key, item in whole.items() if key not in KINDS}
         for key, item in layer.items():
             value = item.value
             if key in NESTED and key in whole:
@@ -183,9 +181,7 @@ def merged(layers: Sequence[Layer]) -> dict[str, Value]:
 
 
 def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, Value]]:
-    """The settings of a job: one mapping for each combination of the last layer's matrix that has one. A key
-    that a later layer gives is no axis any more.
-    """
+    """Yield a job's settings for each combination of the last matrix; a key of a later layer is no axis."""
     whole = merged(layers)
     if MATRIX not in whole:
         yield whole
@@ -193,7 +189,7 @@ def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, Value]]:
     axes = whole.pop(MATRIX).value
     at = max(i for i, layer in enumerate(layers) if MATRIX in layer)
     later = merged(layers[at + 1 :])
-    fixed = {*later} | (set(KINDS) if later.keys() & KINDS.keys() else set())
+    fixed = later.keys() | (KINDS.keys() if later.keys() & KINDS.keys() else ())
     axes = {key: values for key, values in axes.items() if key not in fixed}
     for values in itertools.product(*axes.values()):
         yield merged([whole, dict(zip(axes, values, strict=True))])

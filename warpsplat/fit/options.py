@@ -23,36 +23,23 @@ from warpsplat.errors import UsageError, shown
 class Option:
     """A setting as it is given. What a declaration leaves out follows from the field's type and default."""
 
-    name: str = ""
-    """The flag without its dashes, and the key of batch files."""
-    field: str = ""
-    """The field that it sets."""
-    value: Any = None
-    """What the flag stands for, if it is a switch for one value of the field."""
+    name: str = ""  # the flag without its dashes, and the key of batch files
+    field: str = ""  # that it sets
+    value: Any = None  # that the flag stands for, if it is a switch for one value of the field
     type: Any = str
     default: Any = None
-    shown_default: str | None = None
-    """The default as help shows it, if not as it is; empty where none is shown."""
-    help: str = ""
-    """A line; empty if it cannot be given by this name."""
-    research: bool = False
-    """Whether it is for researchers: a key of batch files and a keyword of ``make_settings``, but no flag."""
-    refine: bool = False
-    """Whether ``refine`` takes it as well."""
-    limits: tuple[float, float] | None = None
-    """Least and largest value of a number, or length of a text. A number without is positive."""
+    shown_default: str | None = None  # the default as help shows it, if not as it is
+    help: str = ""  # empty if it cannot be given by this name
+    research: bool = False  # a key of batch files and a keyword of make_settings, but no flag
+    refine: bool = False  # whether refine takes it as well
+    limits: tuple[float, float] | None = None  # of a number, else positive; of the length of a text
     choices: tuple[str, ...] = ()
-    pattern: str = ".*"
-    """Regular expression for a text, which ``wanted`` describes."""
-    wanted: str = ""
-    """Values that are accepted, in words."""
+    pattern: str = ".*"  # regular expression for a text, which "wanted" describes
+    wanted: str = ""  # values that are accepted, in words
     metavar: str = ""
-    subjects: tuple[str, ...] = ()
-    """Subjects that it is for, if not for all."""
-    parse: Callable[[Any], Any] | None = None
-    """Makes a value of what users write: of times, sizes and lists."""
-    shorthands: tuple[Option, ...] = ()
-    """Further options that set the field."""
+    subjects: tuple[str, ...] = ()  # that it is for, if not for all
+    parse: Callable[[Any], Any] | None = None  # makes a value of what users write: times, sizes, lists
+    shorthands: tuple[Option, ...] = ()  # further options that set the field
 
     @property
     def keyword(self) -> str:
@@ -98,8 +85,9 @@ class Option:
             UsageError: it is not accepted.
         """
         if isinstance(value, dict) and self.type is dict:
+            number = dataclasses.replace(self, name="", type=float)
             for key, inner in value.items():
-                dataclasses.replace(self, name=f"{self.name} {key}", type=float).check(inner)
+                number.check(inner, f"{prefix}{self.name} {key}")
         elif not (self._accepted(value) or (value is None and self.default is None)):
             raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}")
 
@@ -127,12 +115,11 @@ def option(default: Any, help: str = "", limits: tuple[float, float] | None = No
         limits: see there.
         declared: further fields of ``Option``.
     """
-    makes = callable(default)
-    made = Option(default=None if makes else default, help=help, limits=limits, **declared)
-    metadata = {"option": made}
-    if makes:
-        return dataclasses.field(default_factory=default, metadata=metadata)
-    return dataclasses.field(default=default, metadata=metadata)
+    if callable(default):
+        made = Option(default=default(), shown_default="", help=help, limits=limits, **declared)
+        return dataclasses.field(default_factory=default, metadata={"option": made})
+    made = Option(default=default, help=help, limits=limits, **declared)
+    return dataclasses.field(default=default, metadata={"option": made})
 
 
 research = functools.partial(option, research=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import re
@@ -56,23 +57,7 @@ def default_rates() -> dict[str, float]:
     return {attribute.name: attribute.rate for attribute in ATTRIBUTES}
 
 
-def parse_rates(value: object) -> object:
-    """Return some of the rates, with underscores in their names; see ``_known``."""
-    return _known("rates", value, default_rates())
-
-
-def parse_density(value: object) -> object:
-    """Return the default density with the values of a mapping; see ``_known``."""
-    values = _known("density", value, [each.field for each in options_of(Density)])
-    return Density(**values) if isinstance(values, dict) else values
-
-
-def parse_basis(value: object) -> object:
-    """Return the basis of a name; anything else is left to be checked."""
-    return Basis.__members__.get(value.upper(), value) if isinstance(value, str) else value
-
-
-def _known(name: str, value: object, known: Iterable[str]) -> object:
+def known_keys(name: str, known: Iterable[str], value: object) -> object:
     """Return a mapping with underscores in its keys; anything else as it is, for ``Option.check`` to refuse.
 
     Raises:
@@ -85,6 +70,20 @@ def _known(name: str, value: object, known: Iterable[str]) -> object:
         if key not in known:
             raise UsageError(f"unknown setting {shown(key)} in {name}{nearest(key, known)}")
     return values
+
+
+parse_rates = functools.partial(known_keys, "rates", default_rates())
+
+
+def parse_density(value: object) -> object:
+    """Return the default density with the values of a mapping; see ``known_keys``."""
+    values = known_keys("density", [each.field for each in options_of(Density)], value)
+    return Density(**values) if isinstance(values, dict) else values
+
+
+def parse_basis(value: object) -> object:
+    """Return the basis of a name; anything else is left to be checked."""
+    return Basis.__members__.get(value.upper(), value) if isinstance(value, str) else value
 
 
 def check_fields(settings: Any, prefix: str = "") -> None:
@@ -101,37 +100,19 @@ def check_fields(settings: Any, prefix: str = "") -> None:
 class Density:
     """Pruning and densification (paper section 3.4), and growth from few shapes to all."""
 
-    start: float = research(
-        1 / 3, "Fraction of the shapes at the start: they settle as large ones.", (1e-3, 1.0)
-    )
-    grown: float = research(
-        0.5,
-        "Fraction of the run in which the number of shapes grows, geometrically, to all.",
-        FRACTION,
-    )
+    start: float = research(1 / 3, "Fraction of the shapes to start with, as large ones.", (1e-3, 1.0))
+    grown: float = research(0.5, "Fraction of the run in which the number of shapes grows.", FRACTION)
     surplus: float = research(1.5, "Most shapes at any time, over those that are left in the end.", (1, 10))
-    thin: float = research(
-        0.65, "Fraction of the run after which the surplus is removed, until `stop`.", FRACTION
-    )
-    mean_points: float = research(
-        10.4, "Mean number of points of splines in the end: those of least use are removed.", (3, 100)
-    )
+    thin: float = research(0.65, "Fraction of the run at which removal of the surplus begins.", FRACTION)
+    mean_points: float = research(10.4, "Mean number of points of splines in the end.", (3, 100))
     interval: int = research(25, "Steps between two densification steps; 0: none.", (0, 1_000_000))
     stop: float = research(0.85, "Fraction of the run after which the set of shapes is fixed.", FRACTION)
-    opacity_start: float = research(
-        0.2, "Prune below this opacity at the start; it falls linearly to `opacity-end` at `stop`.", FRACTION
-    )
-    opacity_end: float = research(0.05, "Prune below this opacity at `stop`.", FRACTION)
-    area: float = research(6.0, "Prune below this area [px² of the canvas].", (0, 1e9))
-    duplicate_color: float = research(
-        0.03, "Two shapes are alike below this distance of colours, and above `duplicate-overlap`.", (0, 2)
-    )
-    duplicate_overlap: float = research(
-        0.9, "Overlap (intersection over union) of the boxes of two shapes that are alike.", (0, 2)
-    )
-    replace: float = research(
-        0.1, "Replace at least this fraction in each densification step: the shapes of least use.", FRACTION
-    )
+    opacity_start: float = research(0.2, "Opacity below which shapes are pruned at the start.", FRACTION)
+    opacity_end: float = research(0.05, "The same at `stop`; in between it falls linearly.", FRACTION)
+    area: float = research(6.0, "Area below which shapes are pruned [px² of the canvas].", (0, 1e9))
+    duplicate_color: float = research(0.03, "Distance of colours below which two shapes are alike.", (0, 2))
+    duplicate_overlap: float = research(0.9, "Overlap (IoU) of boxes above which they are.", (0, 2))
+    replace: float = research(0.1, "Least fraction replaced in each densification step.", FRACTION)
 
     def __post_init__(self) -> None:
         """Check ranges.
@@ -263,54 +244,30 @@ class Settings:
     spline_points: int = research(12, "Control points of a new spline.", (3, 64))
     chain_cubics: int = research(2, "Cubics in each of the two chains of a fill.", (1, 8))
     coarse: float = research(0.82, "Fraction of the iterations on a reduced image.", FRACTION)
-    coarse_pixels: int = research(
-        100_000, "Most pixels of that image; a smaller one is not reduced.", (1, 10**9)
-    )
+    coarse_pixels: int = research(100_000, "Most pixels of that image.", (1, 10**9))
     fine_pixels: int = research(1_600_000, "Most pixels of the image in the last iterations.", (1, 10**9))
-    opacity: float = research(
-        0.98, "Opacity of a new shape: it hides what it replaces, and may still become translucent.", FRACTION
-    )
+    opacity: float = research(0.98, "Opacity of a new shape, which hides what it replaces.", FRACTION)
     softness: float = research(0.6, "Least standard deviation of soft Gaussians [canvas px].", (0, 100))
-    gaussian_density: float = research(
-        0.5, "Soft Gaussians along and across a shape, over their usual number.", (0.05, 20)
-    )
+    gaussian_density: float = research(0.5, "Soft Gaussians of a shape, over their usual number.", (0.05, 20))
     order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
-    ssim: float = research(
-        0.0, "Weight of 1 - SSIM of small windows: raises SSIM, lowers PSNR and SSIMULACRA2.", WEIGHT
-    )
+    ssim: float = research(0.0, "Weight of 1 - SSIM: lowers PSNR and SSIMULACRA2.", WEIGHT)
     texture: float = research(
-        0.1,
-        "Power of the local variance by which errors count less, since textured areas mask them. 0.3 raises"
-        " SSIMULACRA2 by some points and lowers PSNR (docs/experiments.md).",
-        FRACTION,
+        0.1, "Power of the local variance by which errors count less: textured areas mask them.", FRACTION
     )
-    xing: float = research(
-        0.0, "Weight of the Xing loss (paper: 0.01), which forbids shapes that do no harm here.", WEIGHT
-    )
+    xing: float = research(0.0, "Weight of the Xing loss (paper: 0.01), which is not needed here.", WEIGHT)
     bending: float = research(
-        5e-4,
-        "Weight of the bending of cubics [squared error of a pixel, summed over channels, per pixel]: burrs"
-        " and loops that do not lower the error straighten.",
-        WEIGHT,
+        5e-4, "Weight of the bending of cubics, which straightens burrs and loops.", WEIGHT
     )
     fold_start: float = research(
-        0.2,
-        "Weight of the fold loss (the area where a fill's strip folds over itself) at the start. It grows"
-        " geometrically: at first folds are a way round obstacles, in the file they are a fault.",
-        (1e-6, 1e6),
+        0.2, "Weight of the area where a fill's strip folds over itself; it grows geometrically.", (1e-6, 1e6)
     )
-    fold_end: float = research(3.0, "Weight of the fold loss at the end.", (1e-6, 1e6))
+    fold_end: float = research(3.0, "The same at the end: folds are a fault in the file.", (1e-6, 1e6))
     through_scales: bool = research(True, "Whether gradients flow through the Gaussians' scales and angles.")
-    viewer: bool = research(True, "Whether the last steps see what a viewer shows, rounding included.")
-    tidy: bool = research(True, "Whether drawings lose nodes worth less than their bytes, which takes time.")
-    level_weight: float = research(
-        0.3, "Weight of the squared error of each earlier level's picture beside that of the whole.", WEIGHT
-    )
+    viewer: bool = research(True, "Whether the last steps see what a viewer shows, rounded.")
+    tidy: bool = research(True, "Whether drawings lose nodes worth less than their bytes.")
+    level_weight: float = research(0.3, "Weight of the error of each earlier level's picture.", WEIGHT)
     rates: dict[str, float] = research(
-        default_rates,
-        "Adam's learning rates at the start, by attribute; they decay along a cosine.",
-        WEIGHT,
-        parse=parse_rates,
+        default_rates, "Adam's rates at the start, by attribute.", WEIGHT, parse=parse_rates
     )
     final_rate: float = research(0.2, "Fraction of each rate that is left at the end.", FRACTION)
     density: Density = research(

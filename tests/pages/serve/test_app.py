@@ -109,12 +109,9 @@ def test_nothing_of_a_run_is_left_but_its_file(visitor: Visitor, monkeypatch: py
     ("settings", "said"),
     [
         ({"curves": "many"}, "curves must be a whole number from 1 to 100000, not 'many'"),
-        ({"curves": True}, "curves must be a whole number from 1 to 100000, not True"),
-        ({"curves": 0}, "curves must be a whole number from 1 to 100000, not 0"),
         ({"subject": "drawing", "open": True}, "subject drawing and open do not go together"),
         ({"closed": True, "open": True}, "closed and open do not go together"),
         ({"palette": "/etc/passwd"}, "unknown setting 'palette'; there are "),
-        ({"quality": "best"}, "quality must be one of draft, balanced, high, not 'best'"),
     ],
 )
 def test_settings_that_cannot_be_used(visitor: Visitor, settings: dict[str, object], said: str) -> None:
