@@ -24,15 +24,15 @@ TEXT_KEYS = ("output", "device", "importance")
 KEYS = (*BY_NAME, *TEXT_KEYS, *RESEARCH_KEYS, *NESTED)
 
 MATRIX = "matrix"
-"""Key of lists of values: a job is done with each of them, of several lists with each combination."""
+"""Key of lists of values: the job is done with each combination of them."""
 
 MOST_COMBINATIONS = 1000
-"""Of the values of a matrix."""
+"""Maximum number of combinations of a matrix."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """What a key was given."""
+    """Value of a key."""
 
     value: Any
     place: Place
@@ -44,7 +44,7 @@ Layer = Mapping[str, Value]
 
 
 def layer_of(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, Value]:
-    """The values of KEYS and of a matrix in a mapping of a batch file."""
+    """Return the values of KEYS and of a matrix in a mapping of a batch file."""
     layer: dict[str, Value] = {}
     for key, (line, node) in entries.items():
         if key == MATRIX:
@@ -69,7 +69,7 @@ def _single(file: BatchFile, key: str, line: int, node: yaml.Node) -> Value:
 
 
 def _nested(file: BatchFile, key: str, node: yaml.Node) -> dict[str, Any]:
-    """The mapping of a key of NESTED, each value checked by itself."""
+    """Return the mapping of a key of NESTED, each value checked on its own."""
     values = {}
     for name, (line, inner) in file.mapping(node, key, NESTED[key]).items():
         values[name] = file.value(inner)
@@ -89,7 +89,7 @@ def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[Value]]:
 
 
 def checked(key: str, value: Any, place: Place) -> None:
-    """Find out whether ``key`` can have a value, as far as that can be said of it alone.
+    """Check the value of one key on its own.
 
     Raises:
         UsageError: it cannot; the message names the place and the key.
@@ -120,8 +120,7 @@ def _check_kinds(layer: Layer) -> None:
 
 
 def assigned(text: str) -> tuple[str, Any]:
-    """The key and value of ``--set``: ``key=value``, or ``rates.points=0.5`` for a key within a mapping; the
-    value as YAML has it.
+    """Parse ``--set``: ``key=value``, or ``rates.points=0.5`` for a key within a mapping; the value is YAML.
 
     Raises:
         UsageError: neither, or an unknown key.
@@ -140,11 +139,11 @@ def assigned(text: str) -> tuple[str, Any]:
 
 
 def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Value]:
-    """What the command line says.
+    """Return the layer of the command line.
 
     Args:
-        flags: values by key, those that are not None were given.
-        sets: of ``--set``.
+        flags: values by key; None: not given.
+        sets: values of ``--set``.
 
     Raises:
         UsageError: a value is out of range, or one key has two.
@@ -172,7 +171,7 @@ def _given(flag: str, key: str, value: Any) -> Value:
 
 
 def merged(layers: Sequence[Layer]) -> dict[str, Value]:
-    """Later layers over earlier ones, within mappings as well; a kind replaces the other kind."""
+    """Merge layers, later ones winning, also within mappings; a kind replaces the other kind."""
     whole: dict[str, Value] = {}
     for layer in layers:
         if any(kind in layer for kind in KINDS):
@@ -187,9 +186,7 @@ def merged(layers: Sequence[Layer]) -> dict[str, Value]:
 
 
 def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, Value]]:
-    """The settings of a job: one mapping for each combination of the last layer's matrix that has one. A key
-    that a later layer gives is no axis any more.
-    """
+    """Yield the settings of a job for each combination of the last matrix; keys of later layers are fixed."""
     whole = merged(layers)
     if MATRIX not in whole:
         yield whole
