@@ -11,6 +11,7 @@ import click
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks, hook_options
 from warpsplat.cli.options import FILE, overwrite_option
+from warpsplat.cli.request import Request
 from warpsplat.errors import UsageError
 
 
@@ -20,7 +21,7 @@ from warpsplat.errors import UsageError
 @hook_options("eval")
 @overwrite_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(image: Path, svg: Path, overwrite: bool, as_json: bool, **given: Any) -> None:
+def command(image: Path, svg: Path, **given: Any) -> None:
     """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
 
     The SVG is rendered at the image's size, on white; where the image has
@@ -34,14 +35,14 @@ def command(image: Path, svg: Path, overwrite: bool, as_json: bool, **given: Any
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")
-    hooks = Hooks("eval", given)
-    hooks.check([image, svg], [], overwrite=overwrite)
+    hooks, request = Hooks("eval", given), Request.taken(image, given)
+    hooks.check([image, svg], [], overwrite=request.overwrite)
     # The standard input can be read once.
     shown = read_input(image) if image == STANDARD else image
     text = read_input(svg, "an SVG") if svg == STANDARD else svg
     values = warpsplat.score(text, shown).as_dict()
-    hooks.finish(Done(image, shown, [(svg, text)]))
-    if as_json:
+    hooks.finish(Done(request, shown, [(svg, text)]))
+    if request.as_json:
         echo(json.dumps({"image": str(image), "svg": str(svg), **values, **hooks.as_dict()}))
         return
     for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):

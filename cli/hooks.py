@@ -15,6 +15,7 @@ from warpsplat.errors import UsageError
 from warpsplat.extensions import extensions, load
 
 if TYPE_CHECKING:
+    from warpsplat.cli.request import Request
     from warpsplat.fit.progress import Progress
     from warpsplat.run.result import Result
 
@@ -35,8 +36,7 @@ TAKES: dict[Mode, str] = {
 class Done:
     """What a command did."""
 
-    image: Path
-    """As it was given."""
+    request: Request
     data: bytes | Path
     """The image itself."""
     made: Sequence[tuple[Path, Result | bytes | Path]]
@@ -45,9 +45,6 @@ class Done:
     """A command line that does the same again."""
     several: bool = False
     """Whether several numbers of shapes were asked for."""
-    device: str = "auto"
-    threads: int | None = None
-    quiet: bool = False
 
 
 class RunHook:

@@ -11,6 +11,7 @@ import click
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import FILE, checkpoint_options, overwrite_option, refine_options, run_options
+from warpsplat.cli.request import Request
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
 from warpsplat.files.output import check_output
@@ -46,12 +47,6 @@ def command(
     svg: Path,
     image: Path,
     output: Path,
-    overwrite: bool,
-    device: str,
-    threads: int | None,
-    verbose: int,
-    quiet: bool,
-    as_json: bool,
     checkpoint: Path | None,
     resume: bool,
     checkpoint_every: str,
@@ -65,17 +60,17 @@ def command(
     IMAGE may be - for the standard input. The figures go to stderr where the
     SVG goes to stdout.
     """
-    hooks = Hooks("refine", given)
+    hooks, request = Hooks("refine", given), Request.taken(image, given)
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
     from warpsplat.run.formats import ENDINGS, check_format
 
-    check_output(output, svg, image, endings=ENDINGS, overwrite=overwrite)
+    check_output(output, svg, image, endings=ENDINGS, overwrite=request.overwrite)
     check_format(output)
     if checkpoint:
         check_output(checkpoint, svg, image)
-    hooks.check([svg, image], [output, *filter(None, [checkpoint])], overwrite=overwrite)
+    hooks.check([svg, image], [output, *filter(None, [checkpoint])], overwrite=request.overwrite)
     from warpsplat.cli.run import leave, progress_bar, say_renewed
     from warpsplat.cli.signals import Interrupt
     from warpsplat.cli.summary import summary
@@ -85,38 +80,41 @@ def command(
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
     shown = read_input(image) if hooks.need_image() else image
     interrupt = Interrupt()
-    with interrupt.watching(), progress_bar(svg, settings, quiet=quiet, verbose=verbose) as tell:
+    with (
+        interrupt.watching(),
+        progress_bar(svg, settings, quiet=request.quiet, verbose=request.verbose) as tell,
+    ):
         result = refine(
             data,
             shown,
             settings=settings,
             keep=keep,
             output=output,
-            device=device,
-            threads=threads,
+            device=request.device,
+            threads=request.threads,
             callback=hooks.watch(tell),
             stop=interrupt,
             name=input_name(svg),
             checkpoint=checkpoint,
             resume=resume,
             checkpoint_every=checkpoint_every,
-            overwrite=overwrite,
+            overwrite=request.overwrite,
         )
         hooks.show(result, None if image == STANDARD else image)
     before = result.before or 0.0
-    if result.kept and not quiet:
+    if result.kept and not request.quiet:
         echo(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)
-    if not quiet:
+    if not request.quiet:
         say_renewed(input_name(svg), result)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
-    if as_json:
+    if request.as_json:
         echo(json.dumps({**values, **hooks.as_dict()}), err=output == STANDARD)
-    elif not quiet:
+    elif not request.quiet:
         echo(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
     from warpsplat.run.command_line import refine_command
 
     line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
-    hooks.finish(Done(image, shown, [(output, result)], line, device=device, threads=threads, quiet=quiet))
+    hooks.finish(Done(request, shown, [(output, result)], line))
     leave(result)

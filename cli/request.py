@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,21 @@ class Request:
     """One image, and the options of its command that are not settings."""
 
     image: Path
-    output: Path | None
-    importance: Path | None
+    output: Path | None = None
+    importance: Path | None = None
     """File of a mask."""
-    overwrite: bool
-    device: str
-    threads: int | None
-    verbose: int
-    quiet: bool
-    as_json: bool
+    overwrite: bool = False
+    device: str = "auto"
+    threads: int | None = None
+    verbose: int = 0
+    quiet: bool = False
+    as_json: bool = False
+
+    @classmethod
+    def taken(cls, image: Path, given: dict[str, Any]) -> Request:
+        """Take the values of the options out of those of a command."""
+        names = [field.name for field in fields(cls) if field.name in given]
+        return cls(image, **{name: given.pop(name) for name in names})
 
     @property
     def inputs(self) -> tuple[Path, ...]:

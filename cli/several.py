@@ -60,7 +60,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     elif not request.quiet:
         echo("\n".join([table(made), *_missing(numbers, begun)] if made else _missing(numbers, begun)))
     line = several_command(settings, numbers, str(image), request.output, *request.flags)
-    hooks.finish(Done(image, data, made, line, several=True))
+    hooks.finish(Done(request, data, made, line, several=True))
 
 
 def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Settings) -> list[Path]:

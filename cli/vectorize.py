@@ -48,15 +48,7 @@ from warpsplat.run.options import settings_from
 @suggest_option
 def command(
     images: tuple[Path, ...],
-    output: Path | None,
-    overwrite: bool,
-    importance: Path | None,
-    device: str,
-    threads: int | None,
-    verbose: int,
-    quiet: bool,
     as_uri: bool,
-    as_json: bool,
     suggest: bool,
     checkpoint: Path | None,
     resume: bool,
@@ -72,7 +64,7 @@ def command(
     """
     hooks = Hooks("vectorize", given)
     numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
-    request = Request(images[0], output, importance, overwrite, device, threads, verbose, quiet, as_json)
+    request = Request.taken(images[0], given)
     if suggest:
         hooks.check_mode("suggestion")
         if len(images) > 1 or as_uri or checkpoint or resume:
@@ -155,15 +147,5 @@ def single(
     from warpsplat.run.command_line import vectorize_command
 
     line = vectorize_command(settings, str(image), str(output), *request.flags)
-    hooks.finish(
-        Done(
-            image,
-            data,
-            [(output, result)],
-            line,
-            device=request.device,
-            threads=request.threads,
-            quiet=request.quiet,
-        )
-    )
+    hooks.finish(Done(request, data, [(output, result)], line))
     leave(result)

@@ -13,6 +13,7 @@ from tests.cli.helpers import one_line, run
 from tests.needs import WORDS
 from warpsplat import extensions
 from warpsplat.cli.hooks import Done, Hooks, RunHook, hook_options
+from warpsplat.cli.request import Request
 from warpsplat.errors import UsageError
 from warpsplat.extensions import Extension, load, load_renderer, renderer_names
 from warpsplat.fit.renderers import FitRenderer
@@ -103,5 +104,5 @@ def test_a_hook(found: dict[str, Extension]) -> None:
     hooks.check_mode("one file")
     with pytest.raises(UsageError, match="--note takes one image"):
         hooks.check_mode("several images")
-    hooks.finish(Done(Path("a.png"), b"", [], "a line"))
+    hooks.finish(Done(Request(Path("a.png")), b"", [], "a line"))
     assert Noting.noted == [("a", "a line")]

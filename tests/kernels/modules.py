@@ -10,7 +10,6 @@ from types import ModuleType
 import warp as wp
 
 import warpsplat
-from warpsplat import kernels
 
 
 def kernels_of(module: ModuleType) -> list[wp.Kernel]:
@@ -22,11 +21,21 @@ def kernels_of(module: ModuleType) -> list[wp.Kernel]:
     ]
 
 
+def kernel_folders() -> list[Path]:
+    """Those of the core and of extensions."""
+    package = Path(warpsplat.__file__).parent
+    return [package / "kernels", *sorted(package.glob("*/kernels"))]
+
+
 def all_kernels() -> list[wp.Kernel]:
     """Return all kernels of the package and of its extensions."""
-    names = [m.name for m in pkgutil.walk_packages(kernels.__path__, "warpsplat.kernels.")]
-    for folder in sorted(Path(warpsplat.__file__).parent.glob("*/kernels")):
-        prefix = f"warpsplat.{folder.parent.name}.kernels."
-        names += [m.name for m in pkgutil.walk_packages([str(folder)], prefix)]
+    package = Path(warpsplat.__file__).parent
+    names = [
+        module.name
+        for folder in kernel_folders()
+        for module in pkgutil.walk_packages(
+            [str(folder)], ".".join(("warpsplat", *folder.relative_to(package).parts, ""))
+        )
+    ]
     modules = map(importlib.import_module, sorted(names))
     return [kernel for module in modules for kernel in kernels_of(module)]

@@ -6,13 +6,17 @@ import subprocess
 import sys
 
 from tests import ROOT
+from warpsplat.extensions import extensions
 
 MODULES = (
     "warpsplat",
     *(f"warpsplat.run.{name}" for name in ("vectorize", "several", "suggest", "refine", "render")),
     "warpsplat.cli.main",
-    "warpsplat.tools.bench",
-    "warpsplat.pages.report",
+    *(
+        f"warpsplat.{name}"
+        for name in ("batch.command", "motion.recorder", "pages.report", "paper.renderers", "tools.bench")
+        if name.partition(".")[0] in extensions()
+    ),
 )
 
 

@@ -7,7 +7,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,23 +133,11 @@ class Shard(click.ParamType):
 )
 def command(
     inputs: tuple[str, ...],
-    output: str | None,
     sets: tuple[str, ...],
-    device: str | None,
     importance: Path | None,
-    overwrite: bool,
-    dry_run: bool,
-    retry_failed: bool,
-    workers: int | None,
     executor: str | None,
     gpus: float | None,
-    shard: tuple[int, int],
-    manifest: Path | None,
-    threads: int | None,
     verbose: int,
-    quiet: bool,
-    as_json: bool,
-    report: Path | None = None,
     **given: Any,
 ) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
@@ -169,16 +157,9 @@ def command(
 
     Its paths are relative to it. What the command line says is stronger.
     """  # noqa: D301
-    flags = {
-        **flags_of(given),
-        "output": output,
-        "device": device,
-        "importance": None if importance is None else str(importance),
-    }
-    cluster = cluster_of(executor, gpus)
-    options = BatchOptions(
-        overwrite, retry_failed, dry_run, workers, threads, shard, manifest, report, cluster, quiet, as_json
-    )
+    names = [field.name for field in fields(BatchOptions) if field.name in given]
+    options = BatchOptions(cluster=cluster_of(executor, gpus), **{name: given.pop(name) for name in names})
+    flags = flags_of({**given, "importance": None if importance is None else str(importance)})
     perform(inputs, flags, sets, options)
 
 

@@ -16,13 +16,13 @@ MAX_FILE = 1 << 20
 """Largest batch file [bytes]: reading a mebibyte of YAML takes some seconds."""
 
 MAX_DEPTH = 16
-"""Deepest nesting of a batch file; four is what one needs."""
+"""Maximum nesting of a batch file; four are needed."""
 
 MAX_SCALAR = 4096
-"""Longest single value [characters]: that of the longest path."""
+"""Longest single value [characters], as of the longest path."""
 
 MAX_ALIASED = 100_000
-"""Most values that the aliases of a file stand for: those of aliases of aliases multiply."""
+"""Maximum number of values after aliases are expanded: nested aliases multiply."""
 
 
 class BatchFile:
@@ -54,17 +54,17 @@ class BatchFile:
             raise self.error(self.loader.line + 1 if self.loader else 1, f"not valid YAML: {cause}") from None
 
     def error(self, line: int, message: str) -> UsageError:
-        """An error that names the file and the line."""
+        """Return an error that names the file and the line."""
         return UsageError(f"{self.path}:{line}: {message}")
 
     def place(self, line: int) -> Callable[[str], UsageError]:
-        """``error`` of a line."""
+        """Return ``error`` with a fixed line."""
         return partial(self.error, line)
 
     def mapping(
         self, node: yaml.Node | None, where: str, allowed: tuple[str, ...]
     ) -> dict[str, tuple[int, yaml.Node]]:
-        """Key -> (line, value node); unknown and repeated keys are errors."""
+        """Return key -> (line, value node); unknown and repeated keys are errors."""
         if not isinstance(node, yaml.MappingNode):
             line = node.start_mark.line + 1 if node else 1
             raise self.error(line, f"{where} must be a mapping with keys out of: {', '.join(allowed)}")
@@ -82,7 +82,7 @@ class BatchFile:
         return result
 
     def value(self, node: yaml.Node) -> Any:
-        """What a node stands for.
+        """Return the value of a node.
 
         Raises:
             UsageError: nothing plain.
@@ -95,7 +95,7 @@ class BatchFile:
             raise self.error(line, f"not a plain value: {cause}") from error
 
     def text(self, line: int, key: str, value: Any) -> str:
-        """``value`` as a path or name.
+        """Return ``value`` as a path or name.
 
         Raises:
             UsageError: it is no text, or holds what no name can.
@@ -108,15 +108,15 @@ class BatchFile:
 
 
 def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
-    """Refuse what is too deep, too long or too much for a batch file before it is built.
+    """Check depth, lengths and number of values before anything is built.
 
     Raises:
         UsageError: by ``error``, of a line and a message.
     """
     sizes: dict[str, int] = {}
-    """Values that each anchor stands for, itself among them."""
+    """Number of values of each anchor, including itself."""
     around: list[tuple[str, int]] = []
-    """Anchors of the collections that are open, and how many values there were before each."""
+    """Anchors of open collections, and the number of values before each."""
     values = aliased = 0
     while loader.check_event():
         event = loader.get_event()
@@ -150,7 +150,7 @@ CHARACTERS = 100
 
 
 def plain(text: str) -> Any:
-    """A value as YAML has it, within the bounds of batch files.
+    """Parse YAML within the bounds of batch files.
 
     Raises:
         UsageError: beyond them.

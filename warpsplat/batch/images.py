@@ -1,4 +1,4 @@
-"""Which images a name means: a file, those in a folder, or those that match a pattern."""
+"""Find the images that a name means: a file, a folder's, or those that match a pattern."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ ENDINGS = (
     *(".png", ".jpg", ".jpeg", ".jfif", ".webp", ".avif", ".gif", ".bmp", ".tif", ".tiff"),
     *(".ppm", ".pgm", ".pbm", ".pnm", ".tga", ".jp2", ".ico"),
 )
-"""Of names that are taken for images in a folder that is given as a whole."""
+"""File name endings of images in a folder."""
 
 
 def find_images(name: str, base: Path) -> list[Found]:
-    """What ``name`` means, relative to ``base``, sorted. A file that is named and missing is found all the
-    same: that is the failure of one image.
+    """Return the images that ``name`` means, relative to ``base``, sorted. A named file that is missing is
+    included: it fails on its own.
 
     Raises:
         UsageError: nothing is found, or ``name`` is no usable pattern.
@@ -60,7 +60,7 @@ def _found(name: str, base: Path) -> Iterator[Found]:
 
 
 def _is_image(path: Path) -> bool:
-    """Whether a file may be meant: not one that is hidden, nor a result, of a batch where it is a PNG."""
+    """Return whether a file is an image: not hidden, and no result of a batch."""
     if not path.is_file() or path.name.startswith("."):
         return False
     ending = path.suffix.lower()
@@ -68,14 +68,14 @@ def _is_image(path: Path) -> bool:
 
 
 RESULTS = (".svg", ".svgz", ".pdf")
-"""Endings of names of results that are no images."""
+"""File name endings of results that are not images."""
 
 
 def _is_result(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             return is_result(file.read(HEAD))
-    except OSError:  # for the run to say
+    except OSError:  # the run reports it
         return False
 
 

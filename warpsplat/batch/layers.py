@@ -23,15 +23,15 @@ TEXT_KEYS = ("output", "device", "importance")
 KEYS = (*BY_NAME, *TEXT_KEYS, *RESEARCH_KEYS, *NESTED)
 
 MATRIX = "matrix"
-"""Key of lists of values: a job is done with each of them, of several lists with each combination."""
+"""Key of lists of values: the job is done with each combination of them."""
 
 MOST_COMBINATIONS = 1000
-"""Of the values of a matrix."""
+"""Maximum number of combinations of a matrix."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """What a key was given."""
+    """Value of a key."""
 
     value: Any
     place: Place
@@ -68,7 +68,7 @@ def _single(file: BatchFile, key: str, line: int, node: yaml.Node) -> Value:
 
 
 def _nested(file: BatchFile, key: str, node: yaml.Node) -> dict[str, Any]:
-    """Return the mapping of a key of NESTED, each value checked by itself."""
+    """Return the mapping of a key of NESTED, each value checked on its own."""
     values = {}
     for name, (line, inner) in file.mapping(node, key, NESTED[key]).items():
         values[name] = file.value(inner)
@@ -88,7 +88,7 @@ def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[Value]]:
 
 
 def checked(key: str, value: Any, place: Place) -> None:
-    """Check a value by itself.
+    """Check the value of one key on its own.
 
     Raises:
         UsageError: ``key`` cannot have it; the message names the place and the key.
@@ -116,7 +116,7 @@ def _check_kinds(layer: Layer) -> None:
 
 
 def assigned(text: str) -> tuple[str, Any]:
-    """Return the key and value of ``--set``: ``key=value`` with a value as in YAML, or ``rates.points=0.5``.
+    """Parse ``--set``: ``key=value``, or ``rates.points=0.5`` for a key within a mapping; the value is YAML.
 
     Raises:
         UsageError: neither, or an unknown key.
@@ -135,11 +135,11 @@ def assigned(text: str) -> tuple[str, Any]:
 
 
 def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Value]:
-    """Return what the command line gives.
+    """Return the layer of the command line.
 
     Args:
-        flags: values by key, those that are not None were given.
-        sets: of ``--set``.
+        flags: values by key; None: not given.
+        sets: values of ``--set``.
 
     Raises:
         UsageError: a value is out of range, or one key has two.
@@ -167,7 +167,7 @@ def _given(flag: str, key: str, value: Any) -> Value:
 
 
 def merged(layers: Sequence[Layer]) -> dict[str, Value]:
-    """Return later layers over earlier ones, within mappings as well; a kind replaces the other kind."""
+    """Merge layers, later ones winning, also within mappings; a kind replaces the other kind."""
     whole: dict[str, Value] = {}
     for layer in layers:
         if layer.keys() & KINDS.keys():
@@ -181,7 +181,7 @@ def merged(layers: Sequence[Layer]) -> dict[str, Value]:
 
 
 def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, Value]]:
-    """Yield a job's settings for each combination of the last matrix; a key of a later layer is no axis."""
+    """Yield the settings of a job for each combination of the last matrix; keys of later layers are fixed."""
     whole = merged(layers)
     if MATRIX not in whole:
         yield whole

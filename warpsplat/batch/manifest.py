@@ -1,11 +1,11 @@
-"""The manifest of a batch: what was made, of what, how good; and who has what in work.
+"""The manifest of a batch: results with their figures, and claims on work in progress.
 
-A file of JSON lines, each an event, appended in one piece. What a crash tore is one line, which is ignored,
-as are lines that this version cannot read. Entries are found by the result's name and its key (``job_key``:
-content of the image, settings), so that a changed image or setting finds none.
+A file of JSON lines, each an event, appended in one write. A crash damages one line at most, which is
+ignored, as are lines of later versions. Entries are found by the result's name and its key (``job_key``:
+content of the image, settings), so that a changed image or setting has none.
 
-Work is claimed by locking one byte of the same file, far behind its end, whose place is a hash of name and
-key. Such a lock ends with its process, whatever ended that, and is seen from machines that share the folder.
+Work is claimed by locking one byte of the same file, far behind its end, at a hash of name and key. Such a
+lock ends with its process, and works across machines that share the folder.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ except ImportError:  # Windows: two batches at once may both make an image
     fcntl = None  # type: ignore[assignment]
 
 NAME = "warpsplat-manifest.jsonl"
-"""Of the file, in the folder of the results."""
+"""File name, in the folder of the results."""
 
 VERSION = 1
-"""Of a line. A later one is not read."""
+"""Version of a line; later ones are ignored."""
 
 MAX_LINE = 1 << 16
 """Longest line that is read [bytes]."""
@@ -43,10 +43,10 @@ MAX_FILE = 1 << 30
 """Largest manifest [bytes]: 100,000 images take 60 MB."""
 
 FIRST_LOCK = 1 << 40
-"""Of the bytes that stand for claims; there are as many."""
+"""First of the bytes that are locked, and their number."""
 
 Event = Literal["made", "failed", "writing"]
-"""``writing``: the result is about to be written; one that bears no mark is known as ours by that."""
+"""``writing``: the result is about to be written; its digest identifies a result without a key in it."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Entry:
     figures: Mapping[str, Any] = field(default_factory=dict)
 
     def line(self) -> bytes:
-        """As it stands in the file."""
+        """Return the line of the file."""
         now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
         values = {"v": VERSION, "time": now, **vars(self)}
         return (
@@ -74,7 +74,7 @@ class Entry:
 
 
 def entry_of(line: bytes) -> Entry | None:
-    """What a line says; None if it is damaged, of a later version, or no such line at all."""
+    """Parse a line; None if it is damaged or of a later version."""
     if len(line) > MAX_LINE:
         return None
     try:
@@ -98,7 +98,7 @@ def entry_of(line: bytes) -> Entry | None:
 
 
 def sound(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Figures without those that are no numbers where numbers must be."""
+    """Drop figures that should be numbers but are not."""
     return {
         name: value
         for name, value in figures.items()
@@ -108,29 +108,27 @@ def sound(figures: Mapping[str, Any]) -> dict[str, Any]:
 
 
 NUMBERS = ("psnr", "bytes", "seconds")
-"""Figures that sums are made of."""
+"""Figures that are summed."""
 
 LARGE = 1e15
-"""No figure is: neither an infinite one nor an integer of a million digits."""
+"""Limit of figures, which excludes infinite ones and integers of a million digits."""
 
 
 class Manifest:
-    """A manifest that is open. Once open, nobody else in this process may open the file: closing it would end
-    all claims.
-    """
+    """An open manifest. Nothing else in this process may open the file: closing it would end all claims."""
 
     def __init__(self, path: Path) -> None:
-        """Nothing is read or made yet."""
+        """Read and create nothing yet."""
         self.path = path
         self.damaged = 0
-        """Lines that were ignored."""
+        """Number of ignored lines."""
         self._folder = Path(os.path.abspath(path)).parent
         self._handle: int | None = None
         self._read = 0
         self._lines: dict[str, list[bytes]] = {}
 
     def open(self, *, write: bool = True) -> None:
-        """Read the file, if it is there; with ``write``, make it. May be called again, to write as well.
+        """Read the file, if it exists; with ``write``, create it. May be called again to write.
 
         Raises:
             UsageError: it is no file, too large, or cannot be read or made.
@@ -160,13 +158,13 @@ class Manifest:
         self.refresh()
 
     def close(self) -> None:
-        """Close the file, and give up all claims."""
+        """Close the file, which releases all claims."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
     def refresh(self) -> None:
-        """Read the lines that were added, by whomever; one that is not whole is left for the next time."""
+        """Read the lines added since, by any process; an incomplete one is left for later."""
         if self._handle is None:
             return
         size = os.fstat(self._handle).st_size
@@ -190,22 +188,22 @@ class Manifest:
         self._lines.setdefault(entry.output, []).append(line)
 
     def name(self, output: Path) -> str:
-        """How entries call a result."""
+        """Return the name of a result in entries."""
         if is_remote(output):
             return str(output)
         relative = os.path.relpath(os.path.abspath(output), self._folder)
         return Path(relative).as_posix().encode("utf-8", "backslashreplace").decode()
 
     def entries(self, output: Path) -> list[Entry]:
-        """What was noted of a result, the latest last."""
+        """Return the entries of a result, oldest first."""
         return [entry for line in self._lines.get(self.name(output), ()) if (entry := entry_of(line))]
 
     def latest(self, output: Path, key: str) -> Entry | None:
-        """The last that was noted of a result of this key."""
+        """Return the last entry of a result with this key."""
         return next((entry for entry in reversed(self.entries(output)) if entry.key == key), None)
 
     def append(self, entry: Entry) -> None:
-        """Add a line, in one piece.
+        """Append a line in one write.
 
         Raises:
             OutputError: it cannot be written.
@@ -220,7 +218,7 @@ class Manifest:
             raise OutputError(f"manifest {self.path}: could not be written: {error.strerror}") from error
 
     def _ends_whole(self) -> bool:
-        """Whether the file ends with a whole line, or has none; a crash may have torn the last one."""
+        """Return whether the file is empty or ends with a complete line."""
         assert self._handle is not None
         size = os.fstat(self._handle).st_size
         if size == 0:
@@ -230,7 +228,7 @@ class Manifest:
 
     @contextlib.contextmanager
     def _locked(self, byte: int) -> Iterator[None]:
-        """Hold a lock, once all others have let go."""
+        """Hold a lock, after waiting for it."""
         if fcntl is None:
             yield
             return
@@ -242,7 +240,7 @@ class Manifest:
             fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, FIRST_LOCK + byte)
 
     def claim(self, output: Path, key: str) -> bool:
-        """Claim a result; False if another process has.
+        """Claim a result; return False if another process has it.
 
         Raises:
             OutputError: the file system has no locks.
@@ -260,7 +258,7 @@ class Manifest:
         return True
 
     def release(self, output: Path, key: str) -> None:
-        """Give up a claim."""
+        """Release a claim."""
         if fcntl is not None and self._handle is not None:
             fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, self._byte(output, key))
 

@@ -14,7 +14,7 @@
       - images: [logo.png, icons/**/*.png]
         preset: icons
 
-Paths are relative to the YAML file. Later is stronger: defaults, preset, job, command line.
+Paths are relative to the YAML file. Later ones win: defaults, preset, job, command line.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from warpsplat.run.names import Found, Place, Wanted, check_outputs, fields_of, 
 from warpsplat.run.options import NESTED, settings_from
 
 BATCH_ENDINGS = (".yaml", ".yml")
-"""Of names of batch files."""
+"""File name endings of batch files."""
 
 PRESET = "preset"
 """Key of a job: the name of the preset that it takes."""
@@ -70,11 +70,11 @@ class _Planned:
 
 
 def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Job]:
-    """The jobs that names on the command line mean: batch files, images, folders of them and patterns.
+    """Return the jobs of names on the command line: batch files, images, folders of them and patterns.
 
     Args:
         inputs: the names.
-        command: what the command line says of settings, see ``layers.command_layer``.
+        command: settings of the command line, see ``layers.command_layer``.
 
     Raises:
         UsageError: anything wrong with them; of a file the message names its line and key.
@@ -123,7 +123,7 @@ def _presets(file: BatchFile, line: int, node: yaml.Node) -> dict[str, Layer]:
 
 
 def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets: dict[str, Layer]) -> Layer:
-    """The preset that a job names, with its name as a field of its results'."""
+    """Return the preset of a job, with its name as a field for names of results."""
     if PRESET not in entries:
         return {}
     line, node = entries[PRESET]
@@ -135,7 +135,7 @@ def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets:
 
 
 def _images(file: BatchFile, line: int, node: yaml.Node) -> list[Found]:
-    """Files that the patterns match, each once, in the order of the patterns and sorted within one."""
+    """Return the files that match the patterns, without duplicates, sorted within each pattern."""
     patterns = file.value(node)
     if isinstance(patterns, str):
         patterns = [patterns]
@@ -152,7 +152,7 @@ def _images(file: BatchFile, line: int, node: yaml.Node) -> list[Found]:
 
 
 def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Iterator[_Planned]:
-    """The jobs that one description means: each combination of its settings for each image."""
+    """Yield the jobs of one description: each combination of its settings for each image."""
     for values in combinations(layers):
         given: dict[str, Any] = {key: item.value for key, item in values.items()}
         output, mask = (
@@ -175,7 +175,7 @@ def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Ite
 
 
 def _path(key: str, item: Value) -> Path:
-    """A path that a key gives, relative to where it was given."""
+    """Return the path that a key gives, relative to its file."""
     try:
         return remote(item.value) if is_url(item.value) else item.base / Path(item.value).expanduser()
     except RuntimeError as error:
@@ -200,8 +200,9 @@ def _jobs(planned: list[_Planned]) -> list[Job]:
 
 
 def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
-    """Where a batch keeps its manifest: the folder of its results; of several that do not lie in one of them,
-    or lie behind URLs, the folder of the batch file, or, where there is not just one, the current folder.
+    """Return the folder of a batch's manifest: the folder that contains all results, if there is one.
+
+    Else that of the batch file, or the current folder if there is not exactly one batch file.
     """
     away = any(is_remote(job.root) for job in jobs)
     roots = set() if away else {os.path.abspath(job.root) for job in jobs}
@@ -214,8 +215,9 @@ def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
 
 
 def in_shard(job: Job, root: Path, index: int, count: int) -> bool:
-    """Whether ``job`` belongs to part ``index`` (from 1) of ``count``: by its result's name below ``root``,
-    whatever else is in the list, and whatever the image is changed to.
+    """Return whether ``job`` belongs to part ``index`` (from 1) of ``count``.
+
+    It depends on the path of its result below ``root`` only, not on other jobs or the image's content.
     """
     away = is_remote(job.output)
     name = str(job.output) if away else Path(os.path.relpath(job.output, root)).as_posix()

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, ReportWish, Source, Stop, Task
+from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, ReportRequest, Source, Stop, Task
 from warpsplat.batch.executors.work import digest, failure
 from warpsplat.batch.manifest import Entry, Manifest
 from warpsplat.batch.plan import Job
@@ -272,15 +272,15 @@ class Batch:
             bring=away or job.settings.minify or is_picture(job.output),
             measure=measure,
             result=read_result(job.output) if measure and away else None,
-            report=self._report_wish(number),
+            report=self._report_request(number),
         )
 
-    def _report_wish(self, number: int) -> ReportWish | None:
+    def _report_request(self, number: int) -> ReportRequest | None:
         if self._reports is None:
             return None
         before = self._made_before.get(number)
-        back = self._reports.way_back(self.jobs[number].output)
-        return ReportWish(back, before.figures if before else {})
+        back = self._reports.link_to_index(self.jobs[number].output)
+        return ReportRequest(back, before.figures if before else {})
 
     def _mask(self, job: Job, found: JobInputs) -> Source | None:
         if job.importance is None:

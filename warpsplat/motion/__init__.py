@@ -1,1 +1,1 @@
-"""Animations of a run: how the shapes came to be, or in which order they are drawn."""
+"""Animations of a run: its training, or its shapes drawn one after the other; and previews in terminals."""

@@ -1,4 +1,4 @@
-"""In which order a file is drawn: strokes grow as a pen draws them, all else appears."""
+"""Animate the drawing of a file: strokes grow as a pen draws them, all else appears."""
 
 from __future__ import annotations
 
@@ -30,34 +30,34 @@ HIDDEN = {
     SPACE + tag
     for tag in ("defs", "clipPath", "mask", "symbol", "marker", "pattern", "filter", "metadata", "style")
 }
-"""Elements whose content is not drawn where it stands."""
+"""Elements whose content is not drawn in place."""
 
 FADE = 0.3
-"""Time in which a shape appears [s]."""
+"""Time for a shape to appear [s]."""
 
 SHORTEST = 0.02
-"""Time in which a stroke is drawn [s], at the least."""
+"""Minimum time to draw a stroke [s]."""
 
 PIECES = 8
-"""Straight pieces that a cubic's length is taken on."""
+"""Straight pieces to measure a cubic's length."""
 
 
 @dataclass(frozen=True)
 class Turn:
-    """An element's part in the drawing."""
+    """Timing of an element."""
 
     element: ET.Element
     length: float
-    """Of a stroke [its own units]; 0: it appears as a whole."""
+    """Length of a stroke [its own units]; 0: the element appears as a whole."""
     start: float
     """[s]"""
     seconds: float
-    """That it takes."""
+    """Duration."""
 
 
 def turns(root: ET.Element, seconds: float) -> list[Turn]:
-    """Who is drawn when, in the order in which viewers draw: what appears takes equal times, a stroke takes
-    time by its length, the mean of them as much as what appears.
+    """Return the timing of all elements, in painter's order: equal times for those that appear, and times by
+    length, with the same mean, for strokes.
     """
     found = list(_drawn(root, stroked=False, filled=True))
     if found and found[0][0].tag == f"{SPACE}rect":
@@ -73,7 +73,7 @@ def turns(root: ET.Element, seconds: float) -> list[Turn]:
 
 
 def _drawn(element: ET.Element, *, stroked: bool, filled: bool) -> Iterator[tuple[ET.Element, float]]:
-    """Elements that are drawn, with the lengths of those that are lines only."""
+    """Yield the drawn elements, with the lengths of those that are only stroked."""
     if element.tag in HIDDEN:
         return
     stroked, filled = _painted(element, "stroke", stroked), _painted(element, "fill", filled)
@@ -94,7 +94,7 @@ def _painted(element: ET.Element, paint: str, inherited: bool) -> bool:
 
 
 def _says(element: ET.Element, name: str) -> str | None:
-    """What an element itself says of a property."""
+    """Return the value of a property in an element itself."""
     for part in element.get("style", "").split(";"):
         key, _, value = part.partition(":")
         if key.strip() == name:
@@ -103,7 +103,7 @@ def _says(element: ET.Element, name: str) -> str | None:
 
 
 def path_length(data: str) -> float:
-    """Of the longest subpath of path data [its own units]: dashes begin anew with each."""
+    """Return the length of the longest subpath [its own units]: dashes restart at each."""
     t = np.linspace(0, 1, PIECES + 1)[:, None]
     s = 1 - t
     weights = np.concatenate([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
@@ -130,7 +130,7 @@ def _written(root: ET.Element) -> str:
 
 
 def pictures(text: str, path: Path, width: int | None, seconds: float, *, own: bool) -> Iterator[Frame]:
-    """The frames of a film of the drawing of an SVG; the last one is the file as a viewer shows it.
+    """Yield the frames of the drawing of an SVG; the last one is the file as a viewer shows it.
 
     ``own``: it was written here.
     """
@@ -152,7 +152,7 @@ def pictures(text: str, path: Path, width: int | None, seconds: float, *, own: b
 
 
 def _set(turn: Turn, attributes: dict[str, str], now: float) -> None:
-    """Show as much of an element as is drawn at a time [s]."""
+    """Show the part of an element that is drawn by a time [s]."""
     element, share = turn.element, (now - turn.start) / turn.seconds
     element.attrib.clear()
     element.attrib.update(attributes)
@@ -181,7 +181,7 @@ STYLE = (
 
 
 def vector(text: str, seconds: float) -> str:
-    """An SVG that is drawn as its elements follow each other, and is then the file as it was.
+    """Return an SVG that draws its elements one after the other and ends as the original file.
 
     Style sheets play it, once, also in ``<img>``. Where nothing is animated, or readers ask for less motion,
     it is the file.
@@ -199,6 +199,6 @@ def vector(text: str, seconds: float) -> str:
 
 
 def _add(element: ET.Element, name: str, value: str, between: str) -> None:
-    """Say something in an attribute besides what it says."""
+    """Add to an attribute."""
     before = element.get(name, "").rstrip("; ")
     element.set(name, f"{before}{between}{value}" if before else value)

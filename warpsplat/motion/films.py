@@ -1,4 +1,4 @@
-"""Pictures one after the other as a file: GIF, WebP or MP4."""
+"""Write animations as GIF, WebP or MP4."""
 
 from __future__ import annotations
 
@@ -27,29 +27,29 @@ none: it writes MPEG-4 part 2, which plays in no browser.
 
 @dataclass(frozen=True)
 class Format:
-    """What a kind of film is made like."""
+    """Properties of a kind of film."""
 
     rate: float
-    """Pictures a second."""
+    """Frames per second."""
     side: int
-    """Longest side where no width is given [px]."""
+    """Default of the longer side [px]."""
 
 
 FORMATS = {".gif": Format(12.5, 480), ".webp": Format(15, 800), ".mp4": Format(25, 800)}
 """Kinds of films by their ending: a GIF counts hundredths of a second, and grows with its area."""
 
 ENDINGS = (".svg", *FORMATS)
-"""Of names of animations."""
+"""File name endings of animations."""
 
 LEAST_SIDE = 320
-"""Longest side of the film of a smaller picture [px]: shapes have no pixels."""
+"""Longer side of films of smaller images [px]: shapes have no pixels."""
 
 Frame = tuple[Image.Image, float]
-"""A picture, RGB or RGBA, and how long it is shown [s]."""
+"""An image, RGB or RGBA, and its duration [s]."""
 
 
 def check_format(path: Path) -> None:
-    """Whether an animation of this name can be made.
+    """Check that an animation of this name can be made.
 
     Raises:
         UsageError: there is none of that ending, or a package is missing; the message says how it is
@@ -67,8 +67,9 @@ def check_format(path: Path) -> None:
 
 
 def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
-    """Pixels of a film per pixel of a picture of ``size``, whose shorter side keeps a pixel if the longer one
-    has no more than ``WEBP_SIDE``, which is as many as encoders of H.264 take.
+    """Return the pixels of a film per pixel of an image of ``size``.
+
+    The longer side is at most ``WEBP_SIDE``, also the limit of H.264, if the shorter one keeps a pixel.
     """
     if width is not None:
         zoom = width / size[0]
@@ -79,17 +80,17 @@ def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
 
 
 MOST_PIXELS = 80_000_000
-"""Of all pictures of a film: makers of GIFs and WebPs hold them all, with four bytes a pixel."""
+"""Maximum number of pixels of a film: GIF and WebP encoders hold all frames, with four bytes a pixel."""
 
 
 def ticks_of(path: Path, size: tuple[int, int], seconds: float) -> int:
-    """Most pictures of the movement of a film of ``size``."""
+    """Return the maximum number of moving frames of a film of ``size``."""
     most = MOST_PIXELS // (size[0] * size[1])
     return max(2, min(most, round(FORMATS[path.suffix.lower()].rate * seconds)))
 
 
 def encoded(path: Path, frames: Iterable[Frame]) -> bytes:
-    """A film as the ending of ``path`` says; the last picture stays ``HOLD`` seconds longer.
+    """Return a film in the format of ``path``; the last frame stays ``HOLD`` seconds longer.
 
     GIF and WebP play again and again. GIF and MP4 have no opacity: transparency is white there.
     """
@@ -98,7 +99,7 @@ def encoded(path: Path, frames: Iterable[Frame]) -> bytes:
 
 
 def _held(frames: Iterable[Frame]) -> Iterator[Frame]:
-    """With more time for the last one."""
+    """Extend the duration of the last frame."""
     before: Frame | None = None
     for frame in frames:
         if before:
@@ -109,7 +110,7 @@ def _held(frames: Iterable[Frame]) -> Iterator[Frame]:
 
 
 def _opaque(picture: Image.Image) -> Image.Image:
-    """On white."""
+    """Return an image on white."""
     if picture.mode == "RGB":
         return picture
     white = Image.new("RGBA", picture.size, "white")
@@ -117,16 +118,15 @@ def _opaque(picture: Image.Image) -> Image.Image:
 
 
 COLORS = 255
-"""Of a picture of a GIF; one of 256 is left for what did not change since the picture before."""
+"""Colours of a GIF's frame; one of 256 is left for unchanged pixels."""
 
 
 ENOUGH_PIXELS = 10_000
-"""From which the colours of a picture of a GIF are chosen: chosen from all they take nine times as long, and
-are nearer by half a decibel."""
+"""Pixels to choose a frame's colours from; all of them take nine times as long, for half a decibel."""
 
 
 def _few_colors(picture: Image.Image) -> Image.Image:
-    """With a table of ``COLORS``."""
+    """Reduce an image to ``COLORS``."""
     step = max(1, math.isqrt(picture.width * picture.height // ENOUGH_PIXELS))
     some = picture.resize([max(1, side // step) for side in picture.size], Image.Resampling.NEAREST)
     table = some.quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
@@ -134,8 +134,9 @@ def _few_colors(picture: Image.Image) -> Image.Image:
 
 
 def _gif(frames: Iterable[Frame]) -> bytes:
-    """Each picture has colours of its own: one table for all of them shows steps in skies and skin. Without
-    dithering: its grain changes from picture to picture, which flickers and takes twice the bytes.
+    """Write a GIF with a colour table a frame: a common one shows steps in skies and skin.
+
+    Without dithering, whose grain would flicker and take twice the bytes.
     """
     pictures, times = [], []
     for picture, seconds in frames:
@@ -158,7 +159,7 @@ def _gif(frames: Iterable[Frame]) -> bytes:
 WEBP_QUALITY = 80
 
 WEBP_METHOD = 2
-"""Of 0 to 6: twice as quick as the usual 4, for 4 % more bytes; 1 and 0 take 30 % more."""
+"""WebP effort, 0 to 6: twice as fast as the default 4, for 4 % more bytes; 1 and 0 take 30 % more."""
 
 
 def _webp(frames: Iterable[Frame]) -> bytes:
@@ -193,7 +194,7 @@ def _mp4(frames: Iterable[Frame]) -> bytes:
 
 
 def _encode_h264(path: Path, frames: Iterable[Frame]) -> None:
-    """Write an MP4 as all players take it: of even sides, a constant rate, and colours at half the size."""
+    """Write an MP4 for all players: even sides, a constant rate, and half-size chroma."""
     import av
 
     rate = round(FORMATS[".mp4"].rate)

@@ -1,4 +1,4 @@
-"""Which shapes of a run live on: scenes that follow each other do not say so, but shapes move little between.
+"""Match the shapes of successive scenes of a run, which move little in between.
 
 Ten steps later 99 of 100 shapes are found again, and less than 1 in 1000 of those is another one (as the
 run itself knows; ``kodim23.png``, 512 shapes).
@@ -17,27 +17,27 @@ from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import bounds
 
 COLOR_WEIGHT = 0.1
-"""What a difference of colour counts as, beside one of place in sides of the canvas."""
+"""Weight of a difference in colour relative to one in position [sides of the canvas]."""
 
 FARTHEST = 0.1
-"""From a shape to what it becomes, in the same measure."""
+"""Maximum distance of matching shapes, in the same measure."""
 
 AT_ONCE = 1 << 18
-"""Pairs of shapes that are compared in one go: bounds the memory."""
+"""Pairs of shapes compared at a time, to bound memory."""
 
 
 @dataclass(frozen=True)
 class Lives:
-    """The shapes of several scenes, each with a number of its own."""
+    """Shapes of several scenes, matched."""
 
     numbers: list[IndexArray]
-    """By scene and shape: the number of the life that it belongs to."""
+    """Identifier of each shape, by scene."""
     order: list[int]
-    """All numbers, those of what lies further back first, as in each scene."""
+    """All identifiers, in painter's order."""
 
 
 def lives(scenes: Sequence[Scene]) -> Lives:
-    """Follow shapes through scenes of one run, in order."""
+    """Match shapes through the scenes of a run, in order."""
     numbers = [np.arange(len(scenes[0]))]
     order, count = list(range(len(scenes[0]))), len(scenes[0])
     for before, after in itertools.pairwise(map(looks, scenes)):
@@ -57,7 +57,7 @@ def lives(scenes: Sequence[Scene]) -> Lives:
 
 
 def looks(scene: Scene) -> FloatArray:
-    """What shapes are told apart by, place and size and colour, shape (shape, 8)."""
+    """Return the features to match by: position, size and colour, shape (shape, 8)."""
     canvas = scene.canvas
     boxes = bounds(scene) / max(canvas.width, canvas.height)
     paints = COLOR_WEIGHT * np.column_stack([scene.colors, scene.opacities])
@@ -65,7 +65,7 @@ def looks(scene: Scene) -> FloatArray:
 
 
 def pairs(before: FloatArray, after: FloatArray) -> list[tuple[int, int]]:
-    """Rows of the shapes of a scene that are there in the next one, with their rows there; both ascend.
+    """Return the indices of shapes that are in the next scene, and their indices there; both ascend.
 
     Those that are the nearest to each other by their ``looks``, as many as keep their order: depth is kept by
     what lives on.
@@ -80,7 +80,7 @@ def pairs(before: FloatArray, after: FloatArray) -> list[tuple[int, int]]:
 
 
 def nearest(rows: FloatArray, others: FloatArray) -> IndexArray:
-    """Which of the ``others`` is the nearest to each of the ``rows``, the first of several."""
+    """Return the index of the nearest of ``others`` to each of ``rows``."""
     found = np.zeros(len(rows), np.intp)
     columns = np.ascontiguousarray(others.T)
     step = max(1, AT_ONCE // len(others))
@@ -95,7 +95,7 @@ def nearest(rows: FloatArray, others: FloatArray) -> IndexArray:
 
 
 def ascending(values: Sequence[int]) -> list[int]:
-    """Indices of a longest ascending part of different ``values`` (patience sorting)."""
+    """Return the indices of a longest ascending subsequence of distinct ``values`` (patience sorting)."""
     lasts: list[int] = []
     piles: list[int] = []
     behind: list[int] = []

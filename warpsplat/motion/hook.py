@@ -136,11 +136,12 @@ class MotionHook(RunHook):
             what = "drawing"
         log = logging.getLogger("warpsplat")
         log.info(f"{self._file}: pictures of the {what} ...", extra={"passing": True})
+        device, threads = done.request.device, done.request.threads
         try:
             size = self._recorder.save(
-                self._file, result, what=what, width=self._width, device=done.device, threads=done.threads
+                self._file, result, what=what, width=self._width, device=device, threads=threads
             )
         finally:
             log.info("", extra={"passing": True})
-        if not done.quiet:
+        if not done.request.quiet:
             echo(f"warpsplat: {self._file}: animation of the {what}, {size:,} bytes", err=True)

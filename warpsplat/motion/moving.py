@@ -1,5 +1,5 @@
-"""Shapes of a run as elements of an SVG that move: what lives on goes from place to place (SMIL), what is new
-comes, what is gone goes.
+"""Write the shapes of a run as animated elements of an SVG (SMIL): those that persist move, others fade in or
+out.
 
 Path data are interpolated by viewers where their commands are the same, so that a shape has as many points
 throughout as in the beginning: where the run has removed one, it lies between its neighbours.
@@ -22,7 +22,7 @@ from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.write import OPACITY_DECIMALS, PAINTED, STROKE_ATTRIBUTES
 
 Form = tuple[int, int, int, int]
-"""What does not change while a shape moves: kind, basis, rule, and whether it is closed."""
+"""Properties that are fixed while a shape moves: kind, basis, rule, closed."""
 
 
 class Value(NamedTuple):

@@ -1,4 +1,4 @@
-"""Scenes of a run as pictures, by the program's own renderer: a viewer takes seven times as long."""
+"""Render scenes of a run with our own renderer: a viewer takes seven times as long."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from warpsplat.svg.write import GRIDS, resized
 
 
 class Painter:
-    """Draws scenes as their files look, one after the other: what one needs is a guess for the next."""
+    """Renders scenes as their files look; the capacity for one is the first guess for the next."""
 
     def __init__(self, backend: Backend, settings: Settings, size: Size) -> None:
-        """``settings``: of the run; ``size``: of the pictures [px]."""
+        """``settings``: of the run; ``size``: of the images [px]."""
         self._backend, self._settings, self._size = backend, settings, size
         self._capacity: Capacity | None = None
 
     def paint(self, scene: Scene, scale: float) -> Image.Image:
-        """A scene with ``scale`` px a canvas unit, cut to the size; RGBA where not all is opaque."""
+        """Render a scene with ``scale`` px a canvas unit, cropped; RGBA if not all is opaque."""
         if scene.pictures or not len(scene):
             return self._seen(scene, scale)
         try:
@@ -41,7 +41,7 @@ class Painter:
         return to_pillow(renderer.read_image())
 
     def _seen(self, scene: Scene, scale: float) -> Image.Image:
-        """As a viewer shows it: what is kept of other files, and what is too much for the renderer."""
+        """Render a scene with resvg: one with kept elements, or one too large for our renderer."""
         text = export(scene, self._settings, GRIDS[-1])
         if scene.pictures:
             return picture(text, self._size, scale)

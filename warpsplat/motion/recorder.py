@@ -1,4 +1,4 @@
-"""What is kept of a run for its animation: shapes now and then, no pictures."""
+"""Record a run for its animation: shapes now and then, no images."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from warpsplat.run.result import Result
 from warpsplat.scene import Scene
 
 What = Literal["training", "drawing"]
-"""What an animation shows: how the shapes came to be, or how they are drawn one after the other."""
+"""Contents of an animation: the training, or the shapes drawn one after the other."""
 
 MOST_SCENES = 240
-"""That are kept: more than any animation shows."""
+"""Maximum number of scenes to keep: more than any animation shows."""
 
 MOST_BYTES = 256 << 20
-"""Of all that is kept."""
+"""Maximum size of all that is kept [bytes]."""
 
 FEWEST = 3
-"""Scenes of which an animation of the training can be made."""
+"""Scenes needed for an animation of the training."""
 
 NARROWEST, WIDEST = 16, 2048
-"""Of an animation [px]."""
+"""Limits of the width [px]."""
 
 
 class Recorder:
-    """A callback of ``vectorize`` and ``refine`` that keeps what an animation of the run takes.
+    """A callback of ``vectorize`` and ``refine`` that records the run for an animation.
 
     Example::
 
@@ -48,18 +48,18 @@ class Recorder:
 
     def __init__(self) -> None:
         self.scenes: list[Scene] = []
-        """The shapes of the run so far, in order; thinned where they became too many."""
+        """The scenes so far, in order, thinned out if there are too many."""
         self.moments: list[int] = []
-        """Of which of the run's reports they are."""
-        self._heard = self._bytes = 0
+        """Numbers of the progress reports that they are from."""
+        self._reports = self._bytes = 0
 
     def __call__(self, progress: Progress) -> None:
-        """Keep the shapes of a report."""
+        """Keep the shapes of a progress report."""
         if progress.snapshot is None:
             return
         self.scenes.append(progress.snapshot.scene())
-        self.moments.append(self._heard)
-        self._heard += 1
+        self.moments.append(self._reports)
+        self._reports += 1
         self._bytes += _bytes_of(self.scenes[-1])
         while len(self.scenes) > FEWEST and (len(self.scenes) > MOST_SCENES or self._bytes > MOST_BYTES):
             chosen = kept(self.moments, max(FEWEST, len(self.scenes) * 2 // 3))
@@ -69,13 +69,11 @@ class Recorder:
 
     @property
     def has_training(self) -> bool:
-        """Whether there is enough for an animation of the training."""
+        """Whether there are enough scenes for an animation of the training."""
         return len(self.scenes) >= FEWEST
 
     def shows(self, result: Result) -> What:
-        """What an animation of a run shows where nobody says: the training of fitted shapes, and the order
-        in which traced ones are drawn, whose training changes little.
-        """
+        """Return the default contents: the training of photographs, else the drawing."""
         return "training" if result.subject == "photo" and self.has_training else "drawing"
 
     def save(
@@ -89,7 +87,7 @@ class Recorder:
         device: str = "auto",
         threads: int | None = None,
     ) -> int:
-        """Write the animation of the run that made ``result``; its last picture is the file's.
+        """Write the animation of the run that made ``result``; its last frame is the file.
 
         Args:
             path: the ending says what it is: ``.svg``, ``.gif``, ``.webp`` or ``.mp4`` (which takes the
@@ -139,7 +137,7 @@ class Recorder:
 
 
 def check_width(width: int | None) -> None:
-    """Whether an animation may have this width [px].
+    """Check the width of an animation [px].
 
     Raises:
         UsageError: it may not.
@@ -149,6 +147,6 @@ def check_width(width: int | None) -> None:
 
 
 def _bytes_of(scene: Scene) -> int:
-    """What a scene's arrays take."""
+    """Return the size of a scene's arrays [bytes]."""
     arrays = (getattr(scene, field.name) for field in fields(scene))
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))

@@ -1,4 +1,4 @@
-"""SVGs as pictures of an animation."""
+"""Render SVGs as frames of an animation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Size = tuple[int, int]
 
 
 def size_of(text: str) -> tuple[float, float]:
-    """Size of an SVG [px].
+    """Return the size of an SVG [px].
 
     Raises:
         ImageError: it says none.
@@ -25,13 +25,13 @@ def size_of(text: str) -> tuple[float, float]:
 
 
 def screen(text: str, zoom: float) -> Size:
-    """Of an SVG, magnified: whole pixels that it covers."""
+    """Return the whole pixels that a magnified SVG covers."""
     width, height = size_of(text)
     return max(1, int(width * zoom + 1e-6)), max(1, int(height * zoom + 1e-6))
 
 
 def picture(text: str, size: Size, zoom: float | None = None) -> Image.Image:
-    """An SVG as a viewer shows it, RGBA, cut to ``size``.
+    """Render an SVG as a viewer shows it, RGBA, cropped to ``size``.
 
     Args:
         text: written here and of this size, without a ``zoom``; else any.

@@ -1,4 +1,4 @@
-"""When an animation shows what."""
+"""Choose the frames of an animation."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from dataclasses import dataclass
 from warpsplat.portable.elementary import power
 
 SECONDS = 6.0
-"""Of an animation's movement, where it is not said."""
+"""Default duration of the movement [s]."""
 
 SHORTEST, LONGEST = 0.5, 60.0
-"""Of what may be said [s]."""
+"""Limits of the duration [s]."""
 
 HOLD = 2.0
-"""The finished picture stays, before a loop begins again [s]."""
+"""Time that the last frame stays before the loop restarts [s]."""
 
 EARLY = 1.5
-"""Power of a share of the animation that is the share of the run: much changes early, little late."""
+"""Exponent from the fraction of the animation to that of the run: early changes are larger."""
 
 
 @dataclass(frozen=True)
 class Showing:
-    """One picture of an animation."""
+    """A frame of an animation."""
 
     index: int
-    """Of the pictures that there are."""
+    """Index of the scene."""
     seconds: float
-    """How long it is shown."""
+    """Duration [s]."""
 
 
 def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing]:
-    """Which pictures of a run ``seconds`` of ``ticks`` equal parts show.
+    """Return the frames that show a run in ``seconds`` of ``ticks`` equal parts.
 
     Early ones are shown longer; late ones are skipped where there are more than parts.
 
@@ -53,8 +53,6 @@ def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing
 
 
 def kept(moments: Sequence[int], most: int) -> list[int]:
-    """Indices of those pictures of a run that goes on that are kept where there is room for ``most``: those
-    that would be shown, the first and the last one among them.
-    """
+    """Return the indices of ``most`` scenes to keep: those an animation would show, with both ends."""
     chosen = {showing.index for showing in showings(moments, most - 2, 1.0)}
     return sorted(chosen | {0, len(moments) - 1})

@@ -1,4 +1,4 @@
-"""How the shapes came to be: the scenes of a run as pictures, or as an SVG that moves."""
+"""Animate the training: the scenes of a run as frames, or as an animated SVG."""
 
 from __future__ import annotations
 
@@ -31,9 +31,7 @@ def pictures(
     seconds: float,
     backend: Backend,
 ) -> Iterator[Frame]:
-    """The frames of a film of scenes and their moments, drawn on ``backend``; the last one is the file as a
-    viewer shows it.
-    """
+    """Yield frames of scenes at their moments, rendered on ``backend``; the last one is the file itself."""
     end = finished(result)
     zoom = zoom_of(path, size_of(end), width)
     size = screen(end, zoom)
@@ -46,7 +44,7 @@ def pictures(
 
 
 def finished(result: Result) -> str:
-    """The file; or, of one on a sheet of paper, what is on it."""
+    """Return the file without its sheet of paper."""
     canvas = result.scene.canvas
     if size_of(result.svg) == (canvas.width, canvas.height):
         return result.svg
@@ -54,25 +52,25 @@ def finished(result: Result) -> str:
 
 
 def page(scene: Scene, result: Result, per_pixel: float) -> str:
-    """The SVG of a scene of the run, with ``per_pixel`` units of its view box a pixel."""
+    """Return the SVG of a scene of the run, with ``per_pixel`` units of its view box a pixel."""
     return export(scene, Settings(renderer=result.renderer), per_pixel)
 
 
 # An SVG.
 
 MOST_KEYS = 20
-"""Scenes in an SVG."""
+"""Maximum number of scenes in an SVG."""
 
 FEWEST_KEYS = 6
 
 MOST_TEXT = 3 << 20
-"""Of these scenes [bytes], where that leaves ``FEWEST_KEYS``."""
+"""Maximum size of these scenes [bytes], unless that leaves fewer than ``FEWEST_KEYS``."""
 
 UNITS = 1000
-"""Of the coordinates of what moves, along the longer side, at the least: it is seen for a moment."""
+"""Minimum number of coordinate steps along the longer side while shapes move."""
 
 FADE = 0.3
-"""Time in which a file with a background comes over what moved [s], in place of which it then is."""
+"""Time in which a file with a background fades in over the moving shapes [s]."""
 
 STYLE = (
     ".m{{visibility:hidden;animation:m {end}s}}"
@@ -84,7 +82,7 @@ STYLE = (
 
 
 def vector(scenes: Sequence[Scene], moments: Sequence[int], result: Result, seconds: float) -> str:
-    """An SVG whose shapes move as they did in the run, and that then stays the file.
+    """Return an SVG whose shapes move as they did in the run, and that ends as the file.
 
     It plays once, also in ``<img>``, without a script: shapes go their ways by SMIL, style sheets show
     them and then the file. Where nothing is animated, or readers ask for less motion, it is the file.
@@ -133,7 +131,7 @@ COMMENT = re.compile(r"^(\s*<!--warpsplat.*?-->)?\s*", re.DOTALL)
 
 
 def _parts(text: str) -> tuple[str, str]:
-    """The start tag of a file written here, and what is in it."""
+    """Split a file written here into its start tag and its content."""
     found = ROOT.search(text)
     assert found
     inside = text[found.end() :].rpartition("</svg>")[0]
@@ -141,12 +139,12 @@ def _parts(text: str) -> tuple[str, str]:
 
 
 def _named(text: str, prefix: str) -> str:
-    """With identifiers that no other page has."""
+    """Make the identifiers unique."""
     text = re.sub(r'\bid="', f'id="{prefix}', text)
     return re.sub(r'(url\(#|href="#)', rf"\g<1>{prefix}", text)
 
 
 def _coarse(canvas: Canvas) -> float:
-    """Units a pixel of what is seen for a moment."""
+    """Return the units a pixel of moving shapes."""
     side = max(canvas.width, canvas.height)
     return next((units for units in GRIDS if units * side >= UNITS), GRIDS[-1])

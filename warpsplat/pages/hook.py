@@ -60,7 +60,8 @@ class ReportHook(RunHook):
         """Write the page."""
         if self._page is None or not done.made:
             return
-        name = "image" if done.image == STANDARD else done.image.name
+        image = done.request.image
+        name = "image" if image == STANDARD else image.name
         if done.several:
             _write_comparison(self._page, done, name)
             return
@@ -75,8 +76,8 @@ class ReportHook(RunHook):
             command=done.command,
             name=name,
             svg_name=f"{stem}.svg",
-            device=done.device,
-            threads=done.threads,
+            device=done.request.device,
+            threads=done.request.threads,
         )
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
-"""Where the images of a batch are done: in this process, by others, or wherever an ``Executor`` does them.
+"""Executors, which do the images of a batch: in this process, in others, or on a cluster.
 
-An executor is given tasks (``tasks.Task``) and yields what became of them (``tasks.Outcome``); both are small
-and can be pickled. ``work.do`` does one, in whatever process.  serial.py: in this one, one after the other;
-pool.py: in several, whose side is worker.py;  ray.py: on a Ray cluster, whose side is ray_actor.py.
+An executor takes tasks (``tasks.Task``) and yields outcomes (``tasks.Outcome``); both are small and can be
+pickled. ``work.do`` does one task, in any process.  serial.py: in this process, one after the other;
+pool.py: in several processes, which run worker.py;  ray.py: on a Ray cluster, which runs ray_actor.py.
 """

@@ -1,7 +1,7 @@
-"""Several tasks at the same time, each in a process of its own, which is started once and kept.
+"""Do several tasks at the same time, each in a process, which is kept for further tasks.
 
-Processes are spawned: Warp and its threads do not survive a fork. A process that dies is the end of Python's
-own pools; here it costs its task a second try.
+Processes are spawned, since Warp and its threads do not survive a fork. A process that dies would break
+Python's own pools; here its task is tried once more.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from warpsplat.files.output import remove_stale
 log = logging.getLogger("warpsplat")
 
 GRACE = 10.0
-"""Seconds that a task has to end after the word to stop: a step, and writing the file."""
+"""Seconds for a task to end once it is stopped: a step, and writing the file."""
 
-LOOK = 0.1
-"""Seconds between two questions whether to stop."""
+POLL_INTERVAL = 0.1
+"""Seconds between two checks whether to stop."""
 
 TRIES = 2
-"""Of a task whose worker dies."""
+"""Attempts at a task whose worker dies."""
 
-STILLBORN = 3
-"""After so many workers in a row that die before they have done anything, no more are started."""
+MAX_FAILED_STARTS = 3
+"""After this many workers in a row that die before they respond, no more are started."""
 
 
 class Worker:
-    """A process, its channel, and the task that it has."""
+    """A process, the channel to it, and its current task."""
 
     def __init__(self, workers: int) -> None:
-        """``workers``: how many there are, this one counted."""
+        """``workers``: how many there are, including this one."""
         context = multiprocessing.get_context("spawn")
         self.channel, other = context.Pipe()
         self.process: SpawnProcess = context.Process(
@@ -56,24 +56,24 @@ class Worker:
         other.close()
         self.task: Task | None = None
         self.begun = False
-        """Whether the task has something to save."""
-        self.heard = False
-        """Whether it ever said anything."""
+        """Whether the task has a result to save."""
+        self.responded = False
+        """Whether it ever sent a message."""
 
     def give(self, task: Task) -> None:
-        """Hand it a task. Of one that is dead the channel ends, which is heard."""
+        """Send it a task. If it is dead, its channel ends, which ``run`` notices."""
         self.task, self.begun = task, False
         with contextlib.suppress(OSError):
             self.channel.send(task)
 
     def listen(self, advance: Advance) -> Outcome | None:
-        """Take its next message.
+        """Receive its next message.
 
         Raises:
             EOFError, OSError: it is dead.
         """
         message = self.channel.recv()
-        self.heard = True
+        self.responded = True
         if isinstance(message, Outcome):
             self.task = None
             return message
@@ -85,7 +85,7 @@ class Worker:
         return None
 
     def stop(self) -> None:
-        """Have its task ended: with the best so far, or, where there is nothing yet, at once."""
+        """End its task: with the best so far, or at once if there is nothing yet."""
         if self.begun:
             with contextlib.suppress(OSError):
                 self.channel.send(STOP)
@@ -93,15 +93,15 @@ class Worker:
             self.process.kill()
 
     def dismiss(self) -> None:
-        """Let it end by itself if it has nothing to do, else at once."""
+        """End it: by itself if it is idle, else at once."""
         if self.task:
             self.process.kill()
             return
         with contextlib.suppress(OSError):
             self.channel.send(None)
 
-    def bury(self) -> None:
-        """Wait until it has ended, and tidy up after it."""
+    def clean_up(self) -> None:
+        """Wait until it has ended, and remove what it left."""
         self.process.join(GRACE)
         self.process.kill()
         self.process.join()
@@ -111,15 +111,15 @@ class Worker:
 
 
 class Pool:
-    """An ``Executor``, see there."""
+    """An ``Executor`` that has several processes."""
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
         self._workers: list[Worker] = []
-        self._stillborn = 0
+        self._failed_starts = 0
 
     def __enter__(self) -> Pool:
-        """Workers start with the first tasks."""
+        """Return self; workers start with the first tasks."""
         return self
 
     def __exit__(
@@ -132,7 +132,7 @@ class Pool:
         for worker in self._workers:
             worker.dismiss()
         for worker in self._workers:
-            worker.bury()
+            worker.clean_up()
         self._workers.clear()
 
     def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
@@ -155,13 +155,13 @@ class Pool:
             if late is not None and time.monotonic() > late:
                 for worker in self._busy():
                     worker.process.kill()
-            for worker in self._speaking():
+            for worker in self._ready():
                 task = worker.task
                 try:
                     outcome = worker.listen(advance)
                 except (EOFError, OSError):
-                    assert task, "only those that have one are listened to"
-                    cause = self._bury(worker)
+                    assert task
+                    cause = self._remove(worker)
                     lost[task.number] += 1
                     if late is not None:
                         outcome = Outcome(task.number, "stopped")
@@ -177,13 +177,13 @@ class Pool:
     def _busy(self) -> list[Worker]:
         return [worker for worker in self._workers if worker.task]
 
-    def _speaking(self) -> list[Worker]:
-        """The busy ones that have something to say, or are dead; waits for one, for a moment."""
-        ready = wait([worker.channel for worker in self._busy()], LOOK)
+    def _ready(self) -> list[Worker]:
+        """Wait a moment, and return the busy workers that sent a message or died."""
+        ready = wait([worker.channel for worker in self._busy()], POLL_INTERVAL)
         return [worker for worker in self._busy() if worker.channel in ready]
 
     def _free(self) -> Worker:
-        """A worker without a task.
+        """Return a worker without a task.
 
         Raises:
             ResourceError: none can be started.
@@ -191,8 +191,8 @@ class Pool:
         for worker in [worker for worker in self._workers if not worker.task]:
             if worker.process.is_alive():
                 return worker
-            self._bury(worker)
-        if self._stillborn >= STILLBORN:
+            self._remove(worker)
+        if self._failed_starts >= MAX_FAILED_STARTS:
             raise ResourceError("worker processes end as soon as they begin; --workers 1 does without them")
         try:
             self._workers.append(Worker(self.workers))
@@ -200,22 +200,22 @@ class Pool:
             raise ResourceError(f"a worker process cannot be started: {error.strerror}") from error
         return self._workers[-1]
 
-    def _bury(self, worker: Worker) -> str:
-        """Take leave of a worker that is dead, and say what it died of."""
+    def _remove(self, worker: Worker) -> str:
+        """Remove a dead worker, and return how it ended."""
         self._workers.remove(worker)
         worker.process.kill()
-        worker.bury()
-        self._stillborn = 0 if worker.heard else self._stillborn + 1
+        worker.clean_up()
+        self._failed_starts = 0 if worker.responded else self._failed_starts + 1
         code = worker.process.exitcode or 0
         if code >= 0:
             return f"ended with code {code}"
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-        return f"was killed ({name}{', for want of memory, perhaps' if -code == signal.SIGKILL else ''})"
+        return f"was killed ({name}{', maybe out of memory' if -code == signal.SIGKILL else ''})"
 
 
 @contextlib.contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """A process that is started in here never gets SIGINT and SIGTERM; this one gets them afterwards."""
+    """Block SIGINT and SIGTERM in processes started in the block; this process gets them afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return

@@ -1,9 +1,9 @@
-"""Tasks on a Ray cluster; an extra, ``pip install "warpsplat[ray]"``.
+"""Do tasks on a Ray cluster; an extra, ``pip install "warpsplat[ray]"``.
 
-Workers are actors: processes that the cluster starts where it has room, and that are kept, so that each
-starts Warp and loads kernels once; while they work they say how far they are, and hear that they should stop.
-They write no files: all results are brought. So a worker that the cluster has given up, but that lives on
-somewhere, can replace nothing.
+Workers are actors: processes that the cluster starts where it has free resources. They are kept, so that each
+loads Warp and the kernels once; they report progress and can be stopped while they work. They write no files
+but return their results, so that a worker that the cluster has given up, but that still runs, cannot replace
+anything.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from warpsplat.errors import ImageError, ResourceError, UsageError, printable
 log = logging.getLogger("warpsplat")
 
 GRACE = 10.0
-"""Seconds that tasks have to end after the word to stop: a step, and bringing the file."""
+"""Seconds for tasks to end once they are stopped: a step, and returning the file."""
 
-LOOK = 0.2
-"""Seconds between two questions whether to stop."""
+POLL_INTERVAL = 0.2
+"""Seconds between two checks whether to stop."""
 
 PAUSE = 1.0
-"""Seconds between two questions how far tasks are, and whether the cluster has room for more workers."""
+"""Seconds between two queries of progress, and of room for more workers."""
 
 PATIENCE = 20.0
-"""Seconds without any worker after which it is said what is waited for."""
+"""Seconds without any worker until a notice says what the batch waits for."""
 
 TRIES = 3
-"""Of a task whose worker is lost. Nodes of clusters go for reasons of their own: it need not be the image."""
+"""Attempts at a task whose worker is lost: nodes of clusters disappear for many reasons."""
 
-STILLBORN = 3
-"""After so many workers in a row that are lost before they say anything, no more are started."""
+MAX_FAILED_STARTS = 3
+"""After this many workers in a row that are lost before they respond, no more are started."""
 
 
 class RayCluster:
-    """An ``Executor``, see there; every result is brought, whatever its task says."""
+    """An ``Executor`` on a Ray cluster; all results are returned, none is written by a worker."""
 
     def __init__(self, address: str = "", *, workers: int | None = None, gpus: float = 1.0) -> None:
-        """Nothing is connected to before there is a task.
+        """Connect to nothing until there is a task.
 
         Args:
             address: of the cluster, as Ray has it: ``host:port`` on a machine that belongs to it,
@@ -72,22 +72,22 @@ class RayCluster:
         self._workers: list[Worker] = []
         self._connected = False
         self._connection = contextlib.ExitStack()
-        self._stillborn = 0
+        self._failed_starts = 0
         self._unseen: set[tuple[str, str]] = set()
         self._tries: Counter[int] = Counter()
         self._waiting: Iterator[Task] | None = None
         self._again: list[Task] = []
         self._met = 0
         self.lost = 0
-        """Workers that were lost with a task."""
+        """Number of workers that were lost with a task."""
 
     @property
     def workers(self) -> int:
-        """See ``Executor``: the most there were; before there are any, as many as were asked for."""
+        """See ``Executor``: the most there were; before there are any, the number requested."""
         return self._met or self._most or 1
 
     def __enter__(self) -> RayCluster:
-        """The cluster is connected to with the first task."""
+        """Return self; the first task connects to the cluster."""
         return self
 
     def __exit__(
@@ -96,7 +96,7 @@ class RayCluster:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """See ``Executor``. A cluster that was there before stays."""
+        """See ``Executor``. A cluster that existed before stays."""
         self._dismiss(self._workers)
         self._connected = False
         self._connection.close()
@@ -116,9 +116,9 @@ class RayCluster:
                 looked = now
                 for worker in self._busy():
                     worker.ask()
-                self._hire()
+                self._start_workers()
             if now - begun > PATIENCE:
-                self._complain()
+                self._warn_waiting()
                 begun = math.inf
             yield from self._listen(advance)
         yield from self._end_tasks(advance)
@@ -127,7 +127,7 @@ class RayCluster:
         return [worker for worker in self._workers if worker.task]
 
     def _next(self) -> Task | None:
-        """A task that nobody has; None if there is none left."""
+        """Return the next task without a worker; None if there is none left."""
         if self._again:
             return self._again.pop()
         task = next(self._waiting, None) if self._waiting else None
@@ -136,7 +136,7 @@ class RayCluster:
         return task
 
     def _give(self) -> Iterator[Outcome]:
-        """Hand tasks to those who have none; one task is waiting at most, for whoever is starting.
+        """Give tasks to idle workers; at most one task waits, for a worker that is starting.
 
         Yields:
             failures of images that cannot be read.
@@ -150,7 +150,7 @@ class RayCluster:
             worker = next((w for w in self._workers if w.idle and w.need == need), None)
             if worker is None:
                 self._again.append(task)
-                self._hire()
+                self._start_workers()
                 return
             try:
                 worker.give(task, self._unseen)
@@ -158,16 +158,16 @@ class RayCluster:
                 yield Outcome(task.number, "failed", error=failure(error, task.name))
 
     def _need(self, task: Task) -> Need:
-        """What a task takes: a GPU where it asks for one, or leaves it open and the cluster has any."""
+        """Return the needs of a task: a GPU if it asks for one, or does not say and the cluster has any."""
         auto = task.device == "auto" and any(found.get("GPU") for found in self._nodes())
         return Need(task.threads or 1, self._gpus if auto or task.device.startswith("cuda") else 0.0)
 
     def _nodes(self) -> list[dict[str, float]]:
-        """The resources of each node that lives."""
+        """Return the resources of each live node."""
         return [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
 
-    def _hire(self) -> None:
-        """Ask for as many workers as there is room for; those who wait for another kind of task make room."""
+    def _start_workers(self) -> None:
+        """Start as many workers as there is room for; end idle workers with other needs."""
         if not self._again and (not self._workers or any(worker.idle for worker in self._workers)):
             return
         need = self._need(self._again[-1]) if self._again else self._workers[-1].need
@@ -182,8 +182,8 @@ class RayCluster:
             worker.end()
             self._workers.remove(worker)
 
-    def _complain(self) -> None:
-        """Say so where no worker has come."""
+    def _warn_waiting(self) -> None:
+        """Warn if no worker has started yet."""
         if any(worker.node for worker in self._workers):
             return
         found = self._nodes()
@@ -195,26 +195,26 @@ class RayCluster:
         )
 
     def _listen(self, advance: Advance) -> Iterator[Outcome]:
-        """What workers have to say, for a moment."""
+        """Wait a moment for answers of workers, and handle them."""
         answers = {worker.answer: worker for worker in self._workers if worker.answer is not None}
         parts = {worker.part: worker for worker in self._workers if worker.part is not None}
         asked = [*answers, *parts]
-        ready, _ = self._ray.wait(asked, num_returns=1, timeout=LOOK) if asked else ([], [])
+        ready, _ = self._ray.wait(asked, num_returns=1, timeout=POLL_INTERVAL) if asked else ([], [])
         for reference in ready:
             if reference in parts:
                 worker = parts[reference]
                 worker.part = None
-                with contextlib.suppress(self._ray.exceptions.RayError):  # its task will say so
+                with contextlib.suppress(self._ray.exceptions.RayError):  # its task will fail too
                     done = self._ray.get(reference)
                     if worker.task:
                         advance(worker.task.number, done)
             else:
-                outcome = self._heard(answers[reference])
+                outcome = self._take_answer(answers[reference])
                 if outcome:
                     yield outcome
 
-    def _heard(self, worker: Worker) -> Outcome | None:
-        """Take what a worker answered."""
+    def _take_answer(self, worker: Worker) -> Outcome | None:
+        """Handle the answer of a worker."""
         answer, task = worker.answer, worker.task
         worker.answer = worker.task = worker.part = None
         try:
@@ -222,12 +222,12 @@ class RayCluster:
         except self._ray.exceptions.RayError as error:
             self._dismiss([worker])
             if task:
-                return self._mourned(worker, task, error)
-            self._stillbirth(error)
+                return self._retry_or_fail(worker, task, error)
+            self._start_failed(error)
             return None
-        self._stillborn = 0
+        self._failed_starts = 0
         if task is None:
-            self._greeted(worker, said)
+            self._check_version(worker, said)
         elif isinstance(said, Outcome):
             return said
         else:
@@ -235,7 +235,7 @@ class RayCluster:
             self._again.append(task)
         return None
 
-    def _greeted(self, worker: Worker, said: tuple[str, str]) -> None:
+    def _check_version(self, worker: Worker, said: tuple[str, str]) -> None:
         version, worker.node = said
         self._met = max(self._met, sum(bool(other.node) for other in self._workers))
         if version != __version__:
@@ -244,18 +244,18 @@ class RayCluster:
                 f"here it is {__version__}: results would differ; install one version on all"
             )
 
-    def _stillbirth(self, error: BaseException) -> None:
+    def _start_failed(self, error: BaseException) -> None:
         cause = cause_of(error)
-        self._stillborn += 1
+        self._failed_starts += 1
         if "No module named" in str(error):
             raise UsageError(
                 f"a node of the Ray cluster lacks a package: {cause}; warpsplat has to be on each"
             )
-        if self._stillborn >= STILLBORN:
+        if self._failed_starts >= MAX_FAILED_STARTS:
             raise ResourceError(f"workers of the Ray cluster end as soon as they begin: {cause}")
 
-    def _mourned(self, worker: Worker, task: Task, error: BaseException) -> Outcome | None:
-        """What becomes of a task whose worker is lost."""
+    def _retry_or_fail(self, worker: Worker, task: Task, error: BaseException) -> Outcome | None:
+        """Queue the task of a lost worker again; after ``TRIES`` return a failure."""
         self.lost += 1
         self._tries[task.number] += 1
         name, node = printable(task.name), printable(worker.node)
@@ -267,7 +267,7 @@ class RayCluster:
         return None
 
     def _end_tasks(self, advance: Advance) -> Iterator[Outcome]:
-        """End the tasks that are in work: with the best so far, where that comes soon."""
+        """End the current tasks, with the best so far if that comes in time."""
         for worker in self._busy():
             worker.stop()
         late = time.monotonic() + GRACE

@@ -1,4 +1,4 @@
-"""A process of a Ray cluster that does tasks for ``ray.RayCluster``. Ray itself is not imported here."""
+"""Do tasks for ``ray.RayCluster`` in a process of the cluster. Ray itself is not imported here."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from warpsplat.batch.executors.tasks import Outcome, Task
 
 
 class Sight(NamedTuple):
-    """A file as it is seen by one machine; another one that sees the same, sees the same file."""
+    """A file as one machine sees it; a machine with an equal view sees the same file."""
 
     path: str
     size: int
     modified: int
-    """Whole seconds: file systems keep more, or less, of it."""
+    """In whole seconds: file systems differ in precision."""
 
     @staticmethod
     def of(path: str) -> Sight | None:
-        """A file as this machine sees it; None if it does not."""
+        """Return a file as this machine sees it; None if it does not."""
         try:
             found = os.stat(path)
         except OSError:
@@ -30,31 +30,31 @@ class Sight(NamedTuple):
 
 
 class Actor:
-    """Does a task in one thread, and answers in another one meanwhile."""
+    """Does a task in one thread, and answers in another meanwhile."""
 
     def __init__(self) -> None:
         self._stop = threading.Event()
         self._done = 0.0
 
     def hello(self) -> tuple[str, str]:
-        """The version of the package, and the node. Of plain types: another version has to understand it."""
+        """Return the version of the package and the node, as plain types that any version understands."""
         return __version__, platform.node()
 
     def do(self, task: Task, sights: tuple[Sight, ...]) -> Outcome | tuple[str, ...]:
         """Do a task.
 
         Args:
-            task: with paths of files that ``sights`` are of.
-            sights: files as they are seen where the task comes from.
+            task: with the paths of the files of ``sights``.
+            sights: files as the task's origin sees them.
 
         Returns:
-            what became of it; or nothing was done, and these files are not seen here.
+            the outcome; or the files that are not seen here, and nothing was done.
         """
         unseen = tuple(sight.path for sight in sights if Sight.of(sight.path) != sight)
         if unseen:
             return unseen
         from warpsplat.batch.executors.work import do
-        from warpsplat.fit.progress import Progress  # in here, as all that is heavy: hello is quick
+        from warpsplat.fit.progress import Progress  # here, so that hello is quick
 
         self._stop.clear()
         self._done = 0.0
@@ -65,9 +65,9 @@ class Actor:
         return do(task, self._stop.is_set, on_progress)
 
     def stop(self) -> None:
-        """End the task in work, with the best so far."""
+        """End the current task, with the best so far."""
         self._stop.set()
 
     def done(self) -> float:
-        """Which part of the task in work is done."""
+        """Return the fraction of the current task that is done."""
         return self._done

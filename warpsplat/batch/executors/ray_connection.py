@@ -1,4 +1,4 @@
-"""The connection to a Ray cluster, or one of this machine alone, which lasts as long as the connection."""
+"""Connect to a Ray cluster, or start one on this machine for the time of the connection."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from warpsplat.errors import UsageError, printable
 
 STORE = 200_000_000
-"""Memory for what is on its way between processes, in a cluster of this machine alone [bytes]."""
+"""Memory for data between processes, in a cluster on this machine [bytes]."""
 
 WAIT = 5.0
 """Seconds for a cluster to answer."""
@@ -23,7 +23,7 @@ WAIT = 5.0
 
 @contextlib.contextmanager
 def connected(ray: ModuleType, address: str) -> Iterator[None]:
-    """Connect to a cluster for a block; a connection that this process has already is used, and kept.
+    """Connect to a cluster for a block; an existing connection of this process is used and kept.
 
     Args:
         ray: the package.
@@ -35,7 +35,7 @@ def connected(ray: ModuleType, address: str) -> Iterator[None]:
     if ray.is_initialized():
         yield
         return
-    with _hushed():
+    with _quiet():
         with _handlers_kept():
             _connect(ray, address)
         try:
@@ -59,7 +59,7 @@ def _connect(ray: ModuleType, address: str) -> None:
 
 
 def _here() -> str:
-    """The address of the cluster that this machine belongs to, or did; ``auto``: Ray shall look for one."""
+    """Return the address of the cluster that this machine belongs to, or ``auto``: Ray searches."""
     try:
         services: Any = importlib.import_module("ray._private.services")
         found: str = services.get_ray_address_from_environment("auto", None)
@@ -69,7 +69,7 @@ def _here() -> str:
 
 
 def _answers(address: str) -> bool:
-    """Whether somebody listens at ``host:port``; True for an address of another form."""
+    """Return whether a server listens at ``host:port``; True for other forms of addresses."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host or not port.isdigit():
         return True
@@ -91,16 +91,14 @@ def _init(ray: ModuleType, address: str) -> None:
 
 
 def cause_of(error: BaseException) -> str:
-    """What Ray says, in one line: the last error that its text holds, or its first line."""
+    """Return the last error in the text of Ray's exception, or its first line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
     return printable(next((line for line in reversed(lines) if "Error: " in line), lines[0]))
 
 
 @contextlib.contextmanager
-def _hushed() -> Iterator[None]:
-    """Ray says less: what it thinks of lost workers it prints to the standard output, where results may go.
-    It has no switch for that.
-    """
+def _quiet() -> Iterator[None]:
+    """Keep Ray from printing about lost workers to stdout, for which it has no option."""
     log = logging.getLogger("ray")
     with contextlib.ExitStack() as stack:
         stack.callback(log.setLevel, log.level)
@@ -114,11 +112,11 @@ def _hushed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _handlers_kept() -> Iterator[None]:
-    """Signals are answered after the block as they were before: Ray takes SIGTERM for itself."""
+    """Restore the signal handlers after the block: Ray replaces SIGTERM's."""
     kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        with contextlib.suppress(ValueError):  # not the main thread: nobody could take any
+        with contextlib.suppress(ValueError):  # not the main thread, which has none
             for number, handler in kept.items():
                 signal.signal(number, handler)

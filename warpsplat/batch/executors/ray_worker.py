@@ -1,4 +1,4 @@
-"""A worker of a Ray cluster as its parent knows it."""
+"""A worker of a Ray cluster, as seen by its parent."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from warpsplat.batch.executors.work import read
 
 
 class Need(NamedTuple):
-    """What a task takes of a node while it is done."""
+    """Resources of a node that a task uses."""
 
     cpus: int
     gpus: float
 
     def __str__(self) -> str:
-        """For messages."""
+        """Return the flags that give it, for messages."""
         return f"--threads {self.cpus}" + (f" and --gpus {self.gpus:g}" if self.gpus else "")
 
     def fit(self, resources: Mapping[str, float]) -> int:
-        """How many such tasks a node with ``resources`` has room for."""
+        """Return how many such tasks fit on a node with ``resources``."""
         count = resources.get("CPU", 0.0) // self.cpus
         if self.gpus:
             # Ray never cuts a task's part out of two GPUs.
@@ -35,32 +35,32 @@ class Need(NamedTuple):
 
 
 class Worker:
-    """An actor, the task that it has, and what it was asked."""
+    """An actor, its current task, and pending queries."""
 
     def __init__(self, ray: ModuleType, need: Need) -> None:
         self._ray = ray
         self.need = need
         self.node = ""
-        """Where it is; empty until it has said so."""
+        """Its node; empty until it answered."""
         self.task: Task | None = None
         options = {"num_cpus": need.cpus, "num_gpus": need.gpus, "max_concurrency": 2, "max_restarts": 0}
         self._actor = ray.remote(Actor).options(**options).remote()
         self.answer: Any = self._actor.hello.remote()
-        """To hello, or to the task; None: it waits for a task."""
+        """Answer to hello or to the task; None: it is idle."""
         self.part: Any = None
-        """Answer to the question how far the task is."""
+        """Answer to the query of progress."""
 
     @property
     def idle(self) -> bool:
-        """Whether a task can be given to it."""
+        """Return whether it can take a task."""
         return self.answer is None
 
     def give(self, task: Task, unseen: set[tuple[str, str]]) -> None:
-        """Hand it a task, with paths of the files that its node sees, and the bytes of others.
+        """Send it a task, with the paths of files that its node sees, and the bytes of others.
 
         Args:
             task: what to do.
-            unseen: nodes, and folders that they do not see.
+            unseen: pairs of a node and a folder that it does not see.
 
         Raises:
             ImageError: a file that it does not see cannot be read here either.
@@ -80,9 +80,7 @@ class Worker:
             task,
             image=sent(task.image),
             mask=None if task.mask is None else sent(task.mask),
-            device="cuda:0"
-            if self.need.gpus
-            else "cpu",  # Ray shows a process the GPUs that it may use, no more
+            device="cuda:0" if self.need.gpus else "cpu",  # Ray shows a process only its own GPUs
             threads=self.need.cpus,
             result=sent(task.output) if task.measure else None,
             bring=True,
@@ -91,14 +89,14 @@ class Worker:
         self.task = task
 
     def ask(self) -> None:
-        """Ask how far it is."""
+        """Query its progress."""
         self.part = self.part or self._actor.done.remote()
 
     def stop(self) -> None:
-        """Have its task ended, with the best so far."""
+        """End its task, with the best so far."""
         self._actor.stop.remote()
 
     def end(self) -> None:
-        """End its process, at once."""
+        """Kill its process."""
         with contextlib.suppress(Exception):  # of a cluster that is gone
             self._ray.kill(self._actor)

@@ -1,4 +1,4 @@
-"""One task after the other, in this process."""
+"""Do one task after the other, in this process."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from warpsplat.fit.progress import Progress
 
 
 class Serial:
-    """An ``Executor``, see there."""
+    """An ``Executor`` in this process."""
 
     workers = 1
 
     def __init__(
         self, around: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext
     ) -> None:
-        """``around``: a block in which each task is done."""
+        """``around``: context manager for each task."""
         self._around = around
 
     def __enter__(self) -> Serial:
-        """There is nothing to begin."""
+        """Return self."""
         return self
 
     def __exit__(
@@ -32,7 +32,7 @@ class Serial:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """There is nothing to end."""
+        """Do nothing."""
 
     def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
         """See ``Executor``."""

@@ -1,4 +1,4 @@
-"""How many processes a batch has, and how many threads each."""
+"""Choose the processes of a batch, and the threads of each."""
 
 from __future__ import annotations
 
@@ -8,26 +8,25 @@ from warpsplat.fit.settings import Settings
 from warpsplat.native import available_cores, free_memory
 
 WORTH = 400_000
-"""Shapes times steps of a batch from which processes save more than the seconds that they take to start."""
+"""Shapes times steps of a batch above which several processes save more time than they take to start."""
 
 MEMORY = 1 << 30
-"""What a process has room for, where their number is not given [bytes]: an image of 10 million pixels."""
+"""Memory to allow for a process [bytes]: an image of 10 million pixels."""
 
 
 def divided(
     settings: Iterable[Settings], workers: int | None, threads: int | None, *, on_cpu: bool
 ) -> tuple[int, int | None]:
-    """Workers, and threads of each.
+    """Return the number of workers, and the threads of each.
 
-    A process a core, each with one thread, does more than one process with all threads: what is not split
-    among threads (reading, scoring, writing, surgery) is done at the same time as well. On a GPU they would
-    share the one device.
+    One process a core with one thread each is faster than one process with all threads, because what has a
+    single thread (reading, scoring, writing, surgery) is parallel too. On a GPU they would share one device.
 
     Args:
         settings: of each image.
         workers: as given; None: chosen.
         threads: as given; None: the cores are shared.
-        on_cpu: whether that is where images are done.
+        on_cpu: whether images are done on the CPU.
     """
     cores = available_cores()
     if workers is None:

@@ -1,4 +1,4 @@
-"""What executors are given and give back."""
+"""Tasks and outcomes of executors."""
 
 from __future__ import annotations
 
@@ -10,90 +10,88 @@ from typing import Any, Literal, Protocol
 from warpsplat.fit.settings import Settings
 
 Source = str | bytes
-"""Where an image is, or its bytes."""
+"""Path of a file, or its bytes."""
 
 Stop = Callable[[], bool]
-"""Whether work should end; it is asked often, from the thread that runs the executor."""
+"""Returns whether to stop; called often, from the thread that runs the executor."""
 
 Advance = Callable[[int, float], None]
-"""Told the number of a task and which part of it is done."""
+"""Called with the number of a task and the fraction of it that is done."""
 
 
 @dataclass(frozen=True)
-class ReportWish:
-    """What a report says besides what its task says."""
+class ReportRequest:
+    """Contents of a report that are not in its task."""
 
     back: str
-    """Where its link to the index leads, a relative path."""
+    """Relative path of its link to the index."""
     figures: Mapping[str, Any] = field(default_factory=dict)
-    """Of a result that was made earlier, what is known of it."""
+    """Known figures of an earlier result."""
 
 
 @dataclass(frozen=True)
 class Task:
     """An image to vectorize, or a result to measure.
 
-    What a worker needs is in here: paths where it sees the files, bytes where it does not.
+    It has all a worker needs: paths of files that it sees, bytes of others.
     """
 
     number: int
-    """Names the task: its outcome has the same number."""
+    """Identifies the task; its outcome has the same number."""
     image: Source
     name: str
-    """How messages call the image."""
+    """Name of the image in messages."""
     output: str
-    """The result. Its ending says whether it is gzipped, also where it is not written."""
+    """Path of the result, whose ending gives its format even if the worker does not write it."""
     settings: Settings
     device: str = "auto"
     threads: int | None = None
-    """Of a CPU; None: all cores."""
+    """CPU threads; None: all cores."""
     mask: Source | None = None
-    """How much the error of a pixel counts."""
+    """Importance of pixels."""
     bring: bool = False
-    """Whether the worker brings the result's bytes (``Outcome.data``) instead of writing ``output``."""
+    """Whether the worker returns the result's bytes (``Outcome.data``) instead of writing ``output``."""
     measure: bool = False
-    """Whether ``output`` is there already, and only its figures are wanted."""
+    """Whether ``output`` exists, and only its figures are wanted."""
     result: Source | None = None
-    """What is to be measured, where the worker does not see ``output``."""
-    report: ReportWish | None = None
-    """The report that is to be brought along; None: none."""
+    """The result to measure, if the worker does not see ``output``."""
+    report: ReportRequest | None = None
+    """The report to make as well, if any."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task."""
+    """Outcome of a task."""
 
     number: int
-    """Of the task."""
+    """Number of the task."""
     status: Literal["made", "measured", "stopped", "failed"]
     """``stopped``: ended by ``stop``, with a file of the best so far, or none, where ``digest`` is empty."""
     key: str = ""
-    """Of the result, see ``vectorize.job_key``; empty where the image could not be read."""
+    """Key of the result, see ``keys.job_key``; empty if the image could not be read."""
     digest: str = ""
     """SHA-256 of the result's bytes, hexadecimal."""
     data: bytes | None = field(default=None, repr=False)
-    """The result's bytes, where they were to be brought."""
+    """The result's bytes, if they were requested."""
     figures: dict[str, Any] = field(default_factory=dict)
     """See ``vectorize.Result.as_dict``; of a task that measured, what was measured of those."""
     error: str = ""
     """One line that names the image, of a task that failed."""
     report: str = field(default="", repr=False)
-    """The page, where one was asked for and could be made."""
+    """The page, if requested and made."""
     report_error: str = ""
-    """One line on why it could not."""
+    """Why it could not be made."""
 
 
 class Executor(Protocol):
-    """Does tasks. A context manager: what it holds (processes, connections) is gone after its block, whatever
-    ended that, and so are the tasks that were in work.
-    """
+    """Does tasks. A context manager: its processes, connections and current tasks end with the block."""
 
     @property
     def workers(self) -> int:
-        """How many tasks it does at the same time; for messages."""
+        """Number of tasks at the same time, for messages."""
 
     def __enter__(self) -> Executor:
-        """Begin. Nothing is started before there is a task."""
+        """Return self; nothing starts before there is a task."""
 
     def __exit__(
         self,
@@ -110,9 +108,8 @@ class Executor(Protocol):
 
         * ``tasks`` is taken from only when a worker is free, or soon will be: taking a task claims it, and
           reads its image, so that no more are claimed than are in work (back-pressure).
-        * Whatever an image throws is its own outcome, ``failed``. A worker that is lost costs its task
-          another try, and after a few a ``failed`` outcome, never the batch.
-        * Once ``stop`` says so, no further task is taken; those in work end soon, as ``stopped`` or as they
-          would have.
-        * ``advance`` is told how far tasks are, now and then, where that is known.
+        * An error of an image is its outcome, ``failed``. The task of a lost worker is tried again, and fails
+          after a few attempts; the batch goes on.
+        * Once ``stop`` returns true, no further task is taken; current ones end soon, as ``stopped`` or done.
+        * ``advance`` is called now and then with the progress of tasks, if it is known.
         """

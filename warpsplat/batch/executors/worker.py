@@ -1,7 +1,7 @@
-"""A process of ``pool.Pool``: does the tasks that come through its channel, and never outlives its parent.
+"""A process of ``pool.Pool``: does the tasks from its channel, and never outlives its parent.
 
-The parent blocked SIGINT and SIGTERM before it started this process, so that Ctrl-C in a terminal, which goes
-to all processes there, is the parent's to answer.
+The parent blocked SIGINT and SIGTERM before it started this process, so that only the parent handles Ctrl-C,
+which a terminal sends to all processes.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from typing import NamedTuple
 from warpsplat.batch.executors.tasks import Task
 
 STOP = "stop"
-"""Said by the parent: end the task in work, with the best so far."""
+"""Message of the parent: end the current task, with the best so far."""
 
 PAUSE = 0.2
-"""Seconds between two messages on how far a task is."""
+"""Seconds between two messages of progress."""
 
 
 class Part(NamedTuple):
-    """Which part of a task is done; the first one says that there is something to save."""
+    """Progress of a task; after the first one there is a result to save."""
 
     number: int
     done: float
 
 
 class Notice(NamedTuple):
-    """What a library logged."""
+    """A message that a library logged."""
 
     level: int
     text: str
 
 
 class _Notices(logging.Handler):
-    """Sends notices to the parent, which shows them as its own."""
+    """Sends notices to the parent, which prints them."""
 
     def __init__(self, channel: Connection) -> None:
         super().__init__()
@@ -52,13 +52,13 @@ class _Notices(logging.Handler):
 
 
 def main(channel: Connection, parent: int, level: int, workers: int) -> None:
-    """Do tasks until None comes, or nobody is left to send it.
+    """Do tasks until None comes or the parent is gone.
 
     Args:
         channel: to the parent.
         parent: its process number.
-        level: of the notices that it shows.
-        workers: how many share the machine, this one counted.
+        level: level of notices to send.
+        workers: how many share the machine, including this one.
     """
     _end_with(parent)
     log = logging.getLogger("warpsplat")
@@ -69,19 +69,17 @@ def main(channel: Connection, parent: int, level: int, workers: int) -> None:
         task = _received(channel)
         if task is None:
             return
-        if isinstance(task, Task):  # a word to stop that came too late is none
+        if isinstance(task, Task):  # ignore a late message to stop
             _serve(channel, task, workers)
 
 
 def _serve(channel: Connection, task: Task, workers: int) -> None:
     from warpsplat.batch.executors.work import do
-    from warpsplat.fit.progress import (
-        Progress,
-    )  # in here, as all that is heavy: the process must first be safe
+    from warpsplat.fit.progress import Progress  # heavy imports come after the set-up above
     from warpsplat.run.memory import share_machine
 
     share_machine(workers)
-    stopped, begun, told = False, False, 0.0
+    stopped, begun, reported = False, False, 0.0
 
     def stop() -> bool:
         nonlocal stopped, begun
@@ -93,17 +91,17 @@ def _serve(channel: Connection, task: Task, workers: int) -> None:
         return stopped
 
     def on_progress(progress: Progress) -> None:
-        nonlocal told
+        nonlocal reported
         now = time.monotonic()
-        if now - told > PAUSE:
-            told = now
+        if now - reported > PAUSE:
+            reported = now
             channel.send(Part(task.number, progress.work))
 
     channel.send(do(task, stop, on_progress))
 
 
 def _received(channel: Connection) -> object:
-    """The next message; without a parent the process ends here, before it writes any more."""
+    """Return the next message; exit if the parent is gone."""
     try:
         return channel.recv()
     except (EOFError, OSError):
@@ -111,7 +109,7 @@ def _received(channel: Connection) -> object:
 
 
 def _end_with(parent: int) -> None:
-    """Have the system kill this process as soon as its parent is dead, where it can do that (Linux)."""
+    """Let the system kill this process as soon as its parent dies (Linux only)."""
     if sys.platform == "linux":
         set_death_signal = 1
         ctypes.CDLL(None).prctl(set_death_signal, signal.SIGKILL)

@@ -1,1 +1,1 @@
-"""Pictures in terminals."""
+"""Show images in terminals."""

@@ -1,4 +1,4 @@
-"""Pictures of half blocks: two pixels a character, the upper one its colour, the lower one its ground."""
+"""Draw images with half blocks: two pixels a character, as foreground and background colours."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FIRST = 16
 
 
 def half_blocks(image: Bytes, *, true_color: bool) -> list[str]:
-    """Lines of a picture.
+    """Return the lines of an image.
 
     Args:
         image: sRGB, shape (2 lines, columns, 3), uint8.
@@ -41,7 +41,7 @@ def half_blocks(image: Bytes, *, true_color: bool) -> list[str]:
 
 
 def _line(upper: list[str], lower: list[str]) -> str:
-    """Colours are said where they change."""
+    """Write the codes of colours where they change."""
     parts, before = [], ("", "")
     for now in zip(upper, lower, strict=True):
         said = [
@@ -53,8 +53,9 @@ def _line(upper: list[str], lower: list[str]) -> str:
 
 
 def _numbers(image: Bytes) -> npt.NDArray[np.int64]:
-    """The nearest of xterm's colours to each pixel as eyes see them, shape (height, width). They are too far
-    apart to be mixed: dithering shows as grain.
+    """Return the perceptually nearest of xterm's colours for each pixel, shape (height, width).
+
+    Without dithering, which would show as grain.
     """
     colors = np.array([*itertools.product(CUBE, repeat=3), *((grey,) * 3 for grey in GREYS)], np.uint8)
     pixels, known = _lab(image.reshape(-1, 3)), _lab(colors)
@@ -64,5 +65,5 @@ def _numbers(image: Bytes) -> npt.NDArray[np.int64]:
 
 
 def _lab(colors: Bytes) -> npt.NDArray[np.float32]:
-    """sRGB, shape (color, 3), as CIE L*a*b*, in which distances are what eyes see."""
+    """Convert sRGB, shape (color, 3), to CIE L*a*b*, where distances are perceptual."""
     return cv2.cvtColor(colors[None].astype(np.float32) / 255, cv2.COLOR_RGB2LAB)[0]

@@ -1,4 +1,4 @@
-"""What a terminal can show: by the environment, and by its own answer where that is safe to ask for."""
+"""Detect what a terminal can show, from the environment and, if that is safe, by asking it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from typing import IO, Literal
 
 Protocol = Literal["kitty", "iterm", "sixel", "blocks"]
-"""How pictures are shown: kitty's graphics, iTerm2's inline images, sixels, half blocks of characters."""
+"""Ways to show images: kitty's graphics, iTerm2's inline images, sixels, half blocks."""
 
 CELL = (10, 20)
-"""Of a character, where the terminal does not say [px]."""
+"""Default size of a character [px]."""
 
 SCREEN = (80, 24)
-"""Columns and lines of what is no terminal."""
+"""Columns and lines if the stream is no terminal."""
 
 PROGRAMS: dict[str, Protocol] = {
     "iterm.app": "iterm",
@@ -28,7 +28,7 @@ PROGRAMS: dict[str, Protocol] = {
     "ghostty": "kitty",
     "kitty": "kitty",
 }
-"""By TERM_PROGRAM."""
+"""Protocol by TERM_PROGRAM."""
 
 TERMS: dict[str, Protocol] = {
     "xterm-kitty": "kitty",
@@ -36,27 +36,27 @@ TERMS: dict[str, Protocol] = {
     "foot": "sixel",
     "mlterm": "sixel",
 }
-"""By TERM; it is what a remote shell is told."""
+"""Protocol by TERM, which remote shells get too."""
 
 MULTIPLEXERS = ("screen", "tmux")
-"""Beginnings of TERM in programs that draw the screen themselves, and know characters only."""
+"""Prefixes of TERM in multiplexers, which only pass characters."""
 
 
 @dataclass(frozen=True)
 class Terminal:
-    """What there is to draw on."""
+    """A terminal to draw on."""
 
     protocol: Protocol
     columns: int
     lines: int
     cell: tuple[int, int] = CELL
-    """Of a character [px]."""
+    """Size of a character [px]."""
     true_color: bool = True
-    """Whether characters have colours of 24 bits."""
+    """Whether it has 24-bit colours."""
     live: bool = True
-    """Whether it is a terminal, on which pictures can be drawn over earlier ones."""
+    """Whether it is a terminal, where images can replace earlier ones."""
     tmux: bool = False
-    """Whether what it shows goes through tmux, which lets through what is packed for it."""
+    """Whether tmux is in between, which passes wrapped sequences on."""
 
 
 def terminal(
@@ -65,7 +65,7 @@ def terminal(
     environ: Mapping[str, str] = os.environ,
     ask: Callable[[], str] | None = None,
 ) -> Terminal | None:
-    """What pictures are drawn with on ``stream``, or None where nothing can show any.
+    """Return the terminal of ``stream``, or None if it cannot show images.
 
     Args:
         stream: to draw on.
@@ -102,7 +102,7 @@ def terminal(
 
 
 def measured(found: Terminal, stream: IO[str], environ: Mapping[str, str] = os.environ) -> Terminal:
-    """A terminal as large as it is now."""
+    """Return a terminal with its current size."""
     columns, lines, width, height = _size(stream, environ)
     return replace(
         found, columns=columns, lines=lines, cell=(width, height) if width and height else found.cell
@@ -124,7 +124,7 @@ def _true_color(environ: Mapping[str, str], term: str) -> bool:
 
 
 def _size(stream: IO[str], environ: Mapping[str, str]) -> tuple[int, int, int, int]:
-    """Columns, lines, and the size of a character [px] or zeros."""
+    """Return columns, lines, and the size of a character [px] or zeros."""
     with contextlib.suppress(OSError, ValueError, ImportError):
         import fcntl
         import termios
@@ -147,18 +147,18 @@ def _size(stream: IO[str], environ: Mapping[str, str]) -> tuple[int, int, int, i
 # The terminal's own answer.
 
 ASK = "\x1b[16t\x1b[c"
-"""For the size of a character, which some tell, and then the attributes (DA1), which all do."""
+"""Queries of the character size, which some terminals answer, and of the attributes (DA1), which all do."""
 
 ATTRIBUTES = re.compile(r"\x1b\[\?[\d;]*c")
 SIXEL = re.compile(r"\x1b\[\?(?:\d+;)*4(?:;\d+)*c")
 CELL_SIZE = re.compile(r"\x1b\[6;([1-9]\d{0,3});([1-9]\d{0,3})t")
 
 PATIENCE = 1.0
-"""For the answer [s]: one that comes later would be taken for typed input."""
+"""Time to wait for the answer [s]; a later one would count as typed input."""
 
 
 def attributes() -> str:
-    """The answers of the process's terminal; empty where there is none, or none that this process may ask."""
+    """Return the answers of the controlling terminal; empty if there is none or it must not be asked."""
     try:
         import termios
 
@@ -183,7 +183,7 @@ def attributes() -> str:
 
 
 def _answer(handle: int) -> str:
-    """What comes up to the attributes, within ``PATIENCE``."""
+    """Return the input up to the attributes, within ``PATIENCE``."""
     text, end = "", time.monotonic() + PATIENCE
     while not ATTRIBUTES.search(text) and (left := end - time.monotonic()) > 0:
         if not select.select([handle], [], [], left)[0]:

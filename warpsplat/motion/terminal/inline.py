@@ -1,4 +1,4 @@
-"""Pictures as files between the characters: kitty's graphics protocol, and iTerm2's inline images."""
+"""Inline images: kitty's graphics protocol and iTerm2's."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import io
 from PIL import Image
 
 CHUNK = 4096
-"""Characters of base64 that kitty takes at a time."""
+"""Maximum base64 characters in a kitty sequence."""
 
 
 def kitty(picture: Image.Image, columns: int, rows: int, name: int) -> str:
-    """A picture drawn from the cursor on, which stays where it is.
+    """Return an image drawn at the cursor, which does not move.
 
     Args:
         picture: to draw.
@@ -31,7 +31,7 @@ def kitty(picture: Image.Image, columns: int, rows: int, name: int) -> str:
 
 
 def iterm(picture: Image.Image, columns: int, rows: int) -> str:
-    """A picture drawn from the cursor on, ``columns`` wide and ``rows`` high."""
+    """Return an image drawn at the cursor, ``columns`` wide and ``rows`` high."""
     data = png(picture)
     size = f"size={len(data)};width={columns};height={rows}"
     text = base64.b64encode(data).decode("ascii")
@@ -39,7 +39,7 @@ def iterm(picture: Image.Image, columns: int, rows: int) -> str:
 
 
 def png(picture: Image.Image) -> bytes:
-    """Packed quickly rather than well."""
+    """Encode a PNG quickly."""
     packed = io.BytesIO()
     picture.save(packed, "PNG", compress_level=1)
     return packed.getvalue()

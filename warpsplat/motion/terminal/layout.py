@@ -1,4 +1,4 @@
-"""How large a picture is on a terminal, and what draws it there."""
+"""Fit images to a terminal, and draw them."""
 
 from __future__ import annotations
 
@@ -16,38 +16,38 @@ from warpsplat.motion.terminal.sixel import sixels
 from warpsplat.scene import FloatArray
 
 MOST_ROWS = 32
-"""Of a picture."""
+"""Maximum rows of an image."""
 
 OTHER_LINES = 4
-"""Of the terminal, that stay free of it."""
+"""Lines of the terminal to leave free."""
 
 LARGEST_SIDE = 800
-"""Of a picture of pixels [px]."""
+"""Maximum side of an image of pixels [px]."""
 
 LEAST_COLUMNS, LEAST_LINES = 8, 7
-"""Of a terminal on which a picture shows anything."""
+"""Minimum size of a terminal."""
 
 GAP = 1
-"""Columns between two pictures."""
+"""Columns between two images."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Of one picture on a terminal."""
+    """Layout of an image."""
 
     columns: int
     rows: int
     cell: tuple[int, int]
-    """Of a character, in pixels of the picture."""
+    """Size of a character [pixels of the image]."""
 
     @property
     def pixels(self) -> tuple[int, int]:
-        """Width and height of the picture."""
+        """Width and height of the image."""
         return self.columns * self.cell[0], self.rows * self.cell[1]
 
 
 def place(terminal: Terminal, width: int, height: int) -> Place | None:
-    """Where a picture of ``width`` x ``height`` goes: as large as the terminal allows, in its proportions.
+    """Return the largest layout of an image of ``width`` x ``height`` in the terminal.
 
     None on a terminal that is too small.
     """
@@ -66,12 +66,12 @@ def place(terminal: Terminal, width: int, height: int) -> Place | None:
 
 
 def beside(terminal: Terminal, one: Place) -> bool:
-    """Whether a second picture fits beside the first one."""
+    """Return whether a second image fits beside the first one."""
     return 2 * one.columns + GAP < terminal.columns
 
 
 def resized(image: FloatArray, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
-    """A picture, premultiplied where it has opacity, on white, of ``size`` (width, height) and 8 bits."""
+    """Return an image, premultiplied if it has opacity, on white in 8 bits, at ``size`` (width, height)."""
     if image.shape[2] == 4:
         image = image[..., :3] + (1 - image[..., 3:])
     smaller = size[0] < image.shape[1]
@@ -84,7 +84,7 @@ def resized(image: FloatArray, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
 
 
 def joined(left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8], one: Place) -> npt.NDArray[np.uint8]:
-    """Two pictures side by side, with a black ``GAP`` between them."""
+    """Return two images side by side, with a black ``GAP``."""
     gap = np.zeros((left.shape[0], GAP * one.cell[0], 3), np.uint8)
     return np.concatenate([left, gap, right], axis=1)
 
@@ -92,7 +92,7 @@ def joined(left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8], one: Place
 def drawing(
     terminal: Terminal, pixels: npt.NDArray[np.uint8], one: Place, name: int, *, quick: bool = False
 ) -> str:
-    """What draws a picture, or two, from the cursor on, whose column is the first one.
+    """Return the sequence that draws an image, or two, at the cursor in the first column.
 
     Args:
         terminal: to draw on.
@@ -115,7 +115,7 @@ def drawing(
 
 
 def _packed(terminal: Terminal, text: str) -> str:
-    """As tmux lets it through."""
+    """Wrap a sequence for tmux."""
     if not terminal.tmux:
         return text
     return "\x1bPtmux;" + text.replace("\x1b", "\x1b\x1b") + "\x1b\\"

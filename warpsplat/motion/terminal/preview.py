@@ -1,4 +1,4 @@
-"""A run's picture on a terminal: drawn over while it trains, and at the end beside its source."""
+"""Preview a run on a terminal: redrawn during training, and at the end beside its source."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from warpsplat.motion.terminal.layout import Place, beside, drawing, joined, pla
 from warpsplat.scene import FloatArray
 
 SHARE = 0.05
-"""Of the time of a run that is spent on drawing it: the next drawing waits until the last one is no more."""
+"""Fraction of a run's time to spend on drawing."""
 
 SOONEST = 0.1
-"""Time between two drawings [s], at the least."""
+"""Minimum time between two drawings [s]."""
 
 FIRST_WAIT = 1.0
-"""Time from the first drawing to the second one [s], at the most: the first one takes longer than others."""
+"""Maximum time from the first drawing to the second [s], as the first one is slow."""
 
 SAVE, RESTORE = "\x1b7", "\x1b8"
-"""The cursor's place, and back to it."""
+"""Save and restore the cursor."""
 
 
 class Preview:
@@ -38,16 +38,16 @@ class Preview:
         look: Callable[[], Terminal],
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        """``look``: what there is to draw on now."""
+        """``look``: returns the terminal as it is now."""
         self._stream, self._look, self._clock = stream, look, clock
         self._terminal: Terminal | None = None
         self._place: Place | None = None
-        """Of the picture that is there; None: there is none."""
+        """Layout of the current image, if any."""
         self._next, self._cost = 0.0, math.inf
         self._name = 1 + secrets.randbelow(2**24 - 1)
 
     def report(self, progress: Progress) -> None:
-        """Draw the picture of a run's report, unless the last one was just before it."""
+        """Draw the image of a progress report, unless the last drawing was too recent."""
         begun = self._clock()
         if progress.snapshot is None or begun < self._next:
             return
@@ -60,11 +60,11 @@ class Preview:
         self._next = now + max(SOONEST, wait if before < math.inf else min(wait, FIRST_WAIT))
 
     def move_on(self) -> None:
-        """Leave the picture that is there: lines were written below it, and the next one goes below them."""
+        """Keep the current image and draw the next one below, as lines were printed in between."""
         self._place = None
 
     def finish(self, image: FloatArray, source: FloatArray | None) -> None:
-        """Draw the finished picture in the place of the last one, and its source before it if there is room.
+        """Draw the finished image in place of the last one, with its source beside it if there is room.
 
         Pictures have values in [0, 1] and shapes (height, width, 3), or (height, width, 4) premultiplied.
         """
@@ -92,7 +92,7 @@ class Preview:
         self._write(f"{begin}{SAVE}\r\x1b[{one.rows}A{text}{RESTORE}")
 
     def _write(self, text: str) -> None:
-        """A stream that takes no more is no reason to fail."""
+        """Write; errors of the stream are ignored."""
         with contextlib.suppress(OSError, ValueError):
             self._stream.write(text)
             self._stream.flush()

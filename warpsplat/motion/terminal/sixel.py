@@ -1,4 +1,4 @@
-"""Pictures of sixels, columns of six pixels (DEC, VT330/VT340 Programmer Reference, chapter 14)."""
+"""Draw images with sixels, columns of six pixels (DEC, VT330/VT340 Programmer Reference, chapter 14)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy.typing as npt
 from PIL import Image
 
 COLORS, FEW_COLORS = 256, 64
-"""Registers that terminals have; and those of a picture that is drawn quickly."""
+"""Colour registers of terminals, and those used for fast drawing."""
 
 EMPTY = 63
-"""The character of a column without a pixel; a pixel adds the bit of its row, the lowest for the top one."""
+"""Character of an empty column; a pixel adds the bit of its row, the lowest for the top one."""
 
 RUN = re.compile(r"(.)\1{3,}")
-"""Columns that a count makes shorter."""
+"""Repetitions that a count shortens."""
 
 
 def sixels(picture: Image.Image, *, quick: bool = False) -> str:
-    """An RGB picture as a terminal draws it from the cursor on, pixel for pixel."""
+    """Return an RGB image drawn at the cursor, pixel for pixel."""
     number, method = (FEW_COLORS, Image.Quantize.FASTOCTREE) if quick else (COLORS, Image.Quantize.MEDIANCUT)
     drawn = picture.quantize(number, method, dither=Image.Dither.NONE)
     width, height = drawn.size
@@ -34,7 +34,7 @@ def sixels(picture: Image.Image, *, quick: bool = False) -> str:
 
 
 def _band(indices: npt.NDArray[np.uint8]) -> str:
-    """Six rows: colour by colour, each from the left again."""
+    """Return six rows, colour by colour, each from the left."""
     used, lines = np.unique(indices, return_inverse=True)
     columns = np.arange(indices.shape[1])
     characters = np.full((len(used), len(columns)), EMPTY, np.uint8)
