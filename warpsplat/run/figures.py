@@ -6,6 +6,7 @@ import numpy as np
 
 from warpsplat.errors import Stopped
 from warpsplat.fit.export import export
+from warpsplat.fit.loop import Fit
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
@@ -93,6 +94,16 @@ def render_figures(
         levels = levels.reshape(height, scale, width, scale, 3).mean(axis=(1, 3), dtype=np.float32)
     wanted = np.round(255 * target)
     return psnr(levels, wanted), ssim(levels, wanted)
+
+
+def render_score(
+    made: Fit, target: FloatArray, settings: Settings, backend: Backend, reduction: Reduction | None
+) -> tuple[float, float | None]:
+    """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
+    small = not reduction and pixels_of(target) <= settings.fine_pixels
+    if settings.renderer == "gaussian" and small:
+        return render_figures(made.scene, target, settings, backend)
+    return made.render_psnr, None
 
 
 def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:

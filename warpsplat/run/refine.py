@@ -30,7 +30,7 @@ from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
 from warpsplat.run.svg import SvgSource, svg_name_of, text_of
-from warpsplat.run.vectorize import recorded, timed
+from warpsplat.run.tracking import recorded, timed
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
 from warpsplat.svg.read import load_scene
@@ -79,24 +79,24 @@ def refine(
         iterations: steps.
         keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
         name: how messages call the SVG.
-        time_budget: as for ``vectorize``, as is all that follows but for the memory.
+        time_budget: as for ``vectorize``.
         max_memory: bytes, or ``"4GB"``; without, what the machine has. An image that takes more is refused:
             whether a result is better is for all of its pixels to say.
-        precision: see there.
-        title: see there.
-        ids: see there.
-        minify: see there.
-        background: see there.
+        precision: as for ``vectorize``.
+        title: as for ``vectorize``.
+        ids: as for ``vectorize``.
+        minify: as for ``vectorize``.
+        background: as for ``vectorize``.
         settings: in place of all of them.
-        output: see there.
-        device: see there.
-        threads: see there.
-        callback: see there.
-        stop: see there.
-        checkpoint: see there.
-        resume: see there.
-        checkpoint_every: see there.
-        overwrite: see there.
+        output: as for ``vectorize``.
+        device: as for ``vectorize``.
+        threads: as for ``vectorize``.
+        callback: as for ``vectorize``.
+        stop: as for ``vectorize``.
+        checkpoint: as for ``vectorize``.
+        resume: as for ``vectorize``.
+        checkpoint_every: as for ``vectorize``.
+        overwrite: as for ``vectorize``.
 
     Returns:
         the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better

@@ -20,10 +20,10 @@ from warpsplat.rendering.renderer import render as render_scene
 from warpsplat.rendering.renderer import render_into
 from warpsplat.rendering.room import MOST_SIDE
 from warpsplat.run.backend import backend_on
-from warpsplat.run.svg import SvgSource, save_svg, svg_name_of, text_of
+from warpsplat.run.svg import SvgSource, save_svg, size_of, svg_name_of, text_of
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.chains import as_chains
-from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
+from warpsplat.svg.inspect import MAX_PIXELS
 from warpsplat.svg.read import scene_of
 from warpsplat.svg.structure import read_shapes
 from warpsplat.svg.viewer import premultiplied, render_svg
@@ -58,7 +58,7 @@ def render(
         scale: magnification, in place of both.
         renderer: ``exact`` coverage, ``splat`` or (scenes only) ``gaussian``; ``viewer`` is resvg.
         device: where to compute, see ``vectorize``.
-        threads: see there.
+        threads: as for ``vectorize``.
 
     Returns:
         sRGB in [0, 1] premultiplied by opacity, and opacity, shape (height, width, 4). ``to_pillow`` makes an
@@ -71,12 +71,10 @@ def render(
     """
     if not isinstance(scene, Scene):
         text = text_of(scene, svg_name_of(scene))
-        own = svg_size(inspect_svg(text).root)
-        if own is None:
-            raise ImageError(f"{svg_name_of(scene)}: says neither its size nor a viewBox")
+        own = size_of(text, svg_name_of(scene))
         zoom = _zoom(own, width, height, scale)
         with backend_on(device, threads) as backend:
-            return _with_opacity(drawn(text, renderer, zoom, backend))
+            return _with_opacity(_draw_svg(text, own, renderer, zoom, backend))
     size = (scene.canvas.width, scene.canvas.height)
     zoom = _zoom(size, width, height, scale)
     if renderer == "viewer":
@@ -110,18 +108,17 @@ def _with_opacity(image: npt.NDArray[np.float32]) -> FloatArray:
     return image if image.shape[2] == 4 else np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
 
 
-def drawn(text: str, renderer: RendererName, scale: float, backend: Backend) -> FloatArray:
-    """Draw the SVG ``text`` at the size that resvg gives it, as ``Renderer.read_image`` returns images.
+def _draw_svg(
+    text: str, size: tuple[float, float], renderer: RendererName, scale: float, backend: Backend
+) -> FloatArray:
+    """Draw an SVG of a ``size`` at the size that resvg gives it, as ``Renderer.read_image`` returns images.
 
     Raises:
-        ImageError: not an SVG, or with something that the model cannot show.
+        ImageError: an SVG with something that the model cannot show.
         UsageError: a scale that leaves no pixel or too many, or Gaussians, which no SVG holds.
     """
     if renderer == "gaussian":
         raise UsageError(NO_GAUSSIANS)
-    size = svg_size(inspect_svg(text).root)
-    if size is None:
-        raise ImageError("says neither its size nor a viewBox")
     check_scale(size, scale)
     if renderer == "viewer":
         return (premultiplied(render_svg(text, zoom=scale)) / 255).astype(np.float32)
@@ -172,14 +169,9 @@ def to_png(image: FloatArray) -> bytes:
 
 def to_pillow(image: FloatArray) -> Image.Image:
     """Convert what ``render`` returns to 8 bits: RGB if all is opaque, else RGBA with straight opacity."""
-    pixels = to_bytes(image)
-    opaque = (pixels[..., 3:] == 255).all()
-    return Image.fromarray(pixels[..., :3] if opaque else pixels)
-
-
-def to_bytes(image: FloatArray) -> npt.NDArray[np.uint8]:
-    """Return a rendered image in 8 bits, with straight opacity as in a PNG if it is transparent."""
     color, alpha = image[..., :3], image[..., 3:]
     if alpha.shape[2]:
         image = np.concatenate([np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0), alpha], 2)
-    return np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)
+    pixels = np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)
+    opaque = (pixels[..., 3:] == 255).all()
+    return Image.fromarray(pixels[..., :3] if opaque else pixels)

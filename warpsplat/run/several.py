@@ -86,10 +86,9 @@ def vectorize_several(
         importance: as for ``vectorize``.
         outputs: a file for each number, written as soon as it is made; missing folders are made.
         device: as for ``vectorize``.
-        threads: see there.
-        callback: see there; ``Progress.work`` is the share of all that is to be done. One that returns True
-            ends the run.
-        stop: see there.
+        threads: as for ``vectorize``.
+        callback: as for ``vectorize``; ``Progress.work`` is the share of the work for all numbers.
+        stop: as for ``vectorize``.
         ready: called with each result as soon as there is one.
         name: see ``vectorize``.
 

@@ -128,11 +128,11 @@ def suggest(
         image: as for ``vectorize``.
         settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
         importance: as for ``vectorize``, as is all that follows.
-        device: see there.
-        threads: see there.
-        callback: see there.
-        stop: see there.
-        name: see there.
+        device: as for ``vectorize``.
+        threads: as for ``vectorize``.
+        callback: as for ``vectorize``.
+        stop: as for ``vectorize``.
+        name: as for ``vectorize``.
 
     Returns:
         the number, the reason, and what it and others are expected to give at the default effort; None where
