@@ -28,7 +28,7 @@ from warpsplat.fit.constraints import Drawing, Joint
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.renderer import Capacity, Renderer, render
+from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
 from warpsplat.svg.read import load_scene
@@ -171,25 +171,14 @@ def test_errors_within_an_edit() -> None:
         assert sum_within(sums, cells_at(cells)) == pytest.approx(want)
 
 
-def test_a_drawing_like_the_last_one_needs_no_second_renderer(
-    device: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_drawing_like_the_last_one_fits_into_its_renderer(device: str) -> None:
     backend, made, target = Backend.on(device, 1), split(logo()), np.ones((64, 64, 3), np.float32)
     judge = Judge(target, backend)
-    built: list[Capacity] = []
-    build = Renderer._build
-
-    def counted(self: Renderer, capacity: Capacity) -> None:
-        built.append(capacity)
-        build(self, capacity)
-
-    monkeypatch.setattr(Renderer, "_build", counted)
     first = judge.errors(made)
-    before = len(built)
     np.testing.assert_array_equal(judge.errors(made), first)
     step = start(target, made, backend, Refinement(), capacity=judge.capacity)
     step.render()
-    assert len(built) == before + 2
+    assert step.renderer.capacity == judge.capacity
 
 
 def test_large_pictures_have_fewer_rounds() -> None:

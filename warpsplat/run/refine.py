@@ -139,6 +139,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
     """
     begun, history, stages = time.monotonic(), list[Progress](), run.stages
+    run = timed(recorded(run, history), problem.settings, problem.target)
     given, view = text, None
     if OUR_VIEW.match(text):
         view = picture_view(text, *problem.size)
@@ -148,7 +149,6 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     scene = base.scene
     before = score_svg(text, target, eyes=False)
     settings = _settings(problem.settings, len(scene))
-    run = timed(recorded(run, history), settings, target)
     made = fit(Problem(target, settings), run, Start(scene=scene))
     if stages and made.interrupted:
         stages.save()

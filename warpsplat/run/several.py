@@ -103,10 +103,10 @@ def vectorize_several(
     """
     if outputs is not None and len(outputs) != len(curves):
         raise UsageError(f"{len(curves)} numbers of shapes and {len(outputs)} outputs")
-    settings = replace(settings or make_settings(), simplify=False)
+    settings = settings or make_settings()
     check_several(settings, curves)
     with backend_on(device, threads) as backend:
-        most = replace(settings, curves=max(curves))
+        most = replace(settings, curves=max(curves), simplify=False)
         prepared = prepare(image, most, name=name, importance=importance)
         subject = prepared.problem.settings.subject
         if subject in OWN_NUMBER:
