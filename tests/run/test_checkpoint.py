@@ -135,12 +135,12 @@ def test_what_has_no_state_begins_again(
     path = tmp_path / "run.checkpoint"
     assert fitted(checkpoint=path, stop=lambda: True, **given).stopped
     assert not fitted(checkpoint=path, resume=True, stop=lambda: "time_budget" in given, **given).missed
-    assert "starts anew" in caplog.text
+    assert "starts from the beginning" in caplog.text
 
 
 def test_where_no_checkpoint_is_a_run_begins(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     fitted(iterations=2, checkpoint=tmp_path / "none", resume=True)
-    assert "no checkpoint is there yet" in caplog.text
+    assert "no checkpoint exists yet" in caplog.text
 
 
 @pytest.fixture(scope="module")
@@ -238,9 +238,9 @@ def test_no_file_is_replaced_unasked(saved: Path, tmp_path: Path) -> None:
     shutil.copy(saved, path)
     other.write_text("hours of work")
     for file, how, cause in (
-        (path, {}, "a checkpoint is there; --resume goes on"),
-        (other, {}, "is no checkpoint; --overwrite"),
-        (other, {"resume": True}, "no checkpoint of warpsplat"),
+        (path, {}, "a checkpoint exists; --resume continues"),
+        (other, {}, "is not a checkpoint; --overwrite"),
+        (other, {"resume": True}, "not a checkpoint of warpsplat"),
         (tmp_path, {}, "is a folder"),
         (tmp_path / "none" / "a", {}, "does not exist"),
         (Path("-"), {}, "not the standard output"),
@@ -267,4 +267,4 @@ def test_a_full_disk_does_not_end_a_run(
     monkeypatch.setattr(module, "write_atomically", full)
     result = fitted(checkpoint=tmp_path / "run.checkpoint", stop=after(3))
     assert result.iterations == 3
-    assert "No space left on device: goes on without" in caplog.text
+    assert "No space left on device: continues without" in caplog.text

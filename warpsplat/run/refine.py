@@ -78,16 +78,16 @@ def refine(
         image: as for ``vectorize``.
         iterations: steps.
         keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
-        name: how messages call the SVG.
+        name: of the SVG, in messages.
         time_budget: as for ``vectorize``.
-        max_memory: bytes, or ``"4GB"``; without, what the machine has. An image that takes more is refused:
-            whether a result is better is for all of its pixels to say.
+        max_memory: bytes, or ``"4GB"``; default: that of the machine. An image that takes more is refused, as
+            all of its pixels decide whether a result is better.
         precision: as for ``vectorize``.
         title: as for ``vectorize``.
         ids: as for ``vectorize``.
         minify: as for ``vectorize``.
         background: as for ``vectorize``.
-        settings: in place of all of them.
+        settings: instead of all of these.
         output: as for ``vectorize``.
         device: as for ``vectorize``.
         threads: as for ``vectorize``.
@@ -99,7 +99,7 @@ def refine(
         overwrite: as for ``vectorize``.
 
     Returns:
-        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better
+        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged if nothing better
         was found.
 
     Raises:

@@ -54,8 +54,8 @@ def render(
     Args:
         scene: what to draw.
         width: [px]; the canvas, or the SVG's own size, is scaled to it.
-        height: [px]; without one of the two the other says the size.
-        scale: magnification, in place of both.
+        height: [px]; one of the two decides the other.
+        scale: magnification, instead of both.
         renderer: ``exact`` coverage, ``splat`` or (scenes only) ``gaussian``; ``viewer`` is resvg.
         device: where to compute, see ``vectorize``.
         threads: as for ``vectorize``.
@@ -100,7 +100,7 @@ def _zoom(size: tuple[float, float], width: int | None, height: int | None, scal
         return 1.0
     zoom = width / size[0] if width is not None else (height or 1) / size[1]
     if width is not None and height is not None and abs(size[1] * zoom - height) >= 1:
-        raise UsageError(f"{width}x{height} px have not the proportions of {size[0]:g}x{size[1]:g}")
+        raise UsageError(f"{width}x{height} px do not have the proportions of {size[0]:g}x{size[1]:g}")
     return zoom
 
 

@@ -28,10 +28,10 @@ MOST_NUMBERS = 16
 
 
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
-    """Check before the work whether there can be a run with several numbers of shapes.
+    """Check that there can be a run with several numbers of shapes.
 
     Raises:
-        UsageError: a number is given twice or out of range, or other settings say how many shapes there are.
+        UsageError: a number is given twice or out of range, or other settings decide the number of shapes.
     """
     if not 1 <= len(numbers) <= MOST_NUMBERS:
         raise UsageError(f"curves: from 1 to {MOST_NUMBERS} numbers, not {len(numbers)}")
@@ -76,13 +76,13 @@ def vectorize_several(
     ready: Callable[[Result], None] | None = None,
     name: str | None = None,
 ) -> tuple[Result, ...]:
-    """Turn an image into SVGs of several numbers of shapes, which share what work they can.
+    """Turn an image into SVGs of several numbers of shapes, which share as much work as they can.
 
     Args:
         image: as for ``vectorize``.
         curves: numbers of shapes; of a drawing, the most. They are made from few to many.
-        settings: all that decides the results but their numbers, made by ``make_settings``; default: those
-            of ``vectorize``.
+        settings: everything that decides the results but their numbers, made by ``make_settings``; default:
+            those of ``vectorize``.
         importance: as for ``vectorize``.
         outputs: a file for each number, written as soon as it is made; missing folders are made.
         device: as for ``vectorize``.
@@ -93,12 +93,12 @@ def vectorize_several(
         name: see ``vectorize``.
 
     Returns:
-        a result for each number, in the order of ``curves``; where the run was stopped, of the smallest ones
-        alone, and that of most shapes may be ``stopped``.
+        a result for each number, in the order of ``curves``; if the run was stopped, only of the smallest
+        numbers, the last of which may be ``stopped``.
 
     Raises:
-        UsageError: a number that is out of range or there twice; settings that say how many shapes there
-            are, as goals and levels do; line art and pixel art, which say so themselves.
+        UsageError: a number that is out of range or given twice; settings that decide the number of shapes,
+            as goals and levels do; line art and pixel art, which decide it themselves.
         ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``.
     """
     if outputs is not None and len(outputs) != len(curves):
