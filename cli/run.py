@@ -191,7 +191,7 @@ def say_reduced(name: str, result: Result) -> None:
 def say_renewed(name: str, result: Result) -> None:
     """Print how many shapes had to be reset in the training, if any."""
     if result.renewed:
-        found = f"numbers of shapes that are not finite, {result.renewed} times; these began anew"
+        found = f"shapes had numbers that are not finite, {result.renewed} times; these were reset"
         echo(f"warpsplat: {name}: {found}", err=True)
 
 

@@ -49,7 +49,7 @@ def test_sigterm_leaves_a_checkpoint_and_the_next_run_goes_on(
     assert Path("a.checkpoint").exists() and Path("a.svg").exists()
     capfd.readouterr()
     assert run(*given, "-o", "a.svg") == 2
-    assert "a checkpoint is there; --resume goes on from it" in one_line(capfd.readouterr().err)
+    assert "a checkpoint exists; --resume continues from it" in one_line(capfd.readouterr().err)
     assert run(*given, "-o", "a.svg", "--resume") == 0
     assert not Path("a.checkpoint").exists()
     assert run(*given, "-o", "b.svg", "--resume") == 0

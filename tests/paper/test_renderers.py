@@ -78,8 +78,6 @@ def test_soft_gaussians_have_two_figures(device: str, kind: Kind) -> None:
     assert result.render_psnr > result.score.psnr > 14
     reduced = vectorize(picture(), replace(settings, fine_pixels=500, iterations=3), Backend.on(device))
     assert reduced.render_ssim is None, "an image that is larger than what was trained on"
-    larger, _ = render_figures(result.scene, picture(), settings, Backend.on(device), scale=2)
-    assert larger == pytest.approx(result.render_psnr, abs=1)
     said = summary(Path("a.svg"), values)
     assert f"the soft render {values['render_psnr']:.2f} dB, the file {values['psnr']:.2f} dB" in said
 

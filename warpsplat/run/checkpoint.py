@@ -62,13 +62,13 @@ class CheckpointFile:
             raise UsageError(f"{self.path}: cannot be read: {error.strerror}") from error
         if self.resume:
             if not found:
-                raise UsageError(f"{self.path}: is no checkpoint of warpsplat")
+                raise UsageError(f"{self.path}: is not a checkpoint of warpsplat")
         elif not self.overwrite:
-            hint = "--resume goes on from it, --overwrite starts anew"
+            hint = "--resume continues from it, --overwrite starts over"
             raise UsageError(
-                f"{self.path}: a checkpoint is there; {hint}"
+                f"{self.path}: a checkpoint exists; {hint}"
                 if found
-                else f"{self.path}: exists and is no checkpoint; --overwrite replaces it"
+                else f"{self.path}: exists and is not a checkpoint; --overwrite replaces it"
             )
 
     def stages(self, run: Mapping[str, Any], backend: Backend) -> Stages:
@@ -85,18 +85,18 @@ class CheckpointFile:
         device = backend.device.name
         saved = self._read(run, device) if self.resume and self.path.exists() else None
         if self.resume and not saved:
-            log.warning("%s: no checkpoint is there yet: starts anew", self.path)
+            log.warning("%s: no checkpoint exists yet: starts from the beginning", self.path)
 
         def write(content: Content) -> None:
             header = {"version": __version__, "device": device, "run": run, **content.numbers}
             try:
                 write_atomically(self.path, pack(header, content.arrays))
             except OutputError as error:  # hours of work are not to end for it
-                log.warning("%s: goes on without", error)
+                log.warning("%s: continues without it", error)
 
         stages = Stages(str(self.path), write, self.every, saved)
         if saved and stages.is_empty:
-            log.warning("%s: there is nothing in it to go on from: starts anew", self.path)
+            log.warning("%s: nothing to resume from: starts from the beginning", self.path)
         return stages
 
     def _read(self, run: Mapping[str, Any], device: str) -> Content:
@@ -109,7 +109,7 @@ class CheckpointFile:
             detail = f" ({was}, now {now})" if name not in DIGESTS else ""
             raise UsageError(f"{self.path}: is of another run: {name} differs{detail}")
         if header.get("device") != device:
-            log.warning("%s: made on another device: goes on, not to the same bytes", self.path)
+            log.warning("%s: made on another device: continues, but not to the same bytes", self.path)
         return Content(header, arrays)
 
     def remove(self) -> None:

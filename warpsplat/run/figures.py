@@ -6,7 +6,9 @@ import numpy as np
 
 from warpsplat.errors import Stopped
 from warpsplat.fit.export import export
+from warpsplat.fit.loop import Fit
 from warpsplat.fit.problem import Run
+from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, ssim
@@ -80,19 +82,22 @@ def level_scores(
 
 
 def render_figures(
-    scene: Scene, target: FloatArray, settings: Settings, backend: Backend, *, scale: int = 1
+    scene: Scene, target: FloatArray, settings: Settings, backend: Backend
 ) -> tuple[float, float | None]:
-    """Return PSNR [dB] and SSIM of the settings' own render of ``scene`` against ``target``, both in 8 bits.
-
-    ``scale``: of the render, which is reduced by area to the image's size for the comparison.
-    """
-    shown = render(scene, scale=scale, model=model_for(settings, 0), backend=backend)
-    levels = np.round(255 * np.clip(shown, 0, 1))
-    if scale > 1:
-        height, width = target.shape[:2]
-        levels = levels.reshape(height, scale, width, scale, 3).mean(axis=(1, 3), dtype=np.float32)
+    """Return PSNR [dB] and SSIM of the settings' render of ``scene`` against ``target``, both in 8 bits."""
+    shown = np.round(255 * np.clip(render(scene, model=model_for(settings, 0), backend=backend), 0, 1))
     wanted = np.round(255 * target)
-    return psnr(levels, wanted), ssim(levels, wanted)
+    return psnr(shown, wanted), ssim(shown, wanted)
+
+
+def render_score(
+    made: Fit, target: FloatArray, settings: Settings, backend: Backend, reduction: Reduction | None
+) -> tuple[float, float | None]:
+    """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
+    small = not reduction and pixels_of(target) <= settings.fine_pixels
+    if renderer_of(settings.renderer).soft and small:
+        return render_figures(made.scene, target, settings, backend)
+    return made.render_psnr, None
 
 
 def missed_goals(settings: Settings, score: Score | None, seconds: float) -> tuple[str, ...]:

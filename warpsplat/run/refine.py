@@ -32,8 +32,8 @@ from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
 from warpsplat.run.svg import SvgSource, svg_name_of, text_of
+from warpsplat.run.tracking import recorded, timed
 from warpsplat.run.typed import RefineOptions
-from warpsplat.run.vectorize import recorded, timed
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
 from warpsplat.svg.read import load_scene
@@ -80,23 +80,23 @@ def refine(
         image: as for ``vectorize``.
         iterations: steps.
         keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
-        name: how messages call the SVG.
-        max_memory: bytes, or ``"4GB"``; without, what the machine has. An image that takes more is refused:
-            whether a result is better is for all of its pixels to say.
-        settings: in place of all options.
-        output: as for ``vectorize``, as is all that follows.
-        device: see there.
-        threads: see there.
-        callback: see there.
-        stop: see there.
-        checkpoint: see there.
-        resume: see there.
-        checkpoint_every: see there.
-        overwrite: see there.
+        name: of the SVG, in messages.
+        max_memory: bytes, or ``"4GB"``; default: that of the machine. An image that takes more is refused, as
+            all of its pixels decide whether a result is better.
+        settings: instead of all options.
+        output: as for ``vectorize``.
+        device: as for ``vectorize``.
+        threads: as for ``vectorize``.
+        callback: as for ``vectorize``.
+        stop: as for ``vectorize``.
+        checkpoint: as for ``vectorize``.
+        resume: as for ``vectorize``.
+        checkpoint_every: as for ``vectorize``.
+        overwrite: as for ``vectorize``.
         options: see ``RefineOptions``.
 
     Returns:
-        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged where nothing better
+        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged if nothing better
         was found.
 
     Raises:
@@ -127,6 +127,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
     """
     begun, history, stages = time.monotonic(), list[Progress](), run.stages
+    run = timed(recorded(run, history), problem.settings, problem.target)
     given, view = text, None
     if OUR_VIEW.match(text):
         view = picture_view(text, *problem.size)
@@ -136,7 +137,6 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     scene = base.scene
     before = score_svg(text, target, eyes=False)
     settings = _settings(problem.settings, len(scene))
-    run = timed(recorded(run, history), settings, target)
     made = fit(Problem(target, settings), run, Start(scene=scene))
     if stages and made.interrupted:
         stages.save()

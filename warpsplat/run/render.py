@@ -17,9 +17,9 @@ from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.renderer import render as render_scene
 from warpsplat.rendering.renderer import render_into
 from warpsplat.run.backend import backend_on
-from warpsplat.run.svg import SvgSource, save_svg, svg_name_of, text_of
+from warpsplat.run.svg import SvgSource, save_svg, size_of, svg_name_of, text_of
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
+from warpsplat.svg.inspect import MAX_PIXELS
 from warpsplat.svg.read import scene_of
 from warpsplat.svg.structure import read_shapes
 from warpsplat.svg.viewer import premultiplied, render_svg
@@ -40,11 +40,11 @@ def render(
     Args:
         scene: what to draw.
         width: [px]; the canvas, or the SVG's own size, is scaled to it.
-        height: [px]; without one of the two the other says the size.
-        scale: magnification, in place of both.
+        height: [px]; one of the two decides the other.
+        scale: magnification, instead of both.
         renderer: ``exact`` coverage, ``splat`` or (scenes only) ``gaussian``; ``viewer`` is resvg.
         device: where to compute, see ``vectorize``.
-        threads: see there.
+        threads: as for ``vectorize``.
 
     Returns:
         sRGB in [0, 1] premultiplied by opacity, and opacity, shape (height, width, 4). ``to_pillow`` makes an
@@ -57,12 +57,10 @@ def render(
     """
     if not isinstance(scene, Scene):
         text = text_of(scene, svg_name_of(scene))
-        own = svg_size(inspect_svg(text).root)
-        if own is None:
-            raise ImageError(f"{svg_name_of(scene)}: says neither its size nor a viewBox")
+        own = size_of(text, svg_name_of(scene))
         zoom = _zoom(own, width, height, scale)
         with backend_on(device, threads) as backend:
-            return _with_opacity(drawn(text, renderer, zoom, backend))
+            return _with_opacity(_draw_svg(text, own, renderer, zoom, backend))
     size = (scene.canvas.width, scene.canvas.height)
     zoom = _zoom(size, width, height, scale)
     if renderer == "viewer":
@@ -88,7 +86,7 @@ def _zoom(size: tuple[float, float], width: int | None, height: int | None, scal
         return 1.0
     zoom = width / size[0] if width is not None else (height or 1) / size[1]
     if width is not None and height is not None and abs(size[1] * zoom - height) >= 1:
-        raise UsageError(f"{width}x{height} px have not the proportions of {size[0]:g}x{size[1]:g}")
+        raise UsageError(f"{width}x{height} px do not have the proportions of {size[0]:g}x{size[1]:g}")
     return zoom
 
 
@@ -96,17 +94,16 @@ def _with_opacity(image: npt.NDArray[np.float32]) -> FloatArray:
     return image if image.shape[2] == 4 else np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
 
 
-def drawn(text: str, renderer: str, scale: float, backend: Backend) -> FloatArray:
-    """Draw the SVG ``text`` at the size that resvg gives it, as ``Renderer.read_image`` returns images.
+def _draw_svg(
+    text: str, size: tuple[float, float], renderer: str, scale: float, backend: Backend
+) -> FloatArray:
+    """Draw an SVG of a ``size`` at the size that resvg gives it, as ``Renderer.read_image`` returns images.
 
     Raises:
-        ImageError: not an SVG, or with something that the model cannot show.
+        ImageError: an SVG with something that the model cannot show.
         UsageError: a scale that leaves no pixel or too many, or a renderer that cannot draw files.
     """
     check_draws_files(renderer)
-    size = svg_size(inspect_svg(text).root)
-    if size is None:
-        raise ImageError("says neither its size nor a viewBox")
     check_scale(size, scale)
     if renderer == "viewer":
         return (premultiplied(render_svg(text, zoom=scale)) / 255).astype(np.float32)
@@ -166,14 +163,9 @@ def to_png(image: FloatArray) -> bytes:
 
 def to_pillow(image: FloatArray) -> Image.Image:
     """Convert what ``render`` returns to 8 bits: RGB if all is opaque, else RGBA with straight opacity."""
-    pixels = to_bytes(image)
-    opaque = (pixels[..., 3:] == 255).all()
-    return Image.fromarray(pixels[..., :3] if opaque else pixels)
-
-
-def to_bytes(image: FloatArray) -> npt.NDArray[np.uint8]:
-    """Return a rendered image in 8 bits, with straight opacity as in a PNG if it is transparent."""
     color, alpha = image[..., :3], image[..., 3:]
     if alpha.shape[2]:
         image = np.concatenate([np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0), alpha], 2)
-    return np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)
+    pixels = np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)
+    opaque = (pixels[..., 3:] == 255).all()
+    return Image.fromarray(pixels[..., :3] if opaque else pixels)

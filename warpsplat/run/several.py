@@ -34,10 +34,10 @@ MOST_NUMBERS = 16
 
 
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
-    """Check before the work whether there can be a run with several numbers of shapes.
+    """Check that there can be a run with several numbers of shapes.
 
     Raises:
-        UsageError: a number is given twice or out of range, or other settings say how many shapes there are.
+        UsageError: a number is given twice or out of range, or other settings decide the number of shapes.
     """
     if not 1 <= len(numbers) <= MOST_NUMBERS:
         raise UsageError(f"curves: from 1 to {MOST_NUMBERS} numbers, not {len(numbers)}")
@@ -77,39 +77,38 @@ def vectorize_several(
     name: str | None = None,
     **options: Unpack[Options],
 ) -> tuple[Result, ...]:
-    """Turn an image into SVGs of several numbers of shapes, which share what work they can.
+    """Turn an image into SVGs of several numbers of shapes, which share as much work as they can.
 
     Args:
         image: as for ``vectorize``.
         curves: numbers of shapes; of a drawing, the most. They are made from few to many.
-        settings: all that decides the results but their numbers, made by ``make_settings``; in place of
+        settings: everything that decides the results but their numbers, made by ``make_settings``; instead of
             ``options``.
         importance: as for ``vectorize``.
         outputs: a file for each number, written as soon as it is made; missing folders are made.
         device: as for ``vectorize``.
-        threads: see there.
-        callback: see there; ``Progress.work`` is the share of all that is to be done. One that returns True
-            ends the run.
-        stop: see there.
+        threads: as for ``vectorize``.
+        callback: as for ``vectorize``; ``Progress.work`` is the share of the work for all numbers.
+        stop: as for ``vectorize``.
         ready: called with each result as soon as there is one.
         name: see ``vectorize``.
-        options: see there.
+        options: as for ``vectorize``.
 
     Returns:
-        a result for each number, in the order of ``curves``; where the run was stopped, of the smallest ones
-        alone, and that of most shapes may be ``stopped``.
+        a result for each number, in the order of ``curves``; if the run was stopped, only of the smallest
+        numbers, the last of which may be ``stopped``.
 
     Raises:
-        UsageError: a number that is out of range or there twice; settings that say how many shapes there
-            are, as goals and levels do; line art and pixel art, which say so themselves.
+        UsageError: a number that is out of range or given twice; settings that decide the number of shapes,
+            as goals and levels do; line art and pixel art, which decide it themselves.
         ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``.
     """
     if outputs is not None and len(outputs) != len(curves):
         raise UsageError(f"{len(curves)} numbers of shapes and {len(outputs)} outputs")
-    settings = replace(settings_given(settings, **options), simplify=False)
+    settings = settings_given(settings, **options)
     check_several(settings, curves)
     with backend_on(device, threads) as backend:
-        most = replace(settings, curves=max(curves))
+        most = replace(settings, curves=max(curves), simplify=False)
         prepared = prepare(image, most, name=name, importance=importance)
         subject = prepared.problem.settings.subject
         if subject in OWN_NUMBER:

@@ -71,7 +71,7 @@ class Suggestion:
     """A suggested number of shapes, and the reason."""
 
     curves: int | None
-    """Shapes; None where the image itself says how many there are."""
+    """Number of shapes; None if the image itself decides it."""
     subject: Subject
     """Subject that the image was taken for."""
     why: str
@@ -97,7 +97,7 @@ def check_suggesting(settings: Settings) -> None:
     """Check whether there is anything to suggest.
 
     Raises:
-        UsageError: the settings say how many shapes there are to be.
+        UsageError: the settings decide the number of shapes.
     """
     if others := settings.counting or ([] if settings.simplify else ["curves"]):
         raise UsageError(
@@ -120,26 +120,26 @@ def suggest(
 ) -> Suggestion | None:
     """Suggest how many shapes an image is worth: as many as still gain what can be seen for their bytes.
 
-    A short fit on a reduced image, whose shapes grow from few to many, says what each number is expected to
-    give; it takes a fraction of what a run takes.
+    A short fit on a reduced image, whose shapes grow from few to many, estimates the result of each number;
+    it takes a fraction of the time of a run.
 
     Args:
         image: as for ``vectorize``.
         settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
         importance: as for ``vectorize``, as is all that follows.
-        device: see there.
-        threads: see there.
-        callback: see there.
-        stop: see there.
-        name: see there.
-        options: see there.
+        device: as for ``vectorize``.
+        threads: as for ``vectorize``.
+        callback: as for ``vectorize``.
+        stop: as for ``vectorize``.
+        name: as for ``vectorize``.
+        options: as for ``vectorize``.
 
     Returns:
-        the number, the reason, and what it and others are expected to give at the default effort; None where
-        it was stopped. Of images that are traced there is no number to choose, which the reason says.
+        the number, the reason, and the expected results of it and others at the default effort; None if the
+        run was stopped. Images that are traced have no number to choose, which the reason explains.
 
     Raises:
-        UsageError: settings that say how many shapes there are.
+        UsageError: settings that decide the number of shapes.
         ImageError, ResourceError, TypeError: as for ``vectorize``.
     """
     settings = settings_given(settings, **options)

@@ -38,13 +38,7 @@ def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
     """
     name = svg_name_of(svg)
     text = text_of(svg, name)
-    try:
-        size = svg_size(inspect_svg(text).root)
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
-    if size is None:
-        raise ImageError(f"{name}: says neither its size nor a viewBox")
-    width, height = (max(1, math.floor(side + 0.5)) for side in size)
+    width, height = (max(1, math.floor(side + 0.5)) for side in size_of(text, name))
     if keep:
         kept = load_kept(text, width, height, name)
         scene, has_background = kept.scene, kept.has_background
@@ -68,9 +62,9 @@ def save_svg(
         scene: what to write.
         path: its ending decides the format, see ``Result.save``.
         precision: decimals of a pixel in coordinates; default: two.
-        title: as for ``vectorize``, as are ``ids`` and ``minify``.
-        ids: see there.
-        minify: see there.
+        title: as for ``vectorize``.
+        ids: as for ``vectorize``.
+        minify: as for ``vectorize``.
 
     Raises:
         UsageError: a value out of range.
@@ -120,3 +114,18 @@ def text_of(svg: SvgSource, name: str) -> str:
     if not isinstance(svg, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
         raise TypeError(f"an SVG is its text, a path, bytes or a file, not {type(svg).__name__}")
     return svg_text(source_bytes(svg, "an SVG"), name)
+
+
+def size_of(text: str, name: str) -> tuple[float, float]:
+    """Return width and height of an SVG [px], which messages call ``name``.
+
+    Raises:
+        ImageError: it is not an SVG, or has no size.
+    """
+    try:
+        size = svg_size(inspect_svg(text).root)
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
+    if size is None:
+        raise ImageError(f"{name}: says neither its size nor a viewBox")
+    return size

@@ -11,37 +11,29 @@ import functools
 import os
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.export import finished
-from warpsplat.fit.loop import Fit, Start, fit
+from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Run
-from warpsplat.fit.progress import Callback, Progress, Snapshot
-from warpsplat.fit.renderers import renderer_of
+from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import INTERVAL
 from warpsplat.native import release_memory
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import render
 from warpsplat.run.backend import backend_on
 from warpsplat.run.checkpoint import identity, open_checkpoint
-from warpsplat.run.figures import level_scores, missed_goals, pixels_of, render_figures, scored
+from warpsplat.run.export import export_within, on_paper
+from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
 from warpsplat.run.keys import STOPPED
 from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import Result
 from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
+from warpsplat.run.tracking import recorded, report_end, timed
 from warpsplat.run.typed import Options
-from warpsplat.scene import FloatArray, Scene
-from warpsplat.scene.geometry import areas
-from warpsplat.svg.page import placed
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -154,7 +146,7 @@ def make_result(
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
         score = score.of_file(file) if score else None
-        render_psnr, render_ssim = render_score(made, image, settings, run.backend)
+        render_psnr, render_ssim = render_score(made, target, settings, run.backend, reduction)
         seconds = time.monotonic() - begun
         result = Result(
             svg=file,
@@ -186,75 +178,3 @@ def naming(name: str) -> Iterator[None]:
         yield
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
-
-
-RELEASE_INTERVAL = 10
-"""Progress reports from one release of free memory to the next: a release takes as long as a step does."""
-
-
-def recorded(run: Run, history: list[Progress]) -> Run:
-    """Return a run whose progress is recorded and never falls, and which releases memory now and then."""
-
-    def record(now: Progress) -> Progress:
-        now = replace(now, work=max(now.work, history[-1].work) if history else now.work)
-        history.append(replace(now, snapshot=None))  # which holds a run's arrays
-        if len(history) % RELEASE_INTERVAL == 0:
-            release_memory()
-        return now
-
-    return run.mapped(record)
-
-
-def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
-    """Report that the training is done, where the last report could not know."""
-    if history and history[-1].work < 1 and not made.interrupted:
-        scene = made.scene
-        snapshot = Snapshot(lambda: scene, lambda: render(scene, backend=run.backend))
-        last = replace(history[-1], work=1.0, fine=True, psnr=made.estimated_psnr, shapes=len(scene))
-        run.report(replace(last, seconds=time.monotonic() - run.started, snapshot=snapshot))
-
-
-TAIL_SECONDS = 0.3
-TAIL_PER_PIXEL = 3e-7
-"""Part of a time budget that the last step, exporting and scoring take [s]."""
-
-
-def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
-    """Return the run with the deadline that ``time_budget`` sets, which leaves time to write and score."""
-    if settings.time_budget is None:
-        return run
-    tail = TAIL_SECONDS + TAIL_PER_PIXEL * pixels_of(target)
-    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, stages=None)
-
-
-def render_score(
-    made: Fit, image: PreparedImage, settings: Settings, backend: Backend
-) -> tuple[float, float | None]:
-    """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
-    target = image.problem.target
-    small = not image.reduction and pixels_of(target) <= settings.fine_pixels
-    if renderer_of(settings.renderer).soft and small:
-        return render_figures(made.scene, target, settings, backend)
-    return made.render_psnr, None
-
-
-def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
-    """Return the SVG and its shapes: all, or those that show most if ``max_bytes`` allows no more."""
-
-    def made() -> tuple[str, int]:
-        text = finished(scene, settings, per_pixel, metadata)
-        return text, len(on_paper(text, settings).encode())
-
-    svg, size = made()
-    while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
-        excess = 1 - settings.max_bytes / size
-        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
-        seen = areas(scene) * scene.opacities
-        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
-        svg, size = made()
-    return svg, scene
-
-
-def on_paper(svg: str, settings: Settings) -> str:
-    """Return ``svg`` on the sheet that ``settings`` ask for, if any."""
-    return placed(svg, settings.size, settings.page, settings.units)

@@ -47,9 +47,7 @@ GAIN, GAIN_FROM, GAIN_WHOLE = 0.42, 22.0, 27.0
 """
 
 GAIN_SIZES = 4.0, 16.0
-"""Ratios of the finest size to the reduced image [pixels] up to which there is all of that gain, and from
-which on there is none: most steps see the reduced image.
-"""
+"""Ratios of the finest to the reduced size [pixels] of full gain, and of none: most steps see the latter."""
 
 SLOPE = 0.79
 """Gain by a doubling of shapes in such runs, over the gain from the probe to the short fit."""

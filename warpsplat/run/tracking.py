@@ -1,0 +1,53 @@
+"""The progress and the deadline of a run."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from warpsplat.fit.loop import Fit
+from warpsplat.fit.problem import Run
+from warpsplat.fit.progress import Progress, Snapshot
+from warpsplat.fit.settings import Settings
+from warpsplat.native import release_memory
+from warpsplat.rendering.renderer import render
+from warpsplat.run.figures import pixels_of
+from warpsplat.scene import FloatArray
+
+RELEASE_INTERVAL = 10
+"""Progress reports from one release of free memory to the next: a release takes as long as a step does."""
+
+
+def recorded(run: Run, history: list[Progress]) -> Run:
+    """Return a run whose progress is recorded and never falls, and which releases memory now and then."""
+
+    def record(now: Progress) -> Progress:
+        now = replace(now, work=max(now.work, history[-1].work) if history else now.work)
+        history.append(replace(now, snapshot=None))  # which holds a run's arrays
+        if len(history) % RELEASE_INTERVAL == 0:
+            release_memory()
+        return now
+
+    return run.mapped(record)
+
+
+def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
+    """Report that the training is done, where the last report could not know."""
+    if history and history[-1].work < 1 and not made.interrupted:
+        scene = made.scene
+        snapshot = Snapshot(lambda: scene, lambda: render(scene, backend=run.backend))
+        last = replace(history[-1], work=1.0, fine=True, psnr=made.estimated_psnr, shapes=len(scene))
+        run.report(replace(last, seconds=time.monotonic() - run.started, snapshot=snapshot))
+
+
+TAIL_SECONDS = 0.3
+TAIL_PER_PIXEL = 3e-7
+"""Part of a time budget that the last step, exporting and scoring take [s]."""
+
+
+def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
+    """Return the run with the deadline that ``time_budget`` sets, which leaves time to write and score."""
+    if settings.time_budget is None:
+        return run
+    tail = TAIL_SECONDS + TAIL_PER_PIXEL * pixels_of(target)
+    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, stages=None)
