@@ -34,7 +34,6 @@ EXCEPTIONS = {
     ("warpsplat/pages/reports/pictures.py", "cv2.cvtColor"): "a report's pictures",
     ("warpsplat/pages/reports/pictures.py", "cv2.resize"): "a report's pictures",
     ("warpsplat/pages/reports/shapes.py", "np.log10"): "a report's figures",
-    ("warpsplat/drawing/byte_limit.py", "math.log2"): "progress",
     ("warpsplat/metrics.py", "cv2.GaussianBlur"): "SSIM, which is only shown",
     ("warpsplat/metrics.py", "cv2.resize"): "MS-SSIM, which is only shown",
     ("warpsplat/pages/plot.py", "**"): "a page's plot",
