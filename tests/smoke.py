@@ -14,12 +14,12 @@ SMOKE = {
     ),
     "scene": ("scene/test_scene.py::test_take_and_append",),
     "files": (
-        "files/test_image.py::test_plain",
+        "files/test_image.py::test_modes",
         "files/test_image.py::test_bad_files_give_one_line_with_name_and_cause",
         "files/test_packed.py",
     ),
     "svg": (
-        "svg/test_own_files.py::test_what_is_written_is_read",
+        "svg/test_own_files.py::test_files_come_back",
         "svg/test_read_kept.py::test_it_looks_the_same",
         "svg/test_write.py::test_the_file_looks_as_the_render",
         "test_metrics.py::test_psnr",
