@@ -136,7 +136,7 @@ def test_target_psnr_within_a_size_and_a_time(device: str) -> None:
 
 @pytest.mark.parametrize("asked", [3, 25, 45])
 def test_a_goal_may_be_interrupted_anywhere(device: str, asked: int) -> None:
-    """In a pilot, in the run, and where shapes come: the best so far is the result."""
+    """In a probe run, in the first fit, and while shapes are added: the best so far is the result."""
     steps = itertools.count()
     settings = make_settings(iterations=20, curves=10, target_psnr=60.0)
     result = vectorize(picture(), settings, Backend.on(device), stop=lambda: next(steps) >= asked)

@@ -1,1 +1,1 @@
-"""Run one image: from a source to the file and its score."""
+"""One image from source to file: the public functions, and what they share."""
