@@ -48,8 +48,8 @@ class Strokes:
     lines: list[Line]
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
-    areas: Areas | None = None
-    area_pens: Ints = field(default_factory=lambda: np.zeros(0, np.intp))
+    areas: Areas | None
+    area_pens: Ints
     """Row of the pens' colours of each area."""
 
 

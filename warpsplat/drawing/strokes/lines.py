@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,9 +30,9 @@ class TracedLines:
     """Strokes; ``layer`` is the pen of each."""
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
-    areas: Areas | None = None
+    areas: Areas | None
     """What is filled besides."""
-    area_pens: Ints = field(default_factory=lambda: np.zeros(0, np.intp))
+    area_pens: Ints
     """The pen of each area."""
 
 
