@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient, picture, ramp, stops
+from warpsplat.kernels.paint import flat, gradient, padded, picture
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -65,7 +65,7 @@ class Painting:
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         if self.has_gradients:
-            for kernel in (ramp.ramp_forward, stops.stops_forward, gradient.gradient_forward):
+            for kernel in (padded.ramp_forward, padded.chain_forward, gradient.gradient_forward):
                 program.launch(
                     kernel,
                     (self._slots, self._backend.lanes),
@@ -91,7 +91,7 @@ class Painting:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
         if self.has_gradients:
             shapes = self._parameters.shape_count
-            for kernel in (ramp.ramp_backward, stops.stops_backward, gradient.gradient_backward):
+            for kernel in (padded.ramp_backward, padded.chain_backward, gradient.gradient_backward):
                 program.launch(kernel, shapes, *self._sources, split=True)
         program.launch(
             flat.flat_backward,
