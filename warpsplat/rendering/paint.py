@@ -64,21 +64,17 @@ class Painting:
 
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
+        kernels = []
         if self.has_gradients:
-            for kernel in (padded.ramp_forward, padded.chain_forward, gradient.gradient_forward):
-                program.launch(
-                    kernel,
-                    (self._slots, self._backend.lanes),
-                    *self._sources,
-                    lane_columns=self._backend.lane_size,
-                    split=True,
-                )
+            kernels += [padded.ramp_forward, padded.chain_forward, gradient.gradient_forward]
         if self._pictures:
+            kernels.append(picture.picture_forward)
+        for kernel in kernels:
             program.launch(
-                picture.picture_forward,
+                kernel,
                 (self._slots, self._backend.lanes),
                 *self._sources,
-                self._pictures,
+                self._pictures or {},
                 lane_columns=self._backend.lane_size,
                 split=True,
             )
