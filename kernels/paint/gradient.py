@@ -4,7 +4,7 @@ A frame maps the gradient's unit space to the canvas; a pixel's centre, mapped b
 linear gradient that is its first coordinate; on a radial one it says which of the circles between the focus
 and the unit circle goes through it: the larger root s of |p - c0 + s c0| = r0 + s (1 - r0). Between two stops
 colours and opacities are interpolated, colours not premultiplied, at t after the spread.
-``ramp`` and ``stops`` are faster kernels for the common cases.
+``padded`` has faster kernels for the common cases, ramps and chains.
 """
 
 from typing import Any
@@ -131,7 +131,7 @@ def between_stops(offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 def is_ramp(
     spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 ) -> wp.bool:
-    """Return whether ``ramp`` handles a gradient: padded, centred, with two ascending stops."""
+    """Return whether a gradient is a ramp: padded, centred, with two ascending stops."""
     if spread != constants.PAD or last - first != 2:
         return False
     if focus[0] != 0.0 or focus[1] != 0.0 or focus[2] != 0.0:
@@ -141,7 +141,7 @@ def is_ramp(
 
 @wp.func
 def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) -> wp.bool:
-    """Return whether ``stops`` handles a gradient: padded, centred, with three stops or more in any order."""
+    """Return whether a gradient is a chain: padded, centred, with three stops or more in any order."""
     if spread != constants.PAD or last - first < 3:
         return False
     return focus[0] == 0.0 and focus[1] == 0.0 and focus[2] == 0.0
@@ -151,7 +151,7 @@ def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) 
 def is_columnwise(
     spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 ) -> wp.bool:
-    """Return whether ``ramp`` or ``stops`` handles a gradient."""
+    """Return whether a gradient is a ramp or a chain."""
     if is_ramp(spread, focus, offsets, first, last):
         return True
     return is_chain(spread, focus, first, last)

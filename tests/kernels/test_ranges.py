@@ -16,7 +16,7 @@ from warpsplat.rendering.kernel_cache import load
 from warpsplat.rendering.ranges import record_ranges
 from warpsplat.scene import Kind
 
-wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
 CAPACITY = 100
 

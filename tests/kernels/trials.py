@@ -9,7 +9,7 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.elementary import angle_of, normal_quantile, normal_tail, power, sine_and_cosine
 from warpsplat.kernels.tile import column
 
-wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
 TILE = wp.constant(constants.TILE)
 PARTIAL = wp.constant(constants.PARTIAL)

@@ -36,10 +36,10 @@ def test_an_interrupted_wait_leaves_the_compiler_at_work(monkeypatch: pytest.Mon
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    compile_by(done.clear)  # the first time something else is said
+    compile_by(done.clear)  # the first time another message is logged
     assert not compiling()
     with monkeypatch.context() as patch:
-        patch.setattr(compiler, "SAID_EVERY", 0.01)
+        patch.setattr(compiler, "MESSAGE_INTERVAL", 0.01)
         patch.setattr(compiler.log, "info", interrupt)
         with pytest.raises(KeyboardInterrupt):
             compile_by(go_on.wait)

@@ -19,7 +19,7 @@ from warpsplat.kernels import constants
 from warpsplat.rendering import kernel_cache
 from warpsplat.rendering.kernel_cache import CHECKSUMS, LOCK, alone_with, load
 
-wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
 
 @wp.kernel

@@ -12,7 +12,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.rendering.program import Program, bind, capture
 
-wp.set_module_options(constants.MODULE_OPTIONS)  # others would take headers precompiled anew
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
 
 @wp.kernel

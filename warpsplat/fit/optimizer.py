@@ -9,7 +9,7 @@ import warp as wp
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.units import Units
 from warpsplat.kernels import adam
-from warpsplat.kernels.paint import ramp
+from warpsplat.kernels.paint import padded
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -37,7 +37,7 @@ def record_adam(
     if parameters.has_twins:
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
     if parameters.has_circles:
-        program.launch(ramp.tie_circles, parameters.shape_count, parameters.arrays)
+        program.launch(padded.tie_circles, parameters.shape_count, parameters.arrays)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,

@@ -1,4 +1,4 @@
-"""The thread that compiles kernels, and what is said while it does."""
+"""The thread that compiles kernels, and the messages meanwhile."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from warpsplat.native import messages_hidden
 log = logging.getLogger(__name__)
 
 PASSING = "passing"
-"""Attribute of records that the next one takes the place of, and that an empty one removes."""
+"""Attribute of log records that the next such record replaces; an empty message removes them."""
 
-SAID_EVERY = 1.0
-"""Seconds between two of them."""
+MESSAGE_INTERVAL = 1.0
+"""Seconds between two such messages."""
 
 
 class _Task:
-    """What the compiler is to do, and what became of it."""
+    """Work for the compiler, and its result."""
 
     def __init__(self, work: Callable[[], None]) -> None:
         self.work = work
@@ -33,13 +33,13 @@ class _Task:
 class _Compiler:
     """One thread for all modules of a process.
 
-    Warp precompiles its headers anew in each thread that compiles, which takes as long as a dozen small
+    Warp precompiles its headers again in each thread that compiles, which takes as long as a dozen small
     modules.
     """
 
     def __init__(self) -> None:
         self.seconds = 0.0
-        """How long the process has waited so far: modules are compiled one by one."""
+        """Time that the process has waited for all modules so far."""
         self._latest: _Task | None = None
         self._tasks: queue.SimpleQueue[_Task] = queue.SimpleQueue()
         threading.Thread(target=self._serve, name="warpsplat compiler", daemon=True).start()
@@ -54,19 +54,19 @@ class _Compiler:
             task.done.set()
 
     def ask(self, work: Callable[[], None]) -> _Task:
-        """Have ``work`` done when what was asked for before is."""
+        """Queue ``work`` behind earlier requests."""
         self._latest = task = _Task(work)
         self._tasks.put(task)
         return task
 
     def is_busy(self) -> bool:
-        """Whether there is something left to do, say for a caller who was interrupted."""
+        """Return whether work is left, e.g. that of a caller who was interrupted."""
         return self._latest is not None and not self._latest.done.is_set()
 
 
 @functools.cache
 def _compiler() -> _Compiler:
-    """Started when it is first needed."""
+    """Return the compiler, started at the first call."""
     return _Compiler()
 
 
@@ -76,18 +76,18 @@ if hasattr(os, "register_at_fork"):
 
 @functools.cache
 def _announce() -> None:
-    """Say why nothing seems to happen; a process says it once for all its modules."""
+    """Log, once per process, why nothing seems to happen."""
     log.info("compiling kernels, which is done once and takes up to a minute")
 
 
 def compile_by(work: Callable[[], None]) -> None:
-    """Have the compiler do ``work``, so that Ctrl-C need not wait for it, and say how long it takes."""
+    """Do ``work`` in the compiler's thread, so that Ctrl-C need not wait for it; log how long it takes."""
     _announce()
     compiler = _compiler()
     with messages_hidden():
         started = time.monotonic()
         task = compiler.ask(work)
-        while not task.done.wait(SAID_EVERY):
+        while not task.done.wait(MESSAGE_INTERVAL):
             seconds = compiler.seconds + time.monotonic() - started
             log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
         compiler.seconds += time.monotonic() - started
@@ -97,5 +97,5 @@ def compile_by(work: Callable[[], None]) -> None:
 
 
 def compiling() -> bool:
-    """Whether the compiler is at work: a process that ends then must not clean up under its feet."""
+    """Return whether the compiler is working: a process that ends then must not remove its files."""
     return _compiler.cache_info().currsize > 0 and _compiler().is_busy()

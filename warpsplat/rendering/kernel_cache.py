@@ -1,8 +1,8 @@
-"""Loading compiled kernels from Warp's cache, and what to do where that is damaged or cannot be written.
+"""Loading compiled kernels from Warp's cache, even if that is damaged or cannot be written.
 
 Warp trusts its cache: a file that was cut short or changed since makes every later run fail, or run wrong
-code. Here a file of checksums lies beside each module's files. It is written when a module is first loaded,
-so damage from before that moment is found only where the file cannot be loaded at all.
+code. Here a file of checksums is kept beside each module's files. It is written when a module is first
+loaded, so earlier damage is found only if the file cannot be loaded at all.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ CHECKSUMS = "warpsplat.sha256.json"
 """File name -> SHA-256, beside the files of a module."""
 
 LOADED = (".o", ".meta", ".cubin", ".ptx")
-"""Endings of the files that Warp loads; sources are only for reading."""
+"""Suffixes of the files that Warp loads."""
 
 _temporary: list[str] = []
-"""The folder that stands in for a cache that cannot be used, while this process lives."""
+"""The folder that replaces an unusable cache while this process lives."""
 
 
 def load(kernel: wp.Kernel, device: wp.Device) -> None:
-    """Load a kernel's module, compiled where need be. A damaged cache is made anew.
+    """Load a kernel's module, compiled if necessary. What is damaged in the cache is compiled again.
 
     Raises:
         ResourceError: neither the cache nor a temporary folder can hold compiled kernels.
@@ -59,7 +59,7 @@ _loading = threading.RLock()
 
 
 def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
-    """Load what is not loaded."""
+    """Load a module unless it is loaded."""
     if (None if device.is_cpu else device.context, block_dim) in module.execs:
         return
     failure: BaseException | None = None
@@ -77,7 +77,7 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
                         compile_by(lambda: wp.load_module(module, device, block_dim=block_dim))
             with messages_hidden():
                 wp.load_module(module, device, block_dim=block_dim)
-        except Exception as error:  # Warp and its compiler raise all kinds
+        except Exception as error:  # Warp and its compiler raise exceptions of many types
             if explain(error)[0].startswith("not enough memory"):
                 raise
             failure = error
@@ -92,15 +92,15 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
 
 
 LOCK = "warpsplat.lock"
-"""An empty file in the cache, of which a byte is locked for each module that is being compiled."""
+"""An empty file in the cache; a byte of it is locked for each module that is being compiled."""
 
 
 @contextlib.contextmanager
 def alone_with(folder: Path) -> Iterator[None]:
-    """Compile the module of ``folder`` while other processes that need it wait: they only load it then.
+    """Hold the lock on the module of ``folder``, so that other processes wait for it instead of compiling it.
 
-    Meanwhile others may compile other modules. Where nothing can be locked, several compile the same, each
-    for itself, which Warp allows: a module comes to its place whole, by renaming.
+    Other modules may be compiled meanwhile. Where locking is not possible, several processes may compile the
+    same module, which Warp allows: it renames finished folders into place.
     """
     handle = None
     try:
@@ -125,10 +125,10 @@ def _cause(failure: BaseException | None) -> str:
 
 
 def use_temporary_folder(failure: BaseException | None) -> None:
-    """Keep compiled kernels in a folder of this process, which goes with it.
+    """Keep compiled kernels in a temporary folder, which is removed when the process ends.
 
     Raises:
-        ResourceError: there is no place for one either.
+        ResourceError: a temporary folder cannot be made either.
     """
     if _temporary:
         return
@@ -159,7 +159,7 @@ def _checksums(folder: Path) -> dict[str, str]:
 
 
 def damaged(folder: Path) -> bool:
-    """Whether a module's folder holds other files than those that were loaded before."""
+    """Return whether files in a module's folder differ from those that were loaded before."""
     try:
         noted = json.loads((folder / CHECKSUMS).read_bytes())
         found = _checksums(folder)
@@ -171,7 +171,7 @@ def damaged(folder: Path) -> bool:
 
 
 def _record(folder: Path) -> None:
-    """Note the checksums of what was loaded; those noted before are left as they are."""
+    """Write the checksums of loaded files; existing ones are kept."""
     with contextlib.suppress(OSError, ValueError):
         path = folder / CHECKSUMS
         found = _checksums(folder)
@@ -185,11 +185,7 @@ def _record(folder: Path) -> None:
 
 
 def _discard(folder: Path) -> bool:
-    """Remove a module's folder; other processes may be looking, so it goes in one step.
-
-    Returns:
-        whether it is gone.
-    """
+    """Remove a module's folder in one step, as other processes may be using it; return whether it is gone."""
     away = folder.with_name(f"{folder.name}.damaged-{os.getpid()}")
     try:
         folder.rename(away)

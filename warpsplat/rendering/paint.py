@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient, picture, ramp, stops
+from warpsplat.kernels.paint import flat, gradient, padded, picture
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -64,21 +64,17 @@ class Painting:
 
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
+        kernels = []
         if self.has_gradients:
-            for kernel in (ramp.ramp_forward, stops.stops_forward, gradient.gradient_forward):
-                program.launch(
-                    kernel,
-                    (self._slots, self._backend.lanes),
-                    *self._sources,
-                    lane_columns=self._backend.lane_size,
-                    split=True,
-                )
+            kernels += [padded.ramp_forward, padded.chain_forward, gradient.gradient_forward]
         if self._pictures:
+            kernels.append(picture.picture_forward)
+        for kernel in kernels:
             program.launch(
-                picture.picture_forward,
+                kernel,
                 (self._slots, self._backend.lanes),
                 *self._sources,
-                self._pictures,
+                self._pictures or {},
                 lane_columns=self._backend.lane_size,
                 split=True,
             )
@@ -91,7 +87,7 @@ class Painting:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
         if self.has_gradients:
             shapes = self._parameters.shape_count
-            for kernel in (ramp.ramp_backward, stops.stops_backward, gradient.gradient_backward):
+            for kernel in (padded.ramp_backward, padded.chain_backward, gradient.gradient_backward):
                 program.launch(kernel, shapes, *self._sources, split=True)
         program.launch(
             flat.flat_backward,
