@@ -1,4 +1,4 @@
-"""The settings that the page offers: their names, defaults and words are those of the command line."""
+"""The settings on the page, with names, defaults and help of the command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ JSON_NAMES = {bool: "true or false", int: "a whole number", str: "a text"}
 
 
 def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str, Any], Settings]:
-    """What a page asks for.
+    """Parse a page's settings.
 
     Args:
         given: flags without their dashes and their values, as JSON has them.
