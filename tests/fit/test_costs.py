@@ -14,6 +14,7 @@ from warpsplat.drawing.costs import Costs
 from warpsplat.drawing.fit_outlines import Refinement
 from warpsplat.drawing.tidy import REFIT, finish_drawing
 from warpsplat.drawing.trace.trace import trace
+from warpsplat.extensions import renderer_names
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.costs import Course, score_cost
 from warpsplat.fit.schedule import phases
@@ -75,8 +76,7 @@ def test_kinds_of_steps_have_costs_of_their_own() -> None:
     kinds = (
         {},
         {"kind": Kind.STROKE},
-        {"renderer": "splat", "iterations": 1000},
-        {"renderer": "gaussian", "iterations": 1000},
+        *({"renderer": name, "iterations": 1000} for name in renderer_names() if name != "exact"),
     )
     costs = [course(make_settings(curves=64, **kind)).cost() for kind in kinds]
     assert len(set(costs)) == len(costs)
