@@ -114,6 +114,7 @@ def test_files_of_others_stay(
     assert not os.path.exists("photo-3.svg")
 
 
+@pytest.mark.needs("batch")
 def test_batches_say_what_to_use(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("batch", image, "--curves", "5,9") == 2
     assert "matrix: {curves: [5, 9]}" in one_line(capsys.readouterr().err)

@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from tests.golden.cases import CASES, digest_of, text_of
+from tests.golden.cases import ALL_CASES, CASES, digest_of, text_of
 
 EXPECTED = Path(__file__).with_name("digests.json")
 
@@ -34,7 +34,7 @@ def main() -> None:
             (given.save / f"{name}.svg").write_text(svg, encoding="utf-8")
     if given.update:
         known = json.loads(EXPECTED.read_text(encoding="utf-8")) if EXPECTED.exists() else {}
-        kept = {name: digest for name, digest in {**known, **digests}.items() if name in CASES}
+        kept = {name: digest for name, digest in {**known, **digests}.items() if name in ALL_CASES}
         EXPECTED.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import warpsplat
 from tests.golden.pictures import PICTURES
+from warpsplat.extensions import renderer_names
 
 TURNED = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 48" width="64" height="48">
 <defs><linearGradient id="g" gradientTransform="rotate(20)"><stop stop-color="#fa8"/>
@@ -19,7 +20,7 @@ TURNED = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 48" width="6
 
 SHORT: dict[str, Any] = {"curves": 16, "iterations": 40}
 
-CASES: dict[str, tuple[str, dict[str, Any]]] = {
+ALL_CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "photo closed": ("photo", {**SHORT}),
     "photo closed, another seed": ("photo", {**SHORT, "seed": 7}),
     "photo closed, draft": ("photo", {**SHORT, "quality": "draft"}),
@@ -54,6 +55,12 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "auto, sketch": ("sketch", {}),
     "auto, sprite": ("sprite", {}),
 }
+CASES = {
+    name: (picture, given)
+    for name, (picture, given) in ALL_CASES.items()
+    if given.get("renderer", "exact") in renderer_names()
+}
+"""Those whose renderer is there."""
 
 
 def text_of(name: str, threads: int | None = None) -> str:

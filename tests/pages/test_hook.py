@@ -44,12 +44,14 @@ def test_where_a_report_cannot_be(
     assert (tmp_path / "other.html").read_text() == "<p>mine</p>"
 
 
+@pytest.mark.needs("batch")
 def test_a_batch_that_cannot_write_its_list(image: Path, tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("<p>mine</p>")
     assert run("batch", image, "-o", tmp_path / "out", "--report", tmp_path, *QUICK) == 2
     assert (tmp_path / "index.html").read_text() == "<p>mine</p>"
 
 
+@pytest.mark.needs("batch")
 def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.png"
     other.write_bytes(image.read_bytes())
@@ -62,6 +64,7 @@ def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.needs("batch")
 @pytest.mark.parametrize(
     ("report", "said"),
     [

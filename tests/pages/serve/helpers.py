@@ -80,11 +80,11 @@ class Visitor:
         assert answer.status_code == 201, answer.text
         return str(answer.json()["run"])
 
-    def told(self) -> dict[str, Any]:
-        return self.store.told(self.session)
+    def state(self) -> dict[str, Any]:
+        return self.store.state_of(self.session)
 
     def run(self, run: str) -> dict[str, Any]:
-        return next(each for each in self.told()["runs"] if each["id"] == run)
+        return next(each for each in self.state()["runs"] if each["id"] == run)
 
     def over(self, run: str) -> dict[str, Any]:
         """What is told of a run once it is over."""

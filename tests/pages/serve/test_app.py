@@ -28,7 +28,7 @@ def one_line(text: str) -> str:
 def test_an_image_becomes_the_file_of_the_command_line(visitor: Visitor) -> None:
     data = picture()
     image = visitor.upload(data, "my photo.png")
-    (told,) = visitor.told()["images"]
+    (told,) = visitor.state()["images"]
     assert (told["id"], told["name"], told["width"], told["height"]) == (image, "my photo.png", 40, 32)
     run = visitor.over(visitor.begin(image, **SHORT))
     assert run["state"] == "done" and run["error"] == ""
@@ -75,7 +75,7 @@ def test_runs_wait_for_their_turn() -> None:
         assert (answer.status_code, answer.headers["retry-after"]) == (429, "5")
         assert one_line(answer.text) == "2 runs wait already: try again when one is done"
         visitor.client.post(visitor.at("runs", second, "stop"))  # leaves the queue
-        assert [run["id"] for run in visitor.told()["runs"]] == [first, third]
+        assert [run["id"] for run in visitor.state()["runs"]] == [first, third]
         visitor.client.post(visitor.at("runs", first, "stop"))
         assert visitor.over(third)["state"] == "done" and visitor.run(first)["state"] == "stopped"
 
@@ -174,7 +174,7 @@ def test_the_picture_of_an_image_was_made_here(visitor: Visitor) -> None:
     assert answer.headers["content-type"] == "image/png" and b"<script>" not in answer.content
     with Image.open(io.BytesIO(answer.content)) as shown:
         assert shown.size == (20, 30) and shown.getpixel((3, 3)) == (200, 10, 10, 128)
-    (told,) = visitor.told()["images"]
+    (told,) = visitor.state()["images"]
     assert (told["width"], told["height"], told["transparent"]) == (20, 30, True)
 
 

@@ -67,7 +67,7 @@ def test_the_time_that_is_left() -> None:
     live = Live(clock=slow)
     slow.now = 30.0  # kernels were compiled
     live.begin()
-    live.say("compiling kernels: 3 s")
+    live.notify("compiling kernels: 3 s")
     assert live.as_dict() == {"work": 0.0, "note": "compiling kernels: 3 s", "seconds": 0.0}
     report = Progress(1, 10, math.inf, 1.0, 0.1, False, 5)
     live(report)

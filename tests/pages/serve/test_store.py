@@ -67,7 +67,7 @@ def test_a_page_that_is_closed_is_forgotten_after_a_while() -> None:
     store.finish(running, Made())  # it ends later, and nobody wants it
     assert store.held() == {"sessions": 1, "runs": 0, "waiting": 0, "images": 0, "results": 0, "coming": 0}
     with pytest.raises(Refused, match="load it anew") as refused:
-        store.told(unread)
+        store.state_of(unread)
     assert refused.value.status == 404
     store.leave(read)
     clock.now = 19
@@ -83,7 +83,7 @@ def test_images_give_way_to_new_ones_but_not_while_they_are_needed() -> None:
     first, second = (store.add_picture(session, picture()) for _ in range(2))
     add(store, session, first)
     store.reserve(100)
-    assert [image["id"] for image in store.told(session)["images"]] == [first]
+    assert [image["id"] for image in store.state_of(session)["images"]] == [first]
     add(store, session, store.add_picture(session, picture(50)))
     with pytest.raises(Refused, match="try again when a run is done") as refused:
         store.reserve(100)
@@ -110,7 +110,7 @@ def test_the_oldest_results_go_first() -> None:
     assert store.held()["results"] == 20
     large = add(store, session, image)
     do(store, "x" * 40)  # what is larger than all that may be held is held alone
-    assert [run["id"] for run in store.told(session)["runs"]] == [large]
+    assert [run["id"] for run in store.state_of(session)["runs"]] == [large]
     for _ in range(4):
         add(store, session, image)
     assert store.held()["runs"] == 4 and large not in store._sessions[session].runs
@@ -133,8 +133,8 @@ def test_an_image_goes_with_its_runs() -> None:
     kept = add(store, session, other)
     store.remove_picture(session, one)
     assert running and running.stopping.is_set()
-    assert [run["id"] for run in store.told(session)["runs"]] == [kept]
-    assert store.told(session)["runs"][0]["place"] == 0
+    assert [run["id"] for run in store.state_of(session)["runs"]] == [kept]
+    assert store.state_of(session)["runs"][0]["place"] == 0
     store.remove_run(session, kept)
     assert store.held()["waiting"] == store.held()["runs"] == 0
     for missing in (lambda: store.run(session, kept), lambda: store.remove_picture(session, one)):

@@ -1,4 +1,4 @@
-"""The requests that the page makes. Errors are one line of plain text with their status.
+"""Answer the page's requests. Errors are one line of plain text with their status.
 
 Everything is found by its name in the store: no part of an address is ever a path of the file system.
 """
@@ -33,23 +33,23 @@ from warpsplat.pages.serve.worker import Machine, Worker
 from warpsplat.run.command_line import vectorize_command
 
 MAX_REQUEST = 20_000
-"""Of what is no image [bytes]."""
+"""Maximum size of bodies that are not images [bytes]."""
 
 UPLOAD_TIME = 300.0
-"""For an image to come [s]: the room that is kept for it is somebody else's."""
+"""Maximum time of an upload [s], for which space is reserved."""
 
 TIDY_INTERVAL = 2.0
-"""Between two looks for pages that were closed [s]."""
+"""Time between two searches for closed pages [s]."""
 
 LAST_WAIT = 10.0
-"""For the run that goes on when the server ends [s]."""
+"""Time for the current run to end with the server [s]."""
 
 
 class Service:
-    """The answers to a page's requests."""
+    """Handlers of a page's requests."""
 
     def __init__(self, store: Store, machine: Machine, page: str, max_memory: str | None = None) -> None:
-        """Nothing is done yet.
+        """Do nothing yet.
 
         Args:
             store: what is held.
@@ -61,7 +61,7 @@ class Service:
         self._reading = asyncio.Semaphore(1)
 
     def app(self) -> Starlette:
-        """The application, which does the runs while it lives."""
+        """Return the application, which does the runs while it lives."""
         session = "/sessions/{session}"
         image, run = session + "/images/{image}", session + "/runs/{run}"
         routes = (
@@ -107,23 +107,23 @@ class Service:
                 await run_in_threadpool(release_memory)
 
     async def show_page(self, _: Request) -> Response:
-        """The page. Its own head says what it may load and run."""
+        """Return the page. Its own head says what it may load and run."""
         return HTMLResponse(self._page, headers={"Content-Security-Policy": "frame-ancestors 'none'"})
 
     async def open_session(self, _: Request) -> Response:
-        """A new session, for a page that was opened."""
+        """Open a session for a page."""
         return JSONResponse({"session": self._store.open()}, 201)
 
     async def tell(self, request: Request) -> Response:
-        """The states of a session."""
+        """Stream the states of a session."""
         session = request.path_params["session"]
-        self._store.told(session)  # refused before the stream begins
+        self._store.state_of(session)  # refused before the stream begins
         return StreamingResponse(events(self._store, session), media_type="text/event-stream")
 
     async def upload(self, request: Request) -> Response:
-        """Take an image: the body of the request is its file."""
+        """Receive an image as the body of the request."""
         session = request.path_params["session"]
-        self._store.told(session)
+        self._store.state_of(session)
         name = plain_name(request.query_params.get("name", DEFAULT_NAME))
         limit = self._store.limits.upload
         size = _length(request)
@@ -145,18 +145,18 @@ class Service:
         return JSONResponse({"image": self._store.add_picture(session, picture)}, 201)
 
     async def show_image(self, request: Request) -> Response:
-        """A picture of an image."""
+        """Return the displayed picture of an image."""
         picture = self._picture(request)
         return Response(picture.shown, media_type=picture.media, headers=KEPT)
 
     async def remove_image(self, request: Request) -> Response:
-        """Forget an image and its runs."""
+        """Delete an image and its runs."""
         self._store.remove_picture(request.path_params["session"], request.path_params["image"])
         await run_in_threadpool(release_memory)
         return Response(status_code=204)
 
     async def start(self, request: Request) -> Response:
-        """Queue a run: of ``image``, with ``settings``."""
+        """Queue a run of ``image`` with ``settings``."""
         session = request.path_params["session"]
         given = _parsed(await _body(request, MAX_REQUEST, "the request"))
         image = given.get("image")
@@ -168,23 +168,23 @@ class Service:
         return JSONResponse({"run": run}, 201)
 
     async def stop(self, request: Request) -> Response:
-        """End a run with the shapes as they are."""
+        """Stop a run, with the shapes so far."""
         self._store.stop_run(request.path_params["session"], request.path_params["run"])
         return Response(status_code=204)
 
     async def remove_run(self, request: Request) -> Response:
-        """Forget a run."""
+        """Delete a run."""
         self._store.remove_run(request.path_params["session"], request.path_params["run"])
         await run_in_threadpool(release_memory)
         return Response(status_code=204)
 
     async def show_live(self, request: Request) -> Response:
-        """The shapes of a run that goes on."""
+        """Return the current shapes of a run."""
         run = self._store.run(request.path_params["session"], request.path_params["run"])
         return _svg(run.svg or run.live.picture, {})
 
     async def show_result(self, request: Request) -> Response:
-        """The file of a run; to be saved, where ``download`` is asked for."""
+        """Return the file of a run; as an attachment with ``download``."""
         run = self._store.run(request.path_params["session"], request.path_params["run"])
         if "download" not in request.query_params:
             return _svg(run.svg, KEPT)
@@ -197,11 +197,11 @@ class Service:
 
 
 KEPT = {"Cache-Control": "private, max-age=3600, immutable"}
-"""Of what stays as it is while there is an address for it."""
+"""Headers of immutable responses."""
 
 
 def _stem(name: str) -> str:
-    """Of an image's file, for its SVG."""
+    """Return the name of the SVG for an image's file."""
     stem, _, ending = name.rpartition(".")
     return stem if stem and "/" not in ending else name
 
@@ -213,13 +213,13 @@ def _svg(data: bytes, headers: dict[str, str]) -> Response:
 
 
 def _length(request: Request) -> int | None:
-    """Of a body, as its sender says [bytes]; None where it does not."""
+    """Return the declared size of a body [bytes], or None."""
     given = request.headers.get("content-length", "")
     return int(given) if given.isascii() and given.isdigit() else None
 
 
 async def _body(request: Request, limit: int, name: str) -> bytes:
-    """All of it, refused as soon as it is too long: uvicorn throws away what comes after an answer."""
+    """Return the body; refuse it as soon as it is too long: uvicorn discards the rest."""
     parts, size = [], 0
     async for part in request.stream():
         size += len(part)
@@ -246,7 +246,7 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 
 async def _failed(_: Request, error: Exception) -> Response:
-    """What the library refuses, as an image that is none or settings that do not go together; or a fault."""
+    """Answer errors of the library: unreadable images, conflicting settings, or faults."""
     if os.environ.get("WARPSPLAT_TRACEBACK"):
         traceback.print_exception(error)
     status = 415 if isinstance(error, ImageError) else 400 if isinstance(error, UsageError) else 500

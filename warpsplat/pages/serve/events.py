@@ -1,4 +1,4 @@
-"""What a page is told while it is open: server-sent events, each the whole state of its session.
+"""Server-sent events of a page, each the whole state of its session.
 
 A page that comes back, or missed some, is right with the next one.
 """
@@ -13,21 +13,21 @@ from warpsplat.pages.serve.limits import Refused
 from warpsplat.pages.serve.store import Store
 
 INTERVAL = 0.15
-"""Between two looks at what has changed [s]."""
+"""Time between two checks for changes [s]."""
 
 PULSE = 5.0
-"""After which something is sent in any case [s]: that nobody reads any more is noticed by writing."""
+"""Maximum time between two events [s]: a closed connection is noticed by writing."""
 
 
 async def events(store: Store, session: str) -> AsyncIterator[str]:
-    """The states of a session, until it is forgotten or the server ends; its reader is counted meanwhile."""
+    """Yield the states of a session until it is deleted or the server ends, and count as its reader."""
     store.attend(session)
     version, last, silent = -1, "", 0.0
     try:
         while not store.closed:
             if store.version != version:
                 version = store.version
-                text = json.dumps(store.told(session), allow_nan=False)
+                text = json.dumps(store.state_of(session), allow_nan=False)
                 if text != last:
                     last, silent = text, 0.0
                     yield f"data: {text}\n\n"

@@ -1,4 +1,4 @@
-"""The settings that the page offers: their names, defaults and words are those of the command line."""
+"""The settings on the page, with names, defaults and help of the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who may ask: what other users and other pages cannot do to a server on this machine, and why.
+"""Protect the server on this machine from other users and other pages.
 
 * Another user of the machine can connect: a token, which only the printed address has, becomes a cookie.
 * A page of the web can send requests here (CSRF): the cookie is kept from it (``SameSite``), and what
@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from warpsplat.errors import printable
 
 TOKEN = "token"
-"""Of an address' query."""
+"""Query parameter of the address."""
 
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -34,17 +34,17 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Of every answer."""
+"""Headers of every response."""
 
 NOTHING = "default-src 'none'; style-src 'unsafe-inline'; sandbox; frame-ancestors 'none'"
-"""Policy of what is no page of ours: an SVG that is opened by itself runs and loads nothing."""
+"""Policy of other responses: an SVG opened by itself runs and loads nothing."""
 
 
 class Guard:
-    """Stands before an application: lets in who may ask, and gives every answer its headers."""
+    """Wraps an application: rejects unauthorised requests, and adds headers to responses."""
 
     def __init__(self, app: ASGIApp, token: str, host: str = "") -> None:
-        """Before ``app``.
+        """Wrap ``app``.
 
         Args:
             app: behind it.
@@ -55,7 +55,7 @@ class Guard:
         self._tickets: set[str] = set()
 
     def ticket(self) -> str:
-        """A token that is good once: others can read the command line of a browser that gets it."""
+        """Return a token for one use, because other users can read a browser's command line."""
         made = secrets.token_urlsafe(16)
         self._tickets.add(made)
         return made
@@ -76,7 +76,7 @@ class Guard:
         await (self._checked(Request(scope)) or self._app)(scope, receive, marked)
 
     def _checked(self, request: Request) -> Response | None:
-        """What is answered to somebody who may not ask, or brings the token; None: may pass."""
+        """Return the response to an unauthorised request, or to one with the token; None to pass it on."""
         headers = request.headers
         name, port = _place(headers.get("host", ""))
         if not self._is_ours(name):
@@ -94,7 +94,7 @@ class Guard:
         return None
 
     def _is_ours(self, name: str) -> bool:
-        """Whether the name of a host cannot be one that leads here by somebody else's will."""
+        """Return whether a host name is safe from DNS rebinding."""
         if name.lower() in {"localhost", self._host}:
             return bool(name)
         try:
@@ -114,7 +114,7 @@ class Guard:
 
 
 def _is_same(headers: Headers) -> bool:
-    """Whether a request comes from a page of this server, or from no page."""
+    """Return whether a request comes from a page of this server, or from no page."""
     origin = headers.get("origin")
     if origin is None:
         return headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
@@ -122,7 +122,7 @@ def _is_same(headers: Headers) -> bool:
 
 
 def _place(host: str) -> tuple[str, int]:
-    """Name and port that a request was sent to; no name where they make no sense."""
+    """Return the host and port of a request; no host if invalid."""
     try:
         found = urlsplit(f"//{host}")
         return found.hostname or "", found.port or 80
@@ -131,5 +131,5 @@ def _place(host: str) -> tuple[str, int]:
 
 
 def line(status: int, text: str, headers: Iterable[tuple[str, str]] = ()) -> PlainTextResponse:
-    """An answer of one line."""
+    """Return a response of one line."""
     return PlainTextResponse(f"{text}\n", status, dict(headers))

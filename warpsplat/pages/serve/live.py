@@ -1,4 +1,4 @@
-"""What there is to see of a run that goes on: how far it is, and now and then its picture."""
+"""Show a run in progress: its figures, and its image now and then."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from warpsplat.fit.progress import Progress, Snapshot, TimeLeft
 from warpsplat.run.svg import save_svg
 
 SHARE = 0.07
-"""Of a run's time that pictures of it may take: with all the rest a page costs less than a tenth."""
+"""Fraction of a run's time for its images; in all, a page costs less than a tenth."""
 
 LEAST_PAUSE = 0.4
-"""From one picture to the next [s]."""
+"""Minimum time between two images [s]."""
 
 
 class Live:
-    """The callback of a run. The worker's thread writes, others read: each field is replaced as a whole."""
+    """Callback of a run. The worker's thread writes, others read: each field is replaced as a whole."""
 
     def __init__(
         self,
@@ -27,7 +27,7 @@ class Live:
         changed: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Nothing was heard yet.
+        """Start without any report.
 
         Args:
             is_watched: whether anybody looks: without, no picture is made.
@@ -42,18 +42,18 @@ class Live:
         self.left: float | None = None
         """[s]"""
         self.picture = b""
-        """The shapes, as an SVG."""
+        """The shapes as an SVG."""
         self.number = 0
-        """Of pictures so far."""
+        """Number of images so far."""
         self.note = ""
-        """What the library has to say, as that kernels are being compiled."""
+        """Notice of the library, such as that kernels are being compiled."""
 
     def begin(self) -> None:
-        """Note that the run's turn has come."""
+        """Note that the run has started."""
         self._started = self._clock()
 
     def __call__(self, progress: Progress) -> None:
-        """Hear a report."""
+        """Take a progress report."""
         now = self._clock()
         self.left = self._time.update(progress.work, now)
         self.note = ""
@@ -63,20 +63,20 @@ class Live:
             self._draw(snapshot, now)
         self._changed()
 
-    def say(self, text: str) -> None:
-        """Hear what the library has to say."""
+    def notify(self, text: str) -> None:
+        """Take a notice of the library."""
         self.note = text
         self._changed()
 
     def _draw(self, snapshot: Snapshot, now: float) -> None:
-        """Take a picture, and find out when there is time for the next one."""
+        """Make an image, and schedule the next one."""
         self.picture = save_svg(snapshot.scene()).encode()
         self.number += 1
         done = self._clock()
         self._next = done + max(LEAST_PAUSE, (done - now) * (1 / SHARE - 1))
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return JSON values."""
         seconds = self._clock() - self._started
         if self.progress is None:
             return {"work": 0.0, "note": self.note, "seconds": round(seconds, 1)}

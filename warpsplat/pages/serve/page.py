@@ -1,4 +1,4 @@
-"""The page, made once: all that differs from session to session comes as events."""
+"""The page, made once: everything specific to a session comes as events."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from warpsplat.run.options import BY_NAME
 
 
 def serve_page(limits: Limits) -> str:
-    """The page as HTML, with the form that the table of options makes."""
+    """Return the page as HTML, with a form made from the table of options."""
     options = {name: BY_NAME[name] for name in FIELDS}
     return page(
         "serve.html.j2",
@@ -22,5 +22,5 @@ def serve_page(limits: Limits) -> str:
 
 
 def default_of(option: Option) -> str:
-    """What a choice has when nothing is chosen."""
+    """Return the default of a choice."""
     return option.default if option.choices else ""

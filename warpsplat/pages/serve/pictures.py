@@ -1,4 +1,4 @@
-"""An image that was given to the server: its file, and a picture of it that any browser shows.
+"""An uploaded image: its file, and a picture of it for browsers.
 
 The file itself is never sent back: what a browser gets was drawn and encoded here.
 """
@@ -17,26 +17,26 @@ from warpsplat.run.render import to_pillow
 from warpsplat.scene import FloatArray
 
 SHOWN_PIXELS = 4_000_000
-"""Of the picture that a page shows: a screen has as many."""
+"""Maximum pixels of a displayed picture, as many as a screen has."""
 
 LOSSLESS_PIXELS = 1_000_000
-"""Up to which that picture is the image to the last bit."""
+"""Maximum pixels of a lossless picture."""
 
 WEBP_QUALITY = 92
 
 LONGEST_NAME = 100
-"""Characters of a file's name."""
+"""Maximum characters of a file name."""
 
 DEFAULT_NAME = "image"
 
 
 @dataclass(frozen=True)
 class Picture:
-    """An image, and what is shown of it."""
+    """An image and its displayed picture."""
 
     name: str
     data: bytes
-    """Of its file."""
+    """Name of its file."""
     width: int
     """[px]"""
     height: int
@@ -50,11 +50,11 @@ class Picture:
 
     @property
     def size(self) -> int:
-        """Memory that it takes [bytes]."""
+        """Return its memory [bytes]."""
         return len(self.data) + len(self.shown)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return JSON values."""
         return {
             "name": self.name,
             "width": self.width,
@@ -65,7 +65,7 @@ class Picture:
 
 
 def plain_name(name: str) -> str:
-    """The last part of a file's name, as one printable line that is not too long."""
+    """Return the last part of a file name, printable and not too long."""
     last = printable(re.split(r"[/\\]", name)[-1]).strip()
     stem, dot, ending = last.rpartition(".")
     if len(last) > LONGEST_NAME:
@@ -74,7 +74,7 @@ def plain_name(name: str) -> str:
 
 
 def read_picture(data: bytes, name: str) -> Picture:
-    """Look at the bytes of an image file.
+    """Read an image file.
 
     Raises:
         ImageError: they are no image that can be read; the message is one line.
@@ -100,7 +100,7 @@ def read_picture(data: bytes, name: str) -> Picture:
 
 
 def _encoded(pixels: FloatArray) -> tuple[bytes, str]:
-    """As a file for browsers, and its media type."""
+    """Encode a picture for browsers; return the file and its media type."""
     buffer = io.BytesIO()
     image = to_pillow(pixels)
     if image.width * image.height <= LOSSLESS_PIXELS:

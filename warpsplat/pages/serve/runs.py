@@ -1,4 +1,4 @@
-"""A run that a page asked for, from its place in the queue to its file."""
+"""A run of a page, from the queue to its file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIGURES = (
     "why",
     "reduced",
 )
-"""Of a result, as ``Result.as_dict`` names them: what the page shows."""
+"""Figures of ``Result.as_dict`` that the page shows."""
 
 
 @dataclass(eq=False)
@@ -34,30 +34,30 @@ class Run:
 
     id: str
     number: int
-    """Of its session's runs, from 1."""
+    """Number within its session, from 1."""
     image: str
-    """By which its session knows the picture."""
+    """Name of its image in the session."""
     picture: Picture
     values: dict[str, Any]
-    """Settings, as they were given."""
+    """Settings as given."""
     settings: Settings
     command: str
-    """What makes the same file in a shell."""
+    """The command that makes the same file."""
     state: State = "waiting"
     live: Live = field(default_factory=Live)
     stopping: threading.Event = field(default_factory=threading.Event)
-    """Set once it shall end with the shapes as they are."""
+    """Set to stop it with the shapes so far."""
     svg: bytes = b""
     figures: dict[str, Any] = field(default_factory=dict)
     error: str = ""
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing of it is to come."""
+        """Whether it is finished."""
         return self.state not in {"waiting", "running"}
 
     def finish(self, result: Result) -> None:
-        """Take what it made."""
+        """Set its result."""
         figures = result.as_dict()
         self.svg = result.svg.encode()
         self.figures = {name: figures[name] for name in FIGURES if name in figures}
@@ -70,8 +70,8 @@ class Run:
         self.live.picture = b""
 
     def as_dict(self, place: int) -> dict[str, Any]:
-        """For JSON. ``place``: runs that are before it."""
-        told = {
+        """Return JSON values. ``place``: number of runs before it."""
+        values = {
             "id": self.id,
             "number": self.number,
             "image": self.image,
@@ -81,7 +81,7 @@ class Run:
             "error": self.error,
         }
         if self.state == "waiting":
-            told["place"] = place
+            values["place"] = place
         elif self.state == "running":
-            told |= {"live": self.live.as_dict(), "stopping": self.stopping.is_set()}
-        return told | {"figures": self.figures}
+            values |= {"live": self.live.as_dict(), "stopping": self.stopping.is_set()}
+        return values | {"figures": self.figures}

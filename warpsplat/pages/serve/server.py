@@ -1,4 +1,4 @@
-"""The server itself: its socket, its address, and its end."""
+"""The server: its socket, its address, and its shutdown."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
 
 LAST_ANSWERS = 2
-"""For answers that are being given when the server ends [s]."""
+"""Time for responses in progress at shutdown [s]."""
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """A socket that listens.
+    """Return a listening socket.
 
     Raises:
         UsageError: it cannot be had; the message says why.
@@ -46,7 +46,7 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can connect to an address."""
+    """Return whether only this machine can connect to an address."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -54,7 +54,7 @@ def is_loopback(host: str) -> bool:
 
 
 class WarpsplatServer:
-    """A server that listens from the beginning, and answers while ``run`` goes on."""
+    """A server that listens from its creation, and answers during ``run``."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class WarpsplatServer:
         """
         self._host, self._socket = host, bound(host, port)
         self.port = int(self._socket.getsockname()[1])
-        """That it listens to."""
+        """Port that it listens on."""
         self._token = secrets.token_urlsafe(24)
         self.store = Store(limits)
         page = serve_page(self.store.limits)
@@ -87,11 +87,11 @@ class WarpsplatServer:
         self._guard = Guard(service.app(), self._token, host)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._socket.close()
 
     def address(self, token: str | None = None) -> str:
-        """Of the page; ``token``: another one than that of all."""
+        """Return the page's address; ``token``: another token than the server's."""
         shown = (
             "127.0.0.1" if self._host in {"0.0.0.0", ""} else "[::1]" if self._host == "::" else self._host
         )
@@ -99,11 +99,11 @@ class WarpsplatServer:
         return f"http://{shown}:{self.port}/?{TOKEN}={token or self._token}"
 
     def ticket(self) -> str:
-        """The address of the page, good for one time."""
+        """Return the page's address with a token for one use."""
         return self.address(self._guard.ticket())
 
     def run(self, stop: Callable[[], bool], ready: Callable[[], None] = lambda: None) -> None:
-        """Answer requests until ``stop``, which is asked now and then; ``ready`` is called at the start."""
+        """Answer requests until ``stop`` returns true; call ``ready`` at the start."""
         logging.getLogger("uvicorn").setLevel(logging.CRITICAL)  # what it has to say is of clients' making
         config = uvicorn.Config(
             self._guard,
@@ -128,7 +128,7 @@ class WarpsplatServer:
 
 
 class _Uvicorn(uvicorn.Server):
-    """Asks whether to stop, in place of signal handlers of its own: ours say what a second Ctrl-C does."""
+    """Polls ``stop`` instead of installing signal handlers, so that ours handle a second Ctrl-C."""
 
     def __init__(
         self,
@@ -142,11 +142,11 @@ class _Uvicorn(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
-        """Leave them as they are."""
+        """Install no handlers."""
         yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to answer."""
+        """Start answering."""
         await super().startup(sockets)
         self._door = Acceptor(self._listener, self._protocol)
         self._is_over()  # from the first question on a signal is a wish
@@ -156,12 +156,12 @@ class _Uvicorn(uvicorn.Server):
         return Protocol(self.config, self.server_state, self.lifespan.state)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Answer no more."""
+        """Stop answering."""
         self._door.close()
         await super().shutdown(sockets)
 
     async def on_tick(self, counter: int) -> bool:
-        """Whether to end; asked ten times a second."""
+        """Return whether to end; called ten times a second."""
         for connection in list(self.server_state.connections):
             assert isinstance(connection, Protocol)
             connection.close_if_idle()

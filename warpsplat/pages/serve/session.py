@@ -1,4 +1,4 @@
-"""A page that is open: what it gave, and what was made of it."""
+"""An open page, with its images and results."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ class Session:
 
     id: str
     seen: float
-    """When it was opened, or the last of its readers left."""
+    """Time at which it was opened or its last reader left."""
     readers: int = 0
-    """Streams of events that are open."""
+    """Number of open event streams."""
     begun: int = 0
-    """Runs so far."""
+    """Number of runs so far."""
     pictures: dict[str, Picture] = field(default_factory=dict)
     runs: dict[str, Run] = field(default_factory=dict)
 
     def runs_of(self, image: str) -> list[Run]:
-        """Of one image."""
+        """Return the runs of one image."""
         return [run for run in self.runs.values() if run.image == image]
 
     def as_dict(self, places: Mapping[Run, int]) -> dict[str, Any]:
-        """For JSON. ``places``: of runs that wait, how many are before them."""
+        """Return JSON values. ``places``: of waiting runs, the number of runs before them."""
         return {
             "images": [{"id": name} | picture.as_dict() for name, picture in self.pictures.items()],
             "runs": [run.as_dict(places.get(run, 0)) for run in self.runs.values()],

@@ -1,4 +1,4 @@
-"""What pages gave and what was made of it: in memory, bounded, and forgotten with the page."""
+"""Images and results of all pages: in memory, bounded, and deleted with the page."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ class Store:
     def __init__(self, limits: Limits | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self.limits = limits or Limits()
         self.version = 0
-        """Grows with everything that a page may want to be told."""
+        """Increases with every change that pages should see."""
         self.closed = False
         self._clock = clock
         self._sessions: dict[str, Session] = {}
         self._queue: deque[Run] = deque()
         self._coming = 0
-        """Of uploads that are on their way [bytes]."""
+        """Space reserved for uploads in progress [bytes]."""
         self._lock = threading.Condition(threading.RLock())
 
     # Sessions
 
     def open(self) -> str:
-        """A new session's name.
+        """Open a session and return its name.
 
         Raises:
             Refused: there are too many.
@@ -69,24 +69,24 @@ class Store:
         return self._sessions[name]
 
     def attend(self, name: str) -> None:
-        """Note that somebody reads a session's events."""
+        """Count a reader of a session's events."""
         with self._lock:
             self._session(name).readers += 1
 
     def leave(self, name: str) -> None:
-        """Note that somebody does so no more."""
+        """Remove a reader."""
         with self._lock:
             if session := self._sessions.get(name):
                 session.readers -= 1
                 session.seen = self._clock()
 
     def is_attended(self, name: str) -> bool:
-        """Whether anybody reads a session's events."""
+        """Return whether a session's events have a reader."""
         with self._lock:
             return name in self._sessions and self._sessions[name].readers > 0
 
     def expire(self) -> bool:
-        """Forget sessions that nobody has read for a while; whether there were any."""
+        """Delete sessions without a reader for a while; return whether there were any."""
         with self._lock:
             before = self._clock() - self.limits.grace
             gone = [s for s in self._sessions.values() if s.readers <= 0 and s.seen <= before]
@@ -95,8 +95,8 @@ class Store:
                 del self._sessions[session.id]
             return bool(gone)
 
-    def told(self, name: str) -> dict[str, Any]:
-        """A session as its page is told of it, for JSON."""
+    def state_of(self, name: str) -> dict[str, Any]:
+        """Return a session's state for its page, as JSON values."""
         with self._lock:
             session = self._session(name)
             busy = any(run.state == "running" for run in self._all_runs())
@@ -105,7 +105,7 @@ class Store:
     # Images
 
     def reserve(self, size: int) -> None:
-        """Make room for an upload; to be given back by ``unreserve``.
+        """Reserve space for an upload, until ``unreserve``.
 
         Raises:
             Refused: there is none.
@@ -115,12 +115,12 @@ class Store:
             self._coming += size
 
     def unreserve(self, size: int) -> None:
-        """Give up the room for an upload, which is over."""
+        """Release the space for an upload."""
         with self._lock:
             self._coming -= size
 
     def add_picture(self, name: str, picture: Picture) -> str:
-        """Hold an image; the name by which the session knows it.
+        """Store an image, and return its name in the session.
 
         Raises:
             Refused: there is no room for it, or no such session.
@@ -134,7 +134,7 @@ class Store:
             return image
 
     def picture(self, name: str, image: str) -> Picture:
-        """An image.
+        """Return an image.
 
         Raises:
             Refused: there is none of that name.
@@ -143,7 +143,7 @@ class Store:
             return _held(self._session(name).pictures, image, "image")
 
     def remove_picture(self, name: str, image: str) -> None:
-        """Forget an image and its runs.
+        """Delete an image and its runs.
 
         Raises:
             Refused: there is none of that name.
@@ -155,7 +155,7 @@ class Store:
     # Runs
 
     def add_run(self, name: str, image: str, values: dict[str, Any], settings: Settings, command: str) -> str:
-        """Put a run at the end of the queue; its name.
+        """Queue a run, and return its name.
 
         Raises:
             Refused: too many wait, or there is no such image.
@@ -177,7 +177,7 @@ class Store:
             return run.id
 
     def run(self, name: str, run: str) -> Run:
-        """A run.
+        """Return a run.
 
         Raises:
             Refused: there is none of that name.
@@ -186,7 +186,7 @@ class Store:
             return _held(self._session(name).runs, run, "run")
 
     def stop_run(self, name: str, run: str) -> None:
-        """Have a run end with the shapes as they are; one that waits leaves the queue.
+        """Stop a run, with the shapes so far, or remove it from the queue.
 
         Raises:
             Refused: there is none of that name.
@@ -199,7 +199,7 @@ class Store:
             self._changed()
 
     def remove_run(self, name: str, run: str) -> None:
-        """Forget a run, which ends.
+        """Stop and delete a run.
 
         Raises:
             Refused: there is none of that name.
@@ -210,7 +210,7 @@ class Store:
     # The worker
 
     def next(self) -> Run | None:
-        """The run whose turn it is, waited for; None once the store is closed."""
+        """Wait for the next run of the queue; None once the store is closed."""
         with self._lock:
             self._lock.wait_for(lambda: self.closed or self._queue)
             if self.closed:
@@ -222,7 +222,7 @@ class Store:
             return run
 
     def finish(self, run: Run, outcome: Result | str) -> None:
-        """Take what a run made, or why it failed; the oldest results go where there is no room for it."""
+        """Store a run's result or error, deleting the oldest results if there is no space."""
         with self._lock:
             if isinstance(outcome, str):
                 run.fail(outcome)
@@ -233,7 +233,7 @@ class Store:
             self._changed()
 
     def close(self) -> None:
-        """End: no run begins, the one that goes on is asked to stop, streams of events end."""
+        """Close: start no run, stop the current one, end the streams of events."""
         with self._lock:
             self.closed = True
             for session in self._sessions.values():
@@ -244,7 +244,7 @@ class Store:
     # Room
 
     def held(self) -> dict[str, int]:
-        """How much of everything there is; images and results in bytes."""
+        """Return the number of everything, and the bytes of images and results."""
         with self._lock:
             return {
                 "sessions": len(self._sessions),
@@ -271,7 +271,7 @@ class Store:
         return sum(len(run.svg) for run in self._all_runs())
 
     def _make_room(self, size: int) -> None:
-        """For an image: the oldest ones without a run that is to be done go."""
+        """Make space for an image by deleting the oldest ones without pending runs."""
         room = self.limits.room - self._coming - size
         while self._image_bytes() > room:
             for session in self._sessions.values():
@@ -291,7 +291,7 @@ class Store:
         self._changed()
 
     def _drop_oldest_run(self, but: Run | None = None) -> bool:
-        """Forget the oldest run that is over; whether there was one."""
+        """Delete the oldest finished run; return whether there was one."""
         for session in self._sessions.values():
             for run in session.runs.values():
                 if run.is_over and run is not but:

@@ -1,4 +1,4 @@
-"""Who does the runs: one thread, one run after the other, each with all that the machine has."""
+"""Do the runs in one thread, one after the other, each with the whole machine."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from warpsplat.run.result import Result
 
 @dataclass(frozen=True)
 class Machine:
-    """Where runs are computed."""
+    """Device and threads of runs."""
 
     device: str = "auto"
     threads: int | None = None
 
 
 class Worker(threading.Thread):
-    """Does what is in a store's queue until that is closed."""
+    """Does the runs in a store's queue until it is closed."""
 
     def __init__(self, store: Store, machine: Machine) -> None:
         # Where the program has to end at once, as within the compiler, it does not wait for a run.
@@ -36,7 +36,7 @@ class Worker(threading.Thread):
         self._store, self._machine = store, machine
 
     def run(self) -> None:
-        """One run after the other."""
+        """Do one run after the other."""
         while run := self._store.next():
             with _notices(run.live):
                 outcome = self._made(run)
@@ -45,7 +45,7 @@ class Worker(threading.Thread):
             release_memory()
 
     def _made(self, run: Run) -> Result | str:
-        """The result, or why there is none."""
+        """Return the result, or an error."""
         try:
             return warpsplat.vectorize(
                 run.picture.data,
@@ -68,12 +68,12 @@ class _Handler(logging.Handler):
         self._live = live
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._live.say(record.getMessage())
+        self._live.notify(record.getMessage())
 
 
 @contextlib.contextmanager
 def _notices(live: Live) -> Iterator[None]:
-    """Tell a run's page what the library says meanwhile."""
+    """Show the library's notices on the run's page."""
     log, handler = logging.getLogger("warpsplat"), _Handler(live)
     log.addHandler(handler)
     try:
