@@ -227,7 +227,7 @@ def test_the_file_looks_as_the_render(device: str, kind: Kind, basis: Basis) -> 
     mine = render(scene, backend=backend).astype(np.float64) * 255
     assert psnr(mine, on_white(render_svg(write_svg(scene)))) > 42
     swapped = replace(scene, points=scene.take(np.arange(len(scene))[::-1]).points)
-    assert psnr(mine, on_white(render_svg(write_svg(swapped)))) < 20
+    assert psnr(mine, on_white(render_svg(write_svg(swapped)))) < 25
 
 
 @pytest.mark.parametrize("basis", list(Basis))
