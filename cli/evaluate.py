@@ -10,8 +10,7 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks, hook_options
-from warpsplat.cli.options import FILE, overwrite_option
-from warpsplat.cli.request import Request
+from warpsplat.cli.options import FILE, Request, overwrite_option
 from warpsplat.errors import UsageError
 
 

@@ -15,7 +15,7 @@ from warpsplat.errors import UsageError
 from warpsplat.extensions import extensions, load
 
 if TYPE_CHECKING:
-    from warpsplat.cli.request import Request
+    from warpsplat.cli.options import Request
     from warpsplat.fit.progress import Progress
     from warpsplat.run.result import Result
 
@@ -150,6 +150,23 @@ class Hooks:
         """See ``RunHook``."""
         for hook in self._hooks:
             hook.check(inputs, outputs, overwrite=overwrite)
+
+    def check_files(
+        self, inputs: Sequence[Path], output: Path, checkpoint: Path | None, *, overwrite: bool
+    ) -> None:
+        """Check before a run that it can write its result and its checkpoint, then ``check``.
+
+        Raises:
+            UsageError: it cannot, or may not.
+        """
+        from warpsplat.files.output import check_output
+        from warpsplat.run.formats import ENDINGS, check_format
+
+        check_output(output, *inputs, endings=ENDINGS, overwrite=overwrite)
+        check_format(output)
+        if checkpoint:
+            check_output(checkpoint, *inputs)
+        self.check(inputs, [output, *filter(None, [checkpoint])], overwrite=overwrite)
 
     def need_image(self) -> bool:
         """Return whether a hook needs the image's bytes."""

@@ -10,11 +10,16 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
-from warpsplat.cli.options import FILE, checkpoint_options, overwrite_option, refine_options, run_options
-from warpsplat.cli.request import Request
+from warpsplat.cli.options import (
+    FILE,
+    Request,
+    checkpoint_options,
+    overwrite_option,
+    refine_options,
+    run_options,
+)
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
-from warpsplat.files.output import check_output
 from warpsplat.fit.settings import make_settings
 
 
@@ -64,16 +69,9 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
-    from warpsplat.run.formats import ENDINGS, check_format
-
-    check_output(output, svg, image, endings=ENDINGS, overwrite=request.overwrite)
-    check_format(output)
-    if checkpoint:
-        check_output(checkpoint, svg, image)
-    hooks.check([svg, image], [output, *filter(None, [checkpoint])], overwrite=request.overwrite)
-    from warpsplat.cli.run import leave, progress_bar, say_renewed
+    hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
+    from warpsplat.cli.run import echo_exceptions, leave, progress_bar, summary
     from warpsplat.cli.signals import Interrupt
-    from warpsplat.cli.summary import summary
     from warpsplat.run.refine import refine
     from warpsplat.svg.inspect import MAX_BYTES
 
@@ -102,10 +100,8 @@ def command(
         )
         hooks.show(result, None if image == STANDARD else image)
     before = result.before or 0.0
-    if result.kept and not request.quiet:
-        echo(f"warpsplat: {input_name(svg)}: kept as it is: {result.kept}", err=True)
     if not request.quiet:
-        say_renewed(input_name(svg), result)
+        echo_exceptions(input_name(svg), result)
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept

@@ -13,10 +13,10 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.hooks import Hooks
-from warpsplat.cli.request import Request
+from warpsplat.cli.options import Request
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
+from warpsplat.extensions import load_renderer
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.progress import Progress, TimeLeft
 from warpsplat.fit.settings import Settings
@@ -24,7 +24,6 @@ from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.run.result import Result
 from warpsplat.run.several import vectorize_several
 from warpsplat.run.suggest import Suggestion, suggest
-from warpsplat.run.vectorize import vectorize
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
@@ -101,44 +100,11 @@ def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Pr
         yield report, interrupt
 
 
-def run_file(
-    request: Request, output: Path, settings: Settings, data: bytes, *, hooks: Hooks, **keeping: Any
-) -> Result:
-    """Vectorize an image with a progress bar.
-
-    Args:
-        request: the image and where to compute.
-        output: the file.
-        settings: of the run.
-        data: bytes of the image.
-        hooks: what extensions add to the run.
-        keeping: ``checkpoint`` and what goes with it, see ``warpsplat.vectorize``.
-    """
-    if request.verbose:
-        say_start(request, _asked(settings))
-    with watched(request, settings) as (report, stop):
-        result = vectorize(
-            data,
-            settings=settings,
-            output=output,
-            overwrite=request.overwrite,
-            callback=hooks.watch(report),
-            stop=stop,
-            **request.source,
-            **keeping,
-        )
-        hooks.show(result, data)
-    if not request.quiet:
-        say_about(request.image, settings, result, verbose=request.verbose)
-    return result
-
-
 def run_several(
     request: Request, outputs: Sequence[Path], numbers: Sequence[int], settings: Settings, data: bytes
 ) -> tuple[Result, ...]:
     """Vectorize an image, whose bytes are ``data``, with several numbers of shapes and one progress bar."""
-    if request.verbose:
-        say_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
+    echo_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
     with watched(request, settings) as (report, stop):
         return vectorize_several(
             data, numbers, settings=settings, outputs=outputs, callback=report, stop=stop, **request.source
@@ -151,7 +117,7 @@ def suggest_file(request: Request, settings: Settings, data: bytes) -> Suggestio
         return suggest(data, settings=settings, callback=report, stop=stop, **request.source)
 
 
-def _asked(settings: Settings) -> str:
+def requested(settings: Settings) -> str:
     """Return the number and kind of shapes that are asked for."""
     has_goal = settings.target_psnr or settings.max_bytes
     number = f"{'at most ' if settings.simplify or has_goal else ''}{settings.curves}"
@@ -160,36 +126,32 @@ def _asked(settings: Settings) -> str:
     return f"{number} {'fills and strokes' if settings.mixed else PLURALS[settings.kind]}"
 
 
-def say_start(request: Request, what: str) -> None:
-    """Print what is about to be made, and on which device."""
-    start_warp()
-    echo(f"{request.image}: {what} on {choose_device(request.device)}", err=True)
+def echo_start(request: Request, shapes: str) -> None:
+    """With ``-v``, print which shapes are about to be made, and on which device."""
+    if request.verbose:
+        start_warp()
+        echo(f"{request.image}: {shapes} on {choose_device(request.device)}", err=True)
 
 
-def say_about(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
+def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
     """Print what the image was taken for, and what else may be unexpected."""
-    has_goal = settings.target_psnr or settings.max_bytes
-    count = len(result.scene)
-    traced = result.subject != "photo"
+    name, count, traced = input_name(source), len(result.scene), result.subject != "photo"
     if result.why and (traced or verbose):
         other = "; --subject photo fits translucent shapes" if traced else ""
-        taken = f"taken for a {SUBJECTS[result.subject]}"
-        echo(f"warpsplat: {input_name(source)}: {taken}: {result.why}{other}", err=True)
+        echo(f"warpsplat: {name}: taken for a {SUBJECTS[result.subject]}: {result.why}{other}", err=True)
+    has_goal = settings.target_psnr or settings.max_bytes
     if not traced and settings.simplify and not has_goal and count < settings.curves:
         hint = f"a simple image: {count} shapes; --curves N for another number"
-        echo(f"warpsplat: {input_name(source)}: {hint}", err=True)
-    say_reduced(input_name(source), result)
-    say_renewed(input_name(source), result)
+        echo(f"warpsplat: {name}: {hint}", err=True)
+    echo_exceptions(name, result)
 
 
-def say_reduced(name: str, result: Result) -> None:
-    """Print what was done to stay below the limit of memory, if anything."""
+def echo_exceptions(name: str, result: Result) -> None:
+    """Print which elements were kept, how the image was reduced, and how many shapes were reset, if any."""
+    if result.kept:
+        echo(f"warpsplat: {name}: kept as it is: {result.kept}", err=True)
     if result.reduced:
         echo(f"warpsplat: {name}: {result.reduced}", err=True)
-
-
-def say_renewed(name: str, result: Result) -> None:
-    """Print how many shapes had to be reset in the training, if any."""
     if result.renewed:
         found = f"shapes had numbers that are not finite, {result.renewed} times; these were reset"
         echo(f"warpsplat: {name}: {found}", err=True)
@@ -201,3 +163,33 @@ def leave(result: Result) -> None:
         echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.missed:
         sys.exit(ExitCode.GOAL_MISSED)
+
+
+def summary(output: Path, values: dict[str, Any]) -> str:
+    """Return one line about a result."""
+    from warpsplat.run.formats import PICTURE_ENDINGS
+
+    name = "standard output" if str(output) == "-" else printable(str(output))
+    note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
+    picture = " as an SVG" if output.suffix.lower() in PICTURE_ENDINGS else ""
+    if values["paths"] is None:
+        size = f"{values['bytes'] / 1000:.1f} kB{picture}"
+        return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
+    ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
+    ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
+    ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
+    psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
+    if load_renderer(values["renderer"]).soft:
+        psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
+    levels = ", ".join(_level(level) for level in values["levels"][:-1])
+    note += f"; the first {levels}" if levels else ""
+    return (
+        f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
+        f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped){picture}, "
+        f"{values['seconds']:.1f} s{note}"
+    )
+
+
+def _level(level: dict[str, Any]) -> str:
+    """Return the PSNR of a layered file up to a level."""
+    return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")

@@ -10,8 +10,8 @@ from typing import Any
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks
-from warpsplat.cli.request import Request
-from warpsplat.cli.run import run_several, say_about
+from warpsplat.cli.options import Request
+from warpsplat.cli.run import echo_notes, run_several
 from warpsplat.errors import UsageError, printable
 from warpsplat.files.inputs import STANDARD, read_input
 from warpsplat.files.output import check_output
@@ -48,7 +48,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]
     made = list(zip(paths, results, strict=True))
     if not request.quiet and results:
-        say_about(image, settings, results[-1], verbose=request.verbose)
+        echo_notes(image, settings, results[-1], verbose=request.verbose)
     if request.as_json:
         each = [
             {"image": str(image), "output": str(path), "device": request.device, **result.as_dict()}

@@ -12,7 +12,7 @@ from warpsplat.cli.echo import echo
 from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
-    from warpsplat.cli.request import Request
+    from warpsplat.cli.options import Request
     from warpsplat.fit.settings import Settings
     from warpsplat.run.suggest import Suggestion
 

@@ -12,15 +12,14 @@ from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     FILE,
+    Request,
     checkpoint_options,
     importance_option,
     overwrite_option,
     run_options,
     several_quality_options,
 )
-from warpsplat.cli.request import Request
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
-from warpsplat.cli.summary import summary
 from warpsplat.errors import UsageError
 from warpsplat.extensions import declared, load
 from warpsplat.run.options import settings_from
@@ -111,29 +110,35 @@ def single(
     Raises:
         WarpsplatError: what cannot be done; found before the run, as far as possible.
     """
-    settings = settings_from(given)
     from warpsplat.files.inputs import STANDARD, read_input
-    from warpsplat.files.output import check_output
-    from warpsplat.run.formats import ENDINGS, check_format
 
-    image = request.image
+    settings, image = settings_from(given), request.image
     if request.output is None and image == STANDARD:
         raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
     if as_uri and request.output == STANDARD:
         raise UsageError("the standard output takes one thing: -o - or --data-uri")
-    inputs = request.inputs
-    data = read_input(image)
+    inputs, data = request.inputs, read_input(image)
     output = request.output or Path(image.name).with_suffix(".svg")
-    check_output(output, *inputs, endings=ENDINGS, overwrite=request.overwrite)
-    check_format(output)
-    outputs = [output]
-    if checkpoint := keeping["checkpoint"]:
-        check_output(checkpoint, *inputs)
-        outputs.append(checkpoint)
-    hooks.check(inputs, outputs, overwrite=request.overwrite)
-    from warpsplat.cli.run import leave, run_file
+    hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
+    from warpsplat.cli.run import echo_notes, echo_start, leave, requested, summary, watched
+    from warpsplat.run.command_line import vectorize_command
+    from warpsplat.run.vectorize import vectorize
 
-    result = run_file(request, output, settings, data, hooks=hooks, **keeping)
+    echo_start(request, requested(settings))
+    with watched(request, settings) as (report, stop):
+        result = vectorize(
+            data,
+            settings=settings,
+            output=output,
+            overwrite=request.overwrite,
+            callback=hooks.watch(report),
+            stop=stop,
+            **request.source,
+            **keeping,
+        )
+        hooks.show(result, data)
+    if not request.quiet:
+        echo_notes(image, settings, result, verbose=request.verbose)
     if as_uri:
         from warpsplat.svg.uri import data_uri
 
@@ -144,8 +149,6 @@ def single(
         echo(json.dumps({**values, **hooks.as_dict()}), err=aside)
     elif not request.quiet:
         echo(summary(output, values), err=aside)
-    from warpsplat.run.command_line import vectorize_command
-
     line = vectorize_command(settings, str(image), str(output), *request.flags)
     hooks.finish(Done(request, data, [(output, result)], line))
     leave(result)

@@ -96,9 +96,9 @@ def test_unknown_keywords_are_refused_with_the_nearest() -> None:
 
 def test_settings_and_their_values_exclude_each_other() -> None:
     settings = warpsplat.make_settings()
-    with pytest.raises(warpsplat.UsageError, match="seed besides"):
+    with pytest.raises(warpsplat.UsageError, match="seed as well"):
         warpsplat.vectorize(photograph(), settings=settings, seed=3)
-    with pytest.raises(warpsplat.UsageError, match="quality besides"):
+    with pytest.raises(warpsplat.UsageError, match="quality as well"):
         warpsplat.suggest(photograph(), settings=settings, quality="draft")
     with pytest.raises(warpsplat.UsageError, match="several numbers of shapes and max-bytes"):
         warpsplat.vectorize_several(photograph(), [4, 8], max_bytes="2KB")

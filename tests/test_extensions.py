@@ -13,7 +13,7 @@ from tests.cli.helpers import one_line, run
 from tests.needs import WORDS
 from warpsplat import extensions
 from warpsplat.cli.hooks import Done, Hooks, RunHook, hook_options
-from warpsplat.cli.request import Request
+from warpsplat.cli.options import Request
 from warpsplat.errors import UsageError
 from warpsplat.extensions import Extension, load, load_renderer, renderer_names
 from warpsplat.fit.renderers import FitRenderer

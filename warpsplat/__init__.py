@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from warpsplat.metrics import Score as Score
     from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.pages.report import report as report
-    from warpsplat.run.images import load_image as load_image
-    from warpsplat.run.images import starting_scene as starting_scene
+    from warpsplat.run.prepare import load_image as load_image
+    from warpsplat.run.prepare import starting_scene as starting_scene
     from warpsplat.run.refine import refine as refine
     from warpsplat.run.render import render as render
     from warpsplat.run.render import to_pillow as to_pillow
@@ -49,7 +49,7 @@ _HOMES = {
     "refine": "warpsplat.run.refine",
     "render": "warpsplat.run.render",
     "report": "warpsplat.pages.report",
-    **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.run.images"),
+    **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.run.prepare"),
     **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.run.svg"),
     **dict.fromkeys(
         ("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"), "warpsplat.errors"

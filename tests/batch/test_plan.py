@@ -18,7 +18,7 @@ from warpsplat.batch.layers import KEYS, command_layer
 from warpsplat.batch.run import marked
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.run.keys import job_key
+from warpsplat.run.result import job_key
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.write import write_svg
 

@@ -10,12 +10,12 @@ import pytest
 
 from tests.runs import scored, vectorize
 from warpsplat.drawing.byte_limit import DEAREST, PRICE_STEP, PRICES, Sketch, best_within
-from warpsplat.drawing.subjects import choose_subject
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.prepare import choose_subject
 from warpsplat.scene import FloatArray
 
 COLORS = ("e00", "0a0", "00e", "ea0", "0ae", "a0e", "555", "000")

@@ -12,10 +12,10 @@ import pytest
 import warpsplat
 from tests.drawing.trace.line_art import CROSS, TEE, drawn, grown, shown
 from tests.runs import scored, vectorize
-from warpsplat.drawing.subjects import choose_subject
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.prepare import choose_subject
 from warpsplat.run.result import Result
 from warpsplat.scene import Kind
 

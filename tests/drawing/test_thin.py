@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.runs import scored, vectorize
-from warpsplat.drawing.subjects import choose_subject
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
+from warpsplat.run.prepare import choose_subject
 
 
 def ramp(width: int, height: int) -> np.ndarray:

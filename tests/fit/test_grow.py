@@ -11,8 +11,7 @@ import pytest
 from tests.fit.pictures import empty_scene
 from tests.runs import vectorize
 from warpsplat.errors import UsageError
-from warpsplat.fit.elongated import ComponentBars
-from warpsplat.fit.grow import ERROR_LEVELS, candidates, new_shapes
+from warpsplat.fit.grow import ERROR_LEVELS, ComponentBars, candidates, new_shapes
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.settings import make_settings
 from warpsplat.portable import filters

@@ -14,13 +14,13 @@ from tests.scenes import mixed_scene
 from warpsplat.errors import UsageError
 from warpsplat.fit.layered import fit_layered
 from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.options import parse_levels
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import levels_of, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.fit.texts import parse_levels
 from warpsplat.metrics import psnr, score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

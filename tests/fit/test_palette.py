@@ -12,9 +12,9 @@ import pytest
 from tests.fit.pictures import picture, step_for
 from tests.runs import vectorize
 from warpsplat.errors import UsageError
+from warpsplat.fit.options import parse_palette
 from warpsplat.fit.palette import Palette, best_colors, main_colors
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.texts import parse_palette
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.options import settings_from
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene

@@ -7,9 +7,9 @@ import pytest
 
 from tests.fit.pictures import empty_scene
 from tests.scenes import mixed_scene, random_scene, with_points
-from warpsplat.fit import prune
+from warpsplat.fit import densification
+from warpsplat.fit.densification import PAIRS_PER_CHUNK, choose_removed, duplicates, prune_mask
 from warpsplat.fit.place import circle_outlines
-from warpsplat.fit.prune import PAIRS_PER_CHUNK, choose_removed, duplicates, prune_mask
 from warpsplat.fit.settings import Density, make_settings
 from warpsplat.scene import Kind, Scene
 from warpsplat.scene.geometry import bounds
@@ -52,7 +52,7 @@ def test_of_two_duplicates_the_lower_one_is_pruned() -> None:
 
 @pytest.mark.parametrize("chunk", [7, PAIRS_PER_CHUNK])
 def test_duplicates_match_brute_force(chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prune, "PAIRS_PER_CHUNK", chunk)
+    monkeypatch.setattr(densification, "PAIRS_PER_CHUNK", chunk)
     rng = np.random.default_rng(1)
     scene = circles([tuple(x) for x in rng.uniform(50, 60, (60, 2))], list(rng.uniform(18, 22, 60)))
     scene.colors[:] = 0.5 + 0.01 * rng.normal(size=scene.colors.shape)

@@ -14,8 +14,16 @@ from warpsplat.fit import rounding
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Problem, Run
-from warpsplat.fit.rate import DB_PER_DOUBLING, byte_worth
-from warpsplat.fit.rounding import STAGES, choose_grid, freeze_opacities, freeze_stage, opacities_at, stage_at
+from warpsplat.fit.rounding import (
+    DB_PER_DOUBLING,
+    STAGES,
+    byte_worth,
+    choose_grid,
+    freeze_opacities,
+    freeze_stage,
+    opacities_at,
+    stage_at,
+)
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from warpsplat.errors import UsageError
+from warpsplat.fit.options import parse_bytes, parse_duration
 from warpsplat.fit.settings import FILL_POINT_RATE, PRESETS, Settings, make_settings
-from warpsplat.fit.texts import parse_bytes, parse_duration
 from warpsplat.scene import Basis, Kind
 
 FINGERPRINTS: list[tuple[dict[str, Any], str]] = [

@@ -14,9 +14,9 @@ from tests.kernels.modules import all_kernels
 from tests.scenes import mixed_scene, picture_scene, with_gradients
 from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.extensions import renderer_names
-from warpsplat.fit.evaluate_file import evaluate_file
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
+from warpsplat.fit.rounding import evaluate_file
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.step import Step, Target

@@ -10,7 +10,7 @@ from tests.fuzz import mutate
 from tests.fuzz.corpus import Seed
 from warpsplat.batch.manifest import Entry
 from warpsplat.fit.settings import make_settings
-from warpsplat.run.keys import job_key
+from warpsplat.run.result import job_key
 
 NAME = "case.jsonl"
 FIGURES = {"psnr": 20.5, "bytes": 700, "seconds": 1.5, "paths": 4, "missed": [], "levels": []}

@@ -24,8 +24,8 @@ from warpsplat.errors import ImageError, OutputError, UsageError, explain
 from warpsplat.extensions import renderer_names
 from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
+from warpsplat.fit.options import parse_bytes, parse_duration
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.fit.texts import parse_bytes, parse_duration
 from warpsplat.metrics import psnr
 from warpsplat.run.options import BY_NAME
 from warpsplat.svg.read import load_scene

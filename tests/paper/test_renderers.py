@@ -11,7 +11,7 @@ from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
 from tests.runs import vectorize
 from tests.scenes import random_scene
-from warpsplat.cli.summary import summary
+from warpsplat.cli.run import summary
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg

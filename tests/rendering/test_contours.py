@@ -12,7 +12,6 @@ from tests.helpers import compare, renderer_for
 from tests.scenes import contours_scene, random_scene
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.units import Units
 from warpsplat.scene import Kind, Rule
 
 SHAPES = [(Kind.FILL, Rule.NONZERO), (Kind.FILL, Rule.EVENODD), (Kind.STROKE, Rule.NONZERO)]
@@ -61,7 +60,7 @@ def test_twins_stay_together(device: str) -> None:
     settings = make_settings(iterations=9)
     program = renderer.backend.program()
     clock = renderer.backend.array(wp.int32, 1)
-    record_adam(program, parameters, clock, settings, Units.of(settings, parameters.canvas))
+    record_adam(program, parameters, clock, settings)
     program.run()
     after = parameters.gradients()["points"].reshape(4, -1)
     np.testing.assert_allclose(after[0], before[0] + before[1], atol=1e-6)

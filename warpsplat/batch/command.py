@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from warpsplat.batch.executors.tasks import Executor
     from warpsplat.batch.manifest import Manifest
     from warpsplat.batch.plan import Job
-    from warpsplat.cli.request import Request
+    from warpsplat.cli.options import Request
     from warpsplat.cli.signals import Interrupt
 
 

@@ -23,7 +23,7 @@ from warpsplat.files.marks import GZIP, HEAD, picture_key
 from warpsplat.files.output import make_folder, may_replace, write_result
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.run.formats import is_picture
-from warpsplat.run.keys import STOPPED, job_key
+from warpsplat.run.result import STOPPED, job_key
 from warpsplat.svg.inspect import svg_text
 from warpsplat.svg.write import read_metadata
 

@@ -13,8 +13,7 @@ import click
 from warpsplat.batch.run import JobReport
 from warpsplat.batch.totals import Totals
 from warpsplat.cli.echo import echo
-from warpsplat.cli.run import SUBJECTS
-from warpsplat.cli.summary import summary
+from warpsplat.cli.run import SUBJECTS, summary
 from warpsplat.errors import printable
 from warpsplat.run.formats import is_picture
 

@@ -16,8 +16,7 @@ from warpsplat.drawing.fit_outlines import Refinement, matching, refine_drawing
 from warpsplat.drawing.nodes import MOST_OFF, Edit, Key, Outlines, applied, turned
 from warpsplat.fit.constraints import Constraints, Drawing, Projection
 from warpsplat.fit.problem import Run
-from warpsplat.fit.rate import byte_worth
-from warpsplat.fit.rounding import STAGED_COST
+from warpsplat.fit.rounding import STAGED_COST, byte_worth
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.parameters import Parameters

@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.fit.afford import affordable
-from warpsplat.fit.budget import Budget
+from warpsplat.fit.budget import Budget, affordable
 from warpsplat.fit.densification import densify, remove_surplus
-from warpsplat.fit.evaluate_file import evaluate_file
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
@@ -19,7 +17,14 @@ from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.recover import recover
 from warpsplat.fit.renderers import renderer_of
-from warpsplat.fit.rounding import choose_grid, freeze_opacities, freeze_stage, opacities_at, stage_at
+from warpsplat.fit.rounding import (
+    choose_grid,
+    evaluate_file,
+    freeze_opacities,
+    freeze_stage,
+    opacities_at,
+    stage_at,
+)
 from warpsplat.fit.saved import step_content, step_from
 from warpsplat.fit.schedule import (
     CHECK_INTERVAL,

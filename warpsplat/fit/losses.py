@@ -12,9 +12,11 @@ import numpy as np
 import warp as wp
 
 from warpsplat.fit.settings import Settings
+from warpsplat.kernels import levels
 from warpsplat.kernels.loss import alpha, image, shape
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
+from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.tiles import to_tiles
@@ -160,3 +162,25 @@ def image_program(inputs: LossInputs) -> Program:
     for loss in IMAGE_LOSSES:
         loss.record(program, inputs)
     return program
+
+
+def level_programs(inputs: LossInputs, whole: Parameters) -> tuple[Program, ...]:
+    """Return programs that render a level, compare, back-propagate and add the gradients to the scene's.
+
+    Args:
+        inputs: of the level, its renderer that of the first shapes.
+        whole: all shapes.
+    """
+    renderer = inputs.renderer
+    add = renderer.backend.program("levels")
+    for name, group in renderer.parameters.groups.items():
+        if group.value.shape[0] > 0:
+            add.launch(
+                levels.add_gradients,
+                group.value.shape,
+                part=group.grad,
+                weight=inputs.settings.level_weight,
+                grad=whole.groups[name].grad,
+                split=True,
+            )
+    return renderer.forward_program, image_program(inputs), renderer.backward_program, add

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.units import Units
 from warpsplat.kernels import adam
 from warpsplat.kernels.paint import padded
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
+from warpsplat.scene import Canvas, Unit
 
 
 @dataclass
@@ -27,9 +28,7 @@ class AdamBuffers:
     """Factor of the learning rates at this step."""
 
 
-def record_adam(
-    program: Program, parameters: Parameters, clock: wp.array, settings: Settings, units: Units
-) -> None:
+def record_adam(program: Program, parameters: Parameters, clock: wp.array, settings: Settings) -> None:
     """Record the step's advance of the clock and the update of every attribute that some shape has.
 
     ``clock``: steps done, on the device, shape (1,).
@@ -38,6 +37,7 @@ def record_adam(
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
     if parameters.has_circles:
         program.launch(padded.tie_circles, parameters.shape_count, parameters.arrays)
+    units = Units.of(settings, parameters.canvas)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,
@@ -66,3 +66,22 @@ def record_adam(
             high=units.resolve(*attribute.high),
             split=True,
         )
+
+
+@dataclass(frozen=True)
+class Units:
+    """Length of each unit in canvas units."""
+
+    pixel: float
+    """A pixel of the finest training size, so that learning rates do not depend on the image's size."""
+    canvas: float
+
+    @staticmethod
+    def of(settings: Settings, canvas: Canvas) -> Units:
+        """Return the units of a run with ``settings`` on ``canvas``."""
+        finest = phases(settings, canvas.width, canvas.height)[-1]
+        return Units(canvas.width / finest.width, float(max(canvas.width, canvas.height)))
+
+    def resolve(self, value: float, unit: Unit) -> float:
+        """Return ``value`` in canvas units; a value without a unit stays as it is."""
+        return value * {Unit.ONE: 1.0, Unit.PIXEL: self.pixel, Unit.CANVAS: self.canvas}[unit]

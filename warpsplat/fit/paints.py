@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from warpsplat.fit.export import export
 from warpsplat.fit.ramps import Bools, Ramps, RampSolver
-from warpsplat.fit.rate import byte_worth
-from warpsplat.fit.rounding import USUAL_GRID, finest
+from warpsplat.fit.rounding import USUAL_GRID, byte_worth, finest
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
 from warpsplat.scene import GRADIENTS, FloatArray, Paint, Scene, Spread

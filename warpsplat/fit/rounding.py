@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.fit.export import export
-from warpsplat.fit.rate import byte_worth
+from warpsplat.fit.export import export, show
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import Step
 from warpsplat.portable import elementary
 from warpsplat.scene import OPACITY_RANGE, Paint, Scene
-from warpsplat.svg.write import GRIDS, rounded
+from warpsplat.svg.viewer import on_white, premultiplied
+from warpsplat.svg.write import GRIDS, resized, rounded
 
 STAGES = 3
 """A third of the control points each: of cubics those on the outline, then the handles."""
@@ -142,3 +142,31 @@ def freeze_stage(step: Step, stage: int) -> None:
     parameters.assign(replace(scene, points=points, widths=low.widths))
     parameters.hold("points", frozen)
     parameters.hold("widths", np.ones(len(scene), np.bool_))
+
+
+DB_PER_DOUBLING = 1.8
+"""Gain from twice the shapes, and so twice the bytes, on photographs [dB] (docs/experiments.md)."""
+
+
+def byte_worth(square_error: float, size: int) -> float:
+    """Return by how much the mean squared error may grow for each byte saved of a file with ``size`` bytes.
+
+    Shapes bought with that byte would lower the error as much: -d error / d size at ``DB_PER_DOUBLING``.
+    """
+    return square_error * DB_PER_DOUBLING * elementary.LN10 / (10 * elementary.LN2 * size)
+
+
+def evaluate_file(step: Step) -> None:
+    """Subtract the difference between the file and the render from the loss target of the next steps.
+
+    A viewer rounds coordinates, colours and, at each translucent layer, pixels. The difference changes little
+    from step to step, so it is measured now and then: the loss is that of the file, its gradient that of the
+    render (a straight-through estimator, Bengio et al. 2013).
+    """
+    step.render()
+    viewport, image = step.target.viewport, step.target.image
+    scene = step.state.scene()
+    text = export(scene, step.settings, step.state.per_pixel)
+    drawn = show(resized(text, viewport.width, viewport.height, viewport.scale), scene)
+    shown = (on_white(drawn) if image.shape[2] == 3 else premultiplied(drawn)) / 255
+    step.loss_target.assign(np.asarray(image - (shown - step.renderer.read_image()), np.float32))

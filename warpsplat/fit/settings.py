@@ -14,8 +14,17 @@ import numpy as np
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
-from warpsplat.fit.options import Option, nearest, option, options_of, research
-from warpsplat.fit.texts import parse_bytes, parse_duration, parse_levels, parse_palette
+from warpsplat.fit.options import (
+    Option,
+    nearest,
+    option,
+    options_of,
+    parse_bytes,
+    parse_duration,
+    parse_levels,
+    parse_palette,
+    research,
+)
 from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]

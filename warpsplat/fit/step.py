@@ -10,15 +10,13 @@ import warp as wp
 from warpsplat.alpha import squares
 from warpsplat.fit import losses
 from warpsplat.fit.importance import weights_at
-from warpsplat.fit.levels import level_programs
-from warpsplat.fit.losses import LossInputs, LossTarget
+from warpsplat.fit.losses import LossInputs, LossTarget, level_programs
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.progress import Snapshot
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
-from warpsplat.fit.units import Units
 from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import Model
@@ -104,8 +102,7 @@ class Step:
             loss.record(update, inputs)
         if state.projection:
             state.projection.record_adjoint(update)
-        units = Units.of(self.settings, state.parameters.canvas)
-        record_adam(update, state.parameters, state.clock, self.settings, units)
+        record_adam(update, state.parameters, state.clock, self.settings)
         if state.projection:
             state.projection.record(update)
         target = self._level_target

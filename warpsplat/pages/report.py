@@ -9,7 +9,7 @@ from warpsplat.files.output import write_result
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.pages.reports.several import several_page, versions_of
 from warpsplat.pages.reports.single import Facts, report_page
-from warpsplat.run.backend import backend_on
+from warpsplat.run.arguments import backend_on
 from warpsplat.run.result import Result
 from warpsplat.run.svg import SvgSource, score, svg_name_of, text_of
 

@@ -18,10 +18,10 @@ from warpsplat.errors import OutputError, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.files.packed import is_packed, pack, unpack
+from warpsplat.fit.options import parse_duration
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import INTERVAL, Content, Stages
-from warpsplat.fit.texts import parse_duration
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 

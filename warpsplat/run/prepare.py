@@ -6,14 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.drawing.subjects import choose_subject
+from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
+from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem
-from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.fit.settings import Settings, make_settings, solid_color
 from warpsplat.native import release_memory
-from warpsplat.run.keys import job_key
 from warpsplat.run.reduction import Memory, Reduction
-from warpsplat.scene import FloatArray
+from warpsplat.run.result import job_key
+from warpsplat.scene import FloatArray, Kind, Scene
 
 
 @dataclass(frozen=True)
@@ -91,3 +92,57 @@ def load_target(source: ImageSource, name: str | None, background: str, factor: 
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
+
+
+def load_image(image: ImageSource) -> FloatArray:
+    """Read an image as it is fitted: upright, sRGB in [0, 1], shape (height, width, 3), float32; with opacity
+    premultiplied, shape (height, width, 4).
+
+    Args:
+        image: as for ``vectorize``.
+
+    Raises:
+        ImageError: it cannot be read.
+    """
+    return image_of(image)
+
+
+def starting_scene(
+    image: ImageSource, curves: int = 128, *, open: bool = False, seed: int = 0, background: str = "auto"
+) -> Scene:
+    """Return shapes to start a fit of your own from: a loose grid over the canvas, in the image's colours.
+
+    Args:
+        image: as for ``vectorize``.
+        curves: number of shapes.
+        open: strokes of three cubics instead of filled rings of quadratics.
+        seed: of random numbers.
+        background: as for ``vectorize``.
+
+    Raises:
+        UsageError: a value out of range.
+        ImageError: the image cannot be read.
+    """
+    settings = make_settings(
+        curves=curves, kind=Kind.STROKE if open else None, seed=seed, background=background
+    )
+    target = load_target(image, None, background)
+    return grid_scene(settings, target, curves, np.random.default_rng(seed))
+
+
+def choose_subject(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
+    """Return ``settings`` with a subject, and the reason for it, which is empty if the subject was given.
+
+    Options that only fits know, as strokes, levels or a target PSNR, make any image a photograph. Line art
+    may be mixed.
+    """
+    if settings.subject != "auto":
+        return settings, ""
+    # A limit of bytes is for drawings too: they get fewer regions.
+    fitted = settings.unsuited("drawing")
+    guess = guess_subject(target) if fitted in ([], ["mixed"]) else None
+    if guess is None or (fitted and guess.subject != "line"):
+        return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
+    if settings.max_bytes and guess.subject not in {"photo", "drawing"}:
+        return replace(settings, subject="photo"), "max-bytes is for fitted shapes and drawings"
+    return replace(settings, subject=guess.subject), guess.why

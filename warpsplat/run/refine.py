@@ -23,11 +23,10 @@ from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.fit.stages import INTERVAL
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
-from warpsplat.run.backend import backend_on
+from warpsplat.run.arguments import backend_on, check_keywords, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
 from warpsplat.run.formats import write_named
-from warpsplat.run.keywords import takes
 from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
@@ -103,6 +102,7 @@ def refine(
         UsageError, ImageError, CheckpointError, OutputError, ResourceError, TypeError: as for
             ``vectorize``; an SVG that cannot be read, or held, is an ``ImageError``.
     """
+    check_keywords(refine, options)
     settings = settings or make_settings(iterations=iterations, max_memory=max_memory, **options)
     name = name or svg_name_of(svg)
     text, image_name = text_of(svg, name), source_name(image)

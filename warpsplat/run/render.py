@@ -16,7 +16,7 @@ from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.renderer import render as render_scene
 from warpsplat.rendering.renderer import render_into
-from warpsplat.run.backend import backend_on
+from warpsplat.run.arguments import backend_on
 from warpsplat.run.svg import SvgSource, save_svg, size_of, svg_name_of, text_of
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.inspect import MAX_PIXELS

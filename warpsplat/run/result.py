@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import os
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from warpsplat._version import __version__
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.settings import Subject
+from warpsplat.fit.settings import Settings, Subject
 from warpsplat.metrics import Score
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
@@ -100,3 +103,18 @@ class Result:
             "missed": list(self.missed),
             "levels": [asdict(level) for level in self.levels],
         }
+
+
+def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:
+    """Return the key of a result: a hash of program version, settings, and bytes of image and mask."""
+    masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
+    digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
+    return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
+
+
+KEY_BYTES = 6
+"""Bytes of a key: two jobs have the same one by a chance of one in 2^48."""
+
+
+STOPPED = "stopped"
+"""Key of a result that was cut short."""

@@ -16,9 +16,8 @@ from warpsplat.files.sources import ImageSource
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import Settings
-from warpsplat.run.backend import backend_on
+from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.formats import write_named
-from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import Result
 from warpsplat.run.typed import Options
@@ -105,7 +104,7 @@ def vectorize_several(
     """
     if outputs is not None and len(outputs) != len(curves):
         raise UsageError(f"{len(curves)} numbers of shapes and {len(outputs)} outputs")
-    settings = settings_given(settings, **options)
+    settings = settings_given(vectorize_several, settings, **options)
     check_several(settings, curves)
     with backend_on(device, threads) as backend:
         most = replace(settings, curves=max(curves), simplify=False)

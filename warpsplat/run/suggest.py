@@ -16,8 +16,7 @@ from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.portable import elementary
-from warpsplat.run.backend import backend_on
-from warpsplat.run.keywords import settings_given, takes
+from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.prepare import prepare
 from warpsplat.run.several import OWN_NUMBER
 from warpsplat.run.typed import Options
@@ -142,7 +141,7 @@ def suggest(
         UsageError: settings that decide the number of shapes.
         ImageError, ResourceError, TypeError: as for ``vectorize``.
     """
-    settings = settings_given(settings, **options)
+    settings = settings_given(suggest, settings, **options)
     check_suggesting(settings)
     with backend_on(device, threads) as backend:
         run = Run(backend, callback, stop)

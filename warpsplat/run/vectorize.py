@@ -22,21 +22,26 @@ from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.stages import INTERVAL
 from warpsplat.native import release_memory
-from warpsplat.run.backend import backend_on
+from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
-from warpsplat.run.export import export_within, on_paper
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
-from warpsplat.run.keys import STOPPED
-from warpsplat.run.keywords import settings_given, takes
 from warpsplat.run.prepare import PreparedImage, prepare
-from warpsplat.run.result import Result
+from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
 from warpsplat.run.tracking import recorded, report_end, timed
 from warpsplat.run.typed import Options
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+
+import numpy as np
+
+from warpsplat.fit.export import finished
+from warpsplat.scene import Scene
+from warpsplat.scene.geometry import areas
+from warpsplat.svg.page import placed
 
 
 @takes(Options)
@@ -97,7 +102,7 @@ def vectorize(
     """
     if isinstance(curves, (list, tuple)):
         raise UsageError(f"several numbers of shapes: vectorize_several(image, {list(curves)})")
-    settings = settings_given(settings, curves=curves, **options)
+    settings = settings_given(vectorize, settings, curves=curves, **options)
     given_files = (image, importance, output)
     kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
     write = None if output is None else functools.partial(write_named, Path(output))
@@ -178,3 +183,25 @@ def naming(name: str) -> Iterator[None]:
         yield
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
+
+
+def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
+    """Return the SVG and its shapes: all, or those that show most if ``max_bytes`` allows no more."""
+
+    def made() -> tuple[str, int]:
+        text = finished(scene, settings, per_pixel, metadata)
+        return text, len(on_paper(text, settings).encode())
+
+    svg, size = made()
+    while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
+        excess = 1 - settings.max_bytes / size
+        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
+        seen = areas(scene) * scene.opacities
+        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
+        svg, size = made()
+    return svg, scene
+
+
+def on_paper(svg: str, settings: Settings) -> str:
+    """Return ``svg`` on the sheet that ``settings`` ask for, if any."""
+    return placed(svg, settings.size, settings.page, settings.units)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.fit.afford import STYLE_BYTES
+from warpsplat.fit.budget import STYLE_BYTES
 from warpsplat.fit.export import finished
 from warpsplat.fit.grow import new_shapes
 from warpsplat.fit.importance import pixel_weights

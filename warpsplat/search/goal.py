@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from warpsplat.fit.afford import affordable_curves
+from warpsplat.fit.budget import affordable_curves
 from warpsplat.fit.loop import Fit, Rounding, fit
 from warpsplat.fit.place import simple_curves
 from warpsplat.fit.problem import Problem, Run
-from warpsplat.fit.rate import DB_PER_DOUBLING
-from warpsplat.fit.rounding import finest
+from warpsplat.fit.rounding import DB_PER_DOUBLING, finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary
 from warpsplat.search.candidate import LAST_STEPS, Candidate, Change, changed, measured

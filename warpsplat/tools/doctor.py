@@ -278,7 +278,7 @@ def check_adjoint(device: str) -> Check:
     from warpsplat.rendering.device import choose_device
     from warpsplat.rendering.parameters import Parameters
     from warpsplat.rendering.renderer import Renderer
-    from warpsplat.run.images import starting_scene
+    from warpsplat.run.prepare import starting_scene
 
     rng = np.random.default_rng(0)
     y, x = np.mgrid[:32, :32] / np.float32(32)

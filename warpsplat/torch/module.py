@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from warpsplat.fit.optimizer import Units
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.units import Units
 from warpsplat.scene import IndexArray, Scene
 from warpsplat.svg.write import write_svg
 from warpsplat.torch.function import render

@@ -22,9 +22,8 @@ from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.device_lock import device_lock
 from warpsplat.run.command_line import vectorize_command
 from warpsplat.run.formats import named_bytes, write_named
-from warpsplat.run.keys import STOPPED, job_key
 from warpsplat.run.prepare import load_target, prepare
-from warpsplat.run.result import Result
+from warpsplat.run.result import STOPPED, Result, job_key
 from warpsplat.run.vectorize import make_result
 from warpsplat.svg.inspect import svg_text
 

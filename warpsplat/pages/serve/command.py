@@ -66,7 +66,7 @@ def command(
     and nothing is kept: images and results are in memory only.
     """
     interrupt = Interrupt()
-    from warpsplat.fit.texts import parse_bytes
+    from warpsplat.fit.options import parse_bytes
     from warpsplat.rendering.device import choose_device, start_warp
 
     try:

@@ -1,0 +1,77 @@
+"""Arguments that the API's functions share: options as keywords, and the device."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from inspect import Parameter
+from typing import Any, TypeVar, get_type_hints
+
+from warpsplat.errors import UsageError, shown
+from warpsplat.fit.options import nearest
+from warpsplat.fit.settings import Settings
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.rendering.device_lock import device_lock
+from warpsplat.run.options import settings_from
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def takes(options: type) -> Callable[[Function], Function]:
+    """Return a decorator that lists the keys of a ``TypedDict`` in a signature, in place of ``**options``."""
+
+    def decorate(function: Function) -> Function:
+        signature = inspect.signature(function)
+        own = [each for each in signature.parameters.values() if each.kind != Parameter.VAR_KEYWORD]
+        listed = [
+            Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+            for name, annotation in get_type_hints(options).items()
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *listed])  # type: ignore[attr-defined]
+        return function
+
+    return decorate
+
+
+def check_keywords(function: Callable[..., Any], options: Mapping[str, object]) -> None:
+    """Check that a function decorated by ``takes`` has all of the keywords that it was given.
+
+    Raises:
+        TypeError: it does not have one; the message suggests the nearest.
+    """
+    known = inspect.signature(function).parameters
+    for name in options:
+        if name not in known:
+            raise TypeError(f"{function.__name__}() has no keyword {name!r}{nearest(name, known)}")
+
+
+def settings_given(function: Callable[..., Any], settings: Settings | None, **options: Any) -> Settings:
+    """Return the settings, or those that the options of ``function`` make.
+
+    Raises:
+        TypeError: see ``check_keywords``.
+        UsageError: both are given, or an option cannot be used as given.
+    """
+    check_keywords(function, options)
+    if settings is None:
+        return settings_from(options)
+    if others := [name for name, value in options.items() if value is not None]:
+        raise UsageError(f"settings are given, and {others[0]} as well")
+    return settings
+
+
+@contextmanager
+def backend_on(device: str, threads: int | None) -> Iterator[Backend]:
+    """Hold the device, and return its backend.
+
+    Raises:
+        UsageError: no such device, or number of threads.
+    """
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
+    start_warp()
+    backend = Backend.on(choose_device(device), threads)
+    with device_lock(backend.device):
+        yield backend
