@@ -50,7 +50,12 @@ def splatted(scene: Scene, device: str) -> FloatArray:
 def test_image_and_gradients(
     device: str, kind: Kind, cubics: int, scale: float, through_scales: bool
 ) -> None:
-    compare(random_scene(kind, beziers=cubics, seed=3), device, scale, model=SplatModel(through_scales))
+    compare(
+        random_scene(kind, beziers=cubics, seed=3),
+        device,
+        scale,
+        model=SplatModel(through_scales=through_scales),
+    )
 
 
 FILL_OF_FOUR = random_scene(FILL, 1, beziers=4)
@@ -256,7 +261,7 @@ def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tupl
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("through_scales", [True, False])
 def test_mixed_scenes(device: str, seed: int, through_scales: bool) -> None:
-    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales))
+    compare(mixed_scene(seed=seed, splines=False), device, model=SplatModel(through_scales=through_scales))
 
 
 @pytest.mark.parametrize("kind", list(Kind))

@@ -8,7 +8,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.paper.grid import Grid
-from warpsplat.paper.kernels import gaussian_coverage, splat_coverage
+from warpsplat.paper.kernels import splat_coverage
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.bins import Bins
 from warpsplat.rendering.coverage import CoverageBuffers
@@ -58,4 +58,4 @@ class SplatCoverage:
 class GaussianCoverage(SplatCoverage):
     """1 - product of 1 - o g."""
 
-    kernels = (gaussian_coverage.gaussian_forward, gaussian_coverage.gaussian_backward)
+    kernels = (splat_coverage.soft_forward, splat_coverage.soft_backward)

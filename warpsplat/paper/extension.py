@@ -1,4 +1,4 @@
-"""What the paper's renderers add to the core."""
+"""The extension that adds the paper's renderers to the core."""
 
 from warpsplat.extensions import Extension
 

@@ -51,6 +51,9 @@ class GridBuffers:
     position_grad: wp.array = buffer(wp.vec2, "gaussians")
     station_grad: wp.array = buffer(wp.vec2, "gaussians")
     station_width_grad: wp.array = buffer(wp.float32, "gaussians")
+    strength: wp.array = buffer(wp.float32, 0)
+    """Opacity of each Gaussian; ``SoftBuffers`` alone has any."""
+    strength_grad: wp.array = buffer(wp.float32, 0)
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,20 @@ from warpsplat.rendering.coverage import Coverage
 from warpsplat.rendering.models import Geometry, Job
 
 
-@dataclass(frozen=True)
-class SplatModel:
-    """The paper's Gaussians, so placed that they cover what the path covers."""
+@dataclass(frozen=True, kw_only=True)
+class GridModel:
+    """Options of both models, grids of Gaussians along and across each shape."""
 
     through_scales: bool = True
     """Whether gradients flow through the Gaussians' scales and angles."""
     fold: float = 0.0
     """Weight of the fold loss (fills; the folded fraction of the canvas), which the adjoint adds."""
     samples_per_shape: int = 64
+
+
+@dataclass(frozen=True)
+class SplatModel(GridModel):
+    """The paper's Gaussians, so placed that they cover what the path covers."""
 
     def stages(self, job: Job) -> tuple[Geometry, Coverage]:
         """See ``Model``.
@@ -40,18 +45,13 @@ class SplatModel:
 
 
 @dataclass(frozen=True)
-class GaussianModel:
+class GaussianModel(GridModel):
     """The paper's own soft model: an opacity for each Gaussian, one soft row for a stroke."""
 
     softness: float = 0.6
     """Standard deviation that every Gaussian has at least [canvas units]; a pixel's area adds to it."""
     density: float = 0.5
     """Gaussians along and across a shape over their usual number."""
-    through_scales: bool = True
-    """Whether gradients flow through the Gaussians' scales and angles."""
-    fold: float = 0.0
-    """Weight of the fold loss (fills; the folded fraction of the canvas), which the adjoint adds."""
-    samples_per_shape: int = 64
 
     def stages(self, job: Job) -> tuple[Geometry, Coverage]:
         """See ``Model``.

@@ -1,4 +1,4 @@
-"""What a fit asks of the two renderers."""
+"""The paper's two renderers, as a fit uses them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Splat(FitRenderer):
 
     def model(self, settings: Settings, step: int, slack: float) -> Model:
         """See ``FitRenderer``."""
-        return SplatModel(settings.through_scales, fold_weight(settings, step))
+        return SplatModel(through_scales=settings.through_scales, fold=fold_weight(settings, step))
 
     def drawable(self, scene: Scene) -> Scene:
         """See ``FitRenderer``."""
@@ -83,7 +83,9 @@ class Gaussian(Splat):
     def model(self, settings: Settings, step: int, slack: float) -> Model:
         """See ``FitRenderer``."""
         fold = fold_weight(settings, step)
-        return GaussianModel(settings.softness, settings.gaussian_density, settings.through_scales, fold)
+        return GaussianModel(
+            settings.softness, settings.gaussian_density, through_scales=settings.through_scales, fold=fold
+        )
 
     def to_paths(self, scene: Scene, settings: Settings) -> Scene:
         """See ``FitRenderer``."""

@@ -19,7 +19,6 @@ class SoftBuffers(GridBuffers):
     """Buffers of the stage."""
 
     strength: wp.array = buffer(wp.float32, "gaussians")
-    """Opacity of each Gaussian."""
     strength_grad: wp.array = buffer(wp.float32, "gaussians")
     gaussian_width_grad: wp.array = buffer(wp.float32, "gaussians")
     paint_opacities: wp.array = buffer(wp.float32, "shapes")

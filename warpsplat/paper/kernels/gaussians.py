@@ -20,12 +20,6 @@ from warpsplat.kernels.bezier import cross
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-SPREAD = wp.constant(constants.SPREAD)
-PIXEL_SIGMA = wp.constant(constants.PIXEL_SIGMA)
-EPSILON = wp.constant(constants.EPSILON)
-Q_MAX = wp.constant(constants.Q_MAX)
-Q_INNER = wp.constant(constants.Q_INNER)
-
 
 @wp.func
 def difference_weight(index: wp.int32, neighbour: wp.int32, count: wp.int32) -> wp.float32:
@@ -60,10 +54,17 @@ def straightness(
     before = values[i] - values[i - stride]
     after = values[i + stride] - values[i]
     lengths = wp.length(before) * wp.length(after)
-    if lengths < EPSILON * EPSILON:
+    if lengths < constants.EPSILON * constants.EPSILON:
         return 1.0
     cosine = wp.max(wp.dot(before, after) / lengths, 0.0)
     return cosine * cosine
+
+
+@wp.func
+def variance(spacing: wp.float32) -> wp.float32:
+    """Return a Gaussian's variance along one of its axes [px^2]."""
+    reach = constants.SPREAD * constants.SPREAD * spacing * spacing
+    return reach + constants.PIXEL_SIGMA * constants.PIXEL_SIGMA
 
 
 @wp.kernel
@@ -97,20 +98,20 @@ def gaussians_forward(
     reach = straightness(mean, i, 1, (index % stations) % run, run) * length
     e = wp.vec2(1.0, 0.0)
     across = wp.length(dr)
-    if length >= EPSILON:
+    if length >= constants.EPSILON:
         e = dx / length
         across = cross(e, dr)
-    variance_x = SPREAD * SPREAD * reach * reach + PIXEL_SIGMA * PIXEL_SIGMA
-    variance_y = SPREAD * SPREAD * across * across + PIXEL_SIGMA * PIXEL_SIGMA
+    variance_x = variance(reach)
+    variance_y = variance(across)
     ix = 1.0 / variance_x
     iy = 1.0 / variance_y
     cc = e[0] * e[0]
     ss = e[1] * e[1]
     cs = e[0] * e[1]
     conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
-    q_cut = float(Q_INNER)
+    q_cut = float(constants.Q_INNER)
     if index < stations or index / stations == shape_rows[shape] - 1:
-        q_cut = Q_MAX
+        q_cut = constants.Q_MAX
     cut[i] = q_cut
     extent[i] = wp.vec2(
         wp.sqrt(q_cut * (cc * variance_x + ss * variance_y)),
@@ -161,7 +162,7 @@ def differences_backward(
     )
     dr = difference(mean, i, stations, index / stations, shape_rows[shape])
     length = wp.length(dx)
-    if length < EPSILON:
+    if length < constants.EPSILON:
         return
     e = dx / length
     n = wp.vec2(-e[1], e[0])
@@ -169,16 +170,16 @@ def differences_backward(
     run = stations / shape_runs[shape]
     straight = straightness(mean, i, 1, (index % stations) % run, run)
     reach = straight * length
-    ix = 1.0 / (SPREAD * SPREAD * reach * reach + PIXEL_SIGMA * PIXEL_SIGMA)
-    iy = 1.0 / (SPREAD * SPREAD * h * h + PIXEL_SIGMA * PIXEL_SIGMA)
+    ix = 1.0 / variance(reach)
+    iy = 1.0 / variance(h)
     g = through_scales * conic_grad[i]
     cc = e[0] * e[0]
     ss = e[1] * e[1]
     cs = e[0] * e[1]
     ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
     iy_grad = ss * g[0] - cs * g[1] + cc * g[2]
-    length_grad = -2.0 * SPREAD * SPREAD * straight * reach * ix * ix * ix_grad
-    h_grad = -2.0 * SPREAD * SPREAD * h * iy * iy * iy_grad
+    length_grad = -2.0 * constants.SPREAD * constants.SPREAD * straight * reach * ix * ix * ix_grad
+    h_grad = -2.0 * constants.SPREAD * constants.SPREAD * h * iy * iy * iy_grad
     angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2]) - h_grad * wp.dot(e, dr)
     along = length_grad * e + (angle_grad / length) * n
     across = h_grad * n

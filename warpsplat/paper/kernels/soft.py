@@ -25,16 +25,6 @@ from warpsplat.paper.kernels.strips import row_plan, station_plan
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-FILL = wp.constant(constants.FILL)
-STROKE = wp.constant(constants.STROKE)
-PLAN_SAMPLES = wp.constant(constants.PLAN_SAMPLES)
-SPREAD = wp.constant(constants.SPREAD)
-EPSILON = wp.constant(constants.EPSILON)
-Q_SOFT = wp.constant(constants.Q_SOFT)
-GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
-WIDTH_SIGMA = wp.constant(constants.WIDTH_SIGMA)
-PIXEL_VARIANCE = wp.constant(constants.PIXEL_VARIANCE)
-
 
 @wp.func
 def soft_stations(length: wp.float32, density: wp.float32) -> wp.int32:
@@ -64,14 +54,14 @@ def plan_soft(
     shape = offset + wp.tid()
     start = point_first[shape]
     shape_runs[shape] = 1
-    if kind[shape] == STROKE:
+    if kind[shape] == constants.STROKE:
         segments = (point_first[shape + 1] - start) / 3
         longest = float(0.0)
         for segment in range(segments):
             before = points[start + 3 * segment]
             length = float(0.0)
-            for i in range(1, PLAN_SAMPLES + 1):
-                weights = cubic_weights(float(i) / float(PLAN_SAMPLES))
+            for i in range(1, constants.PLAN_SAMPLES + 1):
+                weights = cubic_weights(float(i) / float(constants.PLAN_SAMPLES))
                 here = wp.vec2(0.0, 0.0)
                 for j in range(4):
                     here += weights[j] * points[start + 3 * segment + j]
@@ -84,7 +74,7 @@ def plan_soft(
         shape_sign[shape] = 0.0
     else:
         cubics = chain_cubics(point_first, shape)
-        count = PLAN_SAMPLES * cubics
+        count = constants.PLAN_SAMPLES * cubics
         a0 = points[start]
         b0 = a0
         length_a = float(0.0)
@@ -92,7 +82,7 @@ def plan_soft(
         width = float(0.0)
         doubled_area = float(0.0)
         for i in range(1, count + 1):
-            t = float(i) / float(PLAN_SAMPLES)
+            t = float(i) / float(constants.PLAN_SAMPLES)
             a1 = chain_point(points, start, 0, t, cubics)
             b1 = chain_point(points, start, 1, t, cubics)
             length_a += wp.length(a1 - a0)
@@ -131,7 +121,7 @@ def soft_stroke_forward(
     if shape >= gaussian_ends.shape[0]:
         gaussian_shape[i] = -1
         return
-    if kind[shape] != STROKE:
+    if kind[shape] != constants.STROKE:
         return
     gaussian_shape[i] = -1
     if i >= gaussian_last[shape]:
@@ -184,13 +174,13 @@ def soft_gaussians_forward(
     dx = difference(mean, i, 1, station, stations)
     dr = difference(mean, i, stations, index / stations, shape_rows[shape])
     length = wp.length(dx)
-    reach = SPREAD * straightness(mean, i, 1, station, stations) * length
+    reach = constants.SPREAD * straightness(mean, i, 1, station, stations) * length
     e = wp.vec2(1.0, 0.0)
-    if length >= EPSILON:
+    if length >= constants.EPSILON:
         e = dx / length
-    across = SPREAD * cross(e, dr)
-    half = WIDTH_SIGMA * scale * widths[shape]
-    least = scale * scale * softness * softness + PIXEL_VARIANCE
+    across = constants.SPREAD * cross(e, dr)
+    half = constants.WIDTH_SIGMA * scale * widths[shape]
+    least = scale * scale * softness * softness + constants.PIXEL_VARIANCE
     variance_x = reach * reach + least
     variance_y = across * across + half * half + least
     ix = 1.0 / variance_x
@@ -199,13 +189,13 @@ def soft_gaussians_forward(
     ss = e[1] * e[1]
     cs = e[0] * e[1]
     conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
-    cut[i] = Q_SOFT
+    cut[i] = constants.Q_SOFT
     extent[i] = wp.vec2(
-        wp.sqrt(Q_SOFT * (cc * variance_x + ss * variance_y)),
-        wp.sqrt(Q_SOFT * (ss * variance_x + cc * variance_y)),
+        wp.sqrt(constants.Q_SOFT * (cc * variance_x + ss * variance_y)),
+        wp.sqrt(constants.Q_SOFT * (ss * variance_x + cc * variance_y)),
     )
     opacity = opacities[shape] + fades[shape][third(station, stations)]
-    strength[i] = GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)
+    strength[i] = constants.GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)
 
 
 @wp.kernel
@@ -243,30 +233,30 @@ def soft_differences_backward(
     dr = difference(mean, i, stations, index / stations, shape_rows[shape])
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
-    if length >= EPSILON:
+    if length >= constants.EPSILON:
         e = dx / length
     n = wp.vec2(-e[1], e[0])
     h = wp.dot(n, dr)
     straight = straightness(mean, i, 1, station, stations)
-    reach = SPREAD * straight * length
-    half = WIDTH_SIGMA * scale * widths[shape]
-    least = scale * scale * softness * softness + PIXEL_VARIANCE
+    reach = constants.SPREAD * straight * length
+    half = constants.WIDTH_SIGMA * scale * widths[shape]
+    least = scale * scale * softness * softness + constants.PIXEL_VARIANCE
     ix = 1.0 / (reach * reach + least)
-    iy = 1.0 / (SPREAD * SPREAD * h * h + half * half + least)
+    iy = 1.0 / (constants.SPREAD * constants.SPREAD * h * h + half * half + least)
     g = conic_grad[i]
     cc = e[0] * e[0]
     ss = e[1] * e[1]
     cs = e[0] * e[1]
     variance_grad = -iy * iy * (ss * g[0] - cs * g[1] + cc * g[2])
-    gaussian_width_grad[i] = 2.0 * WIDTH_SIGMA * scale * half * variance_grad
+    gaussian_width_grad[i] = 2.0 * constants.WIDTH_SIGMA * scale * half * variance_grad
     along = wp.vec2(0.0, 0.0)
     across = wp.vec2(0.0, 0.0)
-    if length >= EPSILON:
+    if length >= constants.EPSILON:
         g = through_scales * g
         variance_grad = through_scales * variance_grad
         ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
-        length_grad = -2.0 * SPREAD * straight * reach * ix * ix * ix_grad
-        h_grad = 2.0 * SPREAD * SPREAD * h * variance_grad
+        length_grad = -2.0 * constants.SPREAD * straight * reach * ix * ix * ix_grad
+        h_grad = 2.0 * constants.SPREAD * constants.SPREAD * h * variance_grad
         angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2])
         angle_grad -= h_grad * wp.dot(e, dr)
         along = length_grad * e + (angle_grad / length) * n
@@ -297,7 +287,7 @@ def soft_stroke_backward(
     """A gather, one thread a control point: the sum over stations of Bernstein weight x gradient."""
     i = offset + wp.tid()
     shape = point_shape[i]
-    if kind[shape] != STROKE:
+    if kind[shape] != constants.STROKE:
         return
     start = gaussian_first[shape]
     point = i - point_first[shape]
@@ -338,7 +328,7 @@ def soft_shapes_backward(
     sums = wp.vec3(0.0, 0.0, 0.0)
     for i in range(gaussian_first[shape], gaussian_last[shape]):
         k = third((i - gaussian_first[shape]) % stations, stations)
-        sums[k] = sums[k] + GAUSSIAN_MAX * strength_grad[i]
+        sums[k] = sums[k] + constants.GAUSSIAN_MAX * strength_grad[i]
         width += gaussian_width_grad[i]
     for k in range(3):
         opacity = opacities[shape] + fades[shape][k]

@@ -1,8 +1,13 @@
 """Gaussians -> coverage of each slot, and the adjoint.
 
-Inside a shape all Gaussians share colour and opacity, so their order does not matter:
-coverage = 1 - prod_i (1 - g_i), g_i = min(exp(-q_i / 2), GAUSSIAN_MAX), cut at q > cut_i (paper eq. 9 with
-the opacity taken out of the product: it multiplies the coverage once, as fill-opacity does in the file).
+With g_i = exp(-q_i / 2), cut at q > cut_i, there are two models:
+
+- splat: coverage = 1 - prod_i (1 - min(g_i, GAUSSIAN_MAX)), paper eq. 9 with the opacity taken out of the
+  product: it multiplies the coverage once, as fill-opacity does in the file.
+- soft, the paper's own: coverage = 1 - prod_i (1 - o_i g_i), paper eq. 8 and 9. Each Gaussian has its own
+  strength o_i inside the product, so the shape is composited with its coverage alone.
+
+Inside a shape all Gaussians share their colour, so their order does not matter.
 """
 
 import warp as wp
@@ -12,9 +17,6 @@ from warpsplat.kernels.tile import column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-TILE = wp.constant(constants.TILE)
-PARTIAL = wp.constant(constants.PARTIAL)
-GAUSSIAN_MAX = wp.constant(constants.GAUSSIAN_MAX)
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 EXPONENT = wp.constant(-0.5 / 256.0)
 
@@ -23,7 +25,7 @@ EXPONENT = wp.constant(-0.5 / 256.0)
 def rows_of_tile() -> column:
     """Distance of each row's centre from the top of a tile [px]."""
     rows = column(0.0)
-    for r in range(TILE):
+    for r in range(constants.TILE):
         rows[r] = float(r) + 0.5
     return rows
 
@@ -52,148 +54,187 @@ def gaussian_column(con: wp.vec3, dx: wp.float32, dy: column, c_dy: column, leas
     return wp.cw_mul(within, e)
 
 
-@wp.kernel
-def splat_forward(
-    # In:
-    offset: wp.int32,
-    lanes: wp.int32,  # each takes every lanes-th column
-    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
-    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
-    conic: wp.array[wp.vec3],  # [gaussian_capacity]
-    extent: wp.array[wp.vec2],  # [gaussian_capacity] px
-    cut: wp.array[wp.float32],  # [gaussian_capacity] of q
-    # Out:
-    coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
-    slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
-):
-    """One thread a row of tiles of a shape (that of its leftmost slot) and lane."""
-    i, lane = wp.tid()
-    slot = offset + i
-    shape = slot_shape[slot]
-    if shape < 0:
-        return
-    wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-    local = slot - slot_first[shape]
-    if local % wide != 0:
-        return
-    left = TILE * shape_tiles[shape, 0]
-    right = left + TILE * wide
-    top = float(TILE * (shape_tiles[shape, 1] + local / wide))
-    one = column(1.0)
-    most = column(GAUSSIAN_MAX)
-    rows = rows_of_tile()
-    x = left + lane
-    while x < right:
-        coverage[slot + (x - left) / TILE, (x - left) % TILE] = one
-        x += lanes
-    for j in range(gaussian_first[shape], gaussian_last[shape]):
-        m = mean[j]
-        e = extent[j]
-        if m[1] + e[1] >= top and m[1] - e[1] <= top + float(TILE):
-            x = wp.max(left, int(wp.ceil(wp.max(m[0] - e[0], -1.0) - 0.5)))
-            stop = wp.min(right, int(wp.floor(wp.min(m[0] + e[0], 1.0e8) + 0.5)))
-            x += (lane + lanes - x % lanes) % lanes
-            if x < stop:
-                con = EXPONENT * conic[j]
-                dy = rows + column(top - m[1])
-                c_dy = con[2] * dy
-                least = column(EXPONENT * cut[j])
-                while x < stop:
-                    s = slot + (x - left) / TILE
-                    slot_state[s] = PARTIAL
-                    g = wp.min(gaussian_column(con, float(x) + 0.5 - m[0], dy, c_dy, least), most)
-                    k = (x - left) % TILE
-                    coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
-                    x += lanes
-    x = left + lane
-    while x < right:
-        s = slot + (x - left) / TILE
-        coverage[s, (x - left) % TILE] = one - coverage[s, (x - left) % TILE]
-        x += lanes
+@wp.func
+def column_range(centre: wp.float32, extent: wp.float32, left: wp.int32, right: wp.int32) -> wp.vec2i:
+    """Return the first column of pixels in [left, right) that a Gaussian reaches, and one past the last."""
+    first = int(wp.ceil(wp.max(centre - extent, -1.0) - 0.5))
+    last = int(wp.floor(wp.min(centre + extent, 1.0e8) + 0.5))
+    return wp.vec2i(wp.max(left, first), wp.min(right, last))
 
 
-@wp.kernel
-def splat_backward(
-    # In:
-    offset: wp.int32,
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
-    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-    mean: wp.array[wp.vec2],  # [gaussian_capacity]
-    conic: wp.array[wp.vec3],  # [gaussian_capacity]
-    extent: wp.array[wp.vec2],  # [gaussian_capacity]
-    cut: wp.array[wp.float32],  # [gaussian_capacity] of q
-    sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
-    # Out:
-    mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
-    conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] written
-):
-    """A gather, one thread a Gaussian, over the pixels it reaches.
+def make_forward(name: str, *, soft: bool) -> wp.Kernel:
+    """Return the kernel of one model."""
 
-    s = -sum_i log(1 - g_i), ds / dg = 1 / (1 - g) and dg / dq = -g / 2 below the clamp; with h = dL/dq:
-    dL/d(a, b, c) = sum h (dx^2, 2 dx dy, dy^2), dL/d mean = -sum 2 h (a dx + b dy, b dx + c dy).
-    """
-    i = offset + wp.tid()
-    shape = gaussian_shape[i]
-    if shape < 0:
-        return
-    x_grad = wp.vec2(0.0, 0.0)
-    con_grad = wp.vec3(0.0, 0.0, 0.0)
-    start = slot_first[shape]
-    if slot_last[shape] > start:
-        m = mean[i]
-        e = extent[i]
-        con = conic[i]
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def forward(
+        # In:
+        offset: wp.int32,
+        lanes: wp.int32,  # each takes every lanes-th column
+        slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+        gaussian_first: wp.array[wp.int32],  # [shape_count]
+        gaussian_last: wp.array[wp.int32],  # [shape_count]
+        mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+        conic: wp.array[wp.vec3],  # [gaussian_capacity]
+        extent: wp.array[wp.vec2],  # [gaussian_capacity] px
+        cut: wp.array[wp.float32],  # [gaussian_capacity] of q
+        strength: wp.array[wp.float32],  # [gaussian_capacity] below 1; soft only
+        # Out:
+        coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
+        slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
+    ):
+        """One thread a row of tiles of a shape (that of its leftmost slot) and lane."""
+        i, lane = wp.tid()
+        slot = offset + i
+        shape = slot_shape[slot]
+        if shape < 0:
+            return
         wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-        left = TILE * shape_tiles[shape, 0]
-        x_first = wp.max(left, int(wp.ceil(wp.max(m[0] - e[0], -1.0) - 0.5)))
-        x_last = wp.min(left + TILE * wide, int(wp.floor(wp.min(m[0] + e[0], 1.0e8) + 0.5)))
-        y_first = wp.max(shape_tiles[shape, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / TILE)
-        y_last = wp.min(shape_tiles[shape, 3], int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / TILE + 1)
+        local = slot - slot_first[shape]
+        if local % wide != 0:
+            return
+        left = constants.TILE * shape_tiles[shape, 0]
+        right = left + constants.TILE * wide
+        top = float(constants.TILE * (shape_tiles[shape, 1] + local / wide))
         one = column(1.0)
-        zero = column(0.0)
-        most = column(GAUSSIAN_MAX)
-        least = column(EXPONENT * cut[i])
         rows = rows_of_tile()
-        sum_x = zero
-        sum_y = zero
-        sum_xx = zero
-        sum_xy = zero
-        sum_yy = zero
-        for tile_y in range(y_first, y_last):
-            dy = rows + column(float(TILE * tile_y) - m[1])
-            c_dy = (EXPONENT * con[2]) * dy
-            slot_row = start + (tile_y - shape_tiles[shape, 1]) * wide
-            # Moments by row of pixels: few enough to stay in registers.
-            moment0 = zero
-            moment1 = zero
-            moment2 = zero
-            for x in range(x_first, x_last):
-                s = slot_row + (x - left) / TILE
-                if slot_state[s] == PARTIAL:
-                    dx = float(x) + 0.5 - m[0]
-                    g = gaussian_column(EXPONENT * con, dx, dy, c_dy, least)
-                    below = wp.min(wp.max(STEEP * (most - g), zero), one)
-                    h = wp.cw_mul(sum_grad[s, (x - left) % TILE], wp.cw_mul(below, g))
-                    h = wp.cw_div(h, one - wp.min(g, most))
-                    moment0 = moment0 + h
-                    moment1 = moment1 + dx * h
-                    moment2 = moment2 + (dx * dx) * h
-            moment0_dy = wp.cw_mul(moment0, dy)
-            sum_x = sum_x + moment1
-            sum_y = sum_y + moment0_dy
-            sum_xx = sum_xx + moment2
-            sum_xy = sum_xy + wp.cw_mul(moment1, dy)
-            sum_yy = sum_yy + wp.cw_mul(moment0_dy, dy)
-        con_grad = -0.5 * wp.vec3(total(sum_xx), 2.0 * total(sum_xy), total(sum_yy))
-        sx = total(sum_x)
-        sy = total(sum_y)
-        x_grad = wp.vec2(con[0] * sx + con[1] * sy, con[1] * sx + con[2] * sy)
-    mean_grad[i] = x_grad
-    conic_grad[i] = con_grad
+        x = left + lane
+        while x < right:
+            coverage[slot + (x - left) / constants.TILE, (x - left) % constants.TILE] = one
+            x += lanes
+        for j in range(gaussian_first[shape], gaussian_last[shape]):
+            m = mean[j]
+            e = extent[j]
+            if m[1] + e[1] >= top and m[1] - e[1] <= top + float(constants.TILE):
+                reached = column_range(m[0], e[0], left, right)
+                x = reached[0] + (lane + lanes - reached[0] % lanes) % lanes
+                if x < reached[1]:
+                    con = EXPONENT * conic[j]
+                    dy = rows + column(top - m[1])
+                    c_dy = con[2] * dy
+                    least = column(EXPONENT * cut[j])
+                    while x < reached[1]:
+                        s = slot + (x - left) / constants.TILE
+                        slot_state[s] = constants.PARTIAL
+                        g = gaussian_column(con, float(x) + 0.5 - m[0], dy, c_dy, least)
+                        if soft:  # noqa: SIM108  # a conditional expression would read strength always
+                            g = strength[j] * g
+                        else:
+                            g = wp.min(g, column(constants.GAUSSIAN_MAX))
+                        k = (x - left) % constants.TILE
+                        coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
+                        x += lanes
+        x = left + lane
+        while x < right:
+            s = slot + (x - left) / constants.TILE
+            coverage[s, (x - left) % constants.TILE] = one - coverage[s, (x - left) % constants.TILE]
+            x += lanes
+
+    return forward
+
+
+def make_backward(name: str, *, soft: bool) -> wp.Kernel:
+    """Return the adjoint of one model."""
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def backward(
+        # In:
+        offset: wp.int32,
+        gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_last: wp.array[wp.int32],  # [shape_count]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+        mean: wp.array[wp.vec2],  # [gaussian_capacity]
+        conic: wp.array[wp.vec3],  # [gaussian_capacity]
+        extent: wp.array[wp.vec2],  # [gaussian_capacity]
+        cut: wp.array[wp.float32],  # [gaussian_capacity] of q
+        strength: wp.array[wp.float32],  # [gaussian_capacity] soft only
+        sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
+        # Out, written:
+        mean_grad: wp.array[wp.vec2],  # [gaussian_capacity]
+        conic_grad: wp.array[wp.vec3],  # [gaussian_capacity]
+        strength_grad: wp.array[wp.float32],  # [gaussian_capacity] soft only
+    ):
+        """A gather, one thread a Gaussian, over the pixels it reaches.
+
+        s = -sum_i log(1 - o_i g_i): with p = sum_grad g / (1 - o g), 0 where a splat's g is clamped,
+        dL/do = sum p and h = dL/dq = -o p / 2 (a splat's o is 1);
+        dL/d(a, b, c) = sum h (dx^2, 2 dx dy, dy^2), dL/d mean = -sum 2 h (a dx + b dy, b dx + c dy).
+        """
+        i = offset + wp.tid()
+        shape = gaussian_shape[i]
+        if shape < 0:
+            return
+        x_grad = wp.vec2(0.0, 0.0)
+        con_grad = wp.vec3(0.0, 0.0, 0.0)
+        zero = column(0.0)
+        sum_p = zero
+        start = slot_first[shape]
+        if slot_last[shape] > start:
+            m = mean[i]
+            e = extent[i]
+            con = conic[i]
+            peak = float(1.0)
+            if soft:
+                peak = strength[i]
+            wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
+            left = constants.TILE * shape_tiles[shape, 0]
+            reached = column_range(m[0], e[0], left, left + constants.TILE * wide)
+            y_first = wp.max(shape_tiles[shape, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / constants.TILE)
+            y_stop = int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / constants.TILE + 1
+            one = column(1.0)
+            most = column(constants.GAUSSIAN_MAX)
+            least = column(EXPONENT * cut[i])
+            rows = rows_of_tile()
+            sum_x = zero
+            sum_y = zero
+            sum_xx = zero
+            sum_xy = zero
+            sum_yy = zero
+            for tile_y in range(y_first, wp.min(shape_tiles[shape, 3], y_stop)):
+                dy = rows + column(float(constants.TILE * tile_y) - m[1])
+                c_dy = (EXPONENT * con[2]) * dy
+                slot_row = start + (tile_y - shape_tiles[shape, 1]) * wide
+                # Moments by row of pixels: few enough to stay in registers.
+                moment0 = zero
+                moment1 = zero
+                moment2 = zero
+                for x in range(reached[0], reached[1]):
+                    s = slot_row + (x - left) / constants.TILE
+                    if slot_state[s] == constants.PARTIAL:
+                        dx = float(x) + 0.5 - m[0]
+                        g = gaussian_column(EXPONENT * con, dx, dy, c_dy, least)
+                        p = sum_grad[s, (x - left) % constants.TILE]
+                        if soft:
+                            p = wp.cw_div(wp.cw_mul(p, g), one - peak * g)
+                        else:
+                            below = wp.min(wp.max(STEEP * (most - g), zero), one)
+                            p = wp.cw_div(wp.cw_mul(p, wp.cw_mul(below, g)), one - wp.min(g, most))
+                        moment0 = moment0 + p
+                        moment1 = moment1 + dx * p
+                        moment2 = moment2 + (dx * dx) * p
+                moment0_dy = wp.cw_mul(moment0, dy)
+                sum_p = sum_p + moment0
+                sum_x = sum_x + moment1
+                sum_y = sum_y + moment0_dy
+                sum_xx = sum_xx + moment2
+                sum_xy = sum_xy + wp.cw_mul(moment1, dy)
+                sum_yy = sum_yy + wp.cw_mul(moment0_dy, dy)
+            con_grad = -0.5 * peak * wp.vec3(total(sum_xx), 2.0 * total(sum_xy), total(sum_yy))
+            sx = peak * total(sum_x)
+            sy = peak * total(sum_y)
+            x_grad = wp.vec2(con[0] * sx + con[1] * sy, con[1] * sx + con[2] * sy)
+        mean_grad[i] = x_grad
+        conic_grad[i] = con_grad
+        if soft:
+            strength_grad[i] = total(sum_p)
+
+    return backward
+
+
+splat_forward = make_forward("splat_forward", soft=False)
+splat_backward = make_backward("splat_backward", soft=False)
+soft_forward = make_forward("soft_forward", soft=True)
+soft_backward = make_backward("soft_backward", soft=True)

@@ -13,12 +13,6 @@ from warpsplat.kernels.elementary import normal_quantile, normal_tail
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-ROW_INSET = wp.constant(constants.ROW_INSET)
-ROW_GROWTH = wp.constant(constants.ROW_GROWTH)
-STATION_SPACING = wp.constant(constants.STATION_SPACING)
-STATION_DENSITY = wp.constant(constants.STATION_DENSITY)
-STATIONS_MIN = wp.constant(constants.STATIONS_MIN)
-EPSILON = wp.constant(constants.EPSILON)
 EDGE_MIN = wp.constant(2.0e-7)  # beyond, 1 - 2 x edge would be 1
 
 
@@ -27,11 +21,11 @@ def row_plan(width: wp.float32) -> wp.vec2:
     """(row count, reach) for a strip ``width`` [px] wide."""
     # The outermost row at a quarter of the strip at the most: two rows are the least. And so far inside a
     # strip of millions of pixels that a float can tell.
-    edge = wp.clamp(ROW_INSET / wp.max(width, EPSILON), EDGE_MIN, 0.25)
+    edge = wp.clamp(constants.ROW_INSET / wp.max(width, constants.EPSILON), EDGE_MIN, 0.25)
     reach = normal_quantile(edge)
     # Near the boundary du = phi(z) dz and u = Phi(z), so the relative step is the hazard rate of the
     # normal distribution times dz; z + 1 / (z + 1) is close to it over the range in use.
-    step = ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
+    step = constants.ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
     return wp.vec2(wp.max(2.0, wp.ceil(2.0 * reach / step) + 1.0), reach)
 
 
@@ -48,5 +42,5 @@ def row_position(row: wp.int32, rows: wp.int32, reach: wp.float32) -> wp.float32
 @wp.func
 def station_plan(length: wp.float32) -> wp.int32:
     """Stations along a curve ``length`` [px] long."""
-    count = wp.max(length / STATION_SPACING, STATION_DENSITY * wp.sqrt(length))
-    return wp.max(STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))
+    count = wp.max(length / constants.STATION_SPACING, constants.STATION_DENSITY * wp.sqrt(length))
+    return wp.max(constants.STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))
