@@ -18,7 +18,7 @@ from warpsplat.fit.settings import Settings
 
 @pytest.fixture(autouse=True)
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(pool, "main", stub.main)
+    monkeypatch.setattr(pool, "do_tasks", stub.main)
     yield
     assert not multiprocessing.active_children(), "no process is left"
 

@@ -1,4 +1,4 @@
-"""The pages of a batch: one for each result, and one that lists them."""
+"""Where the pages of a batch lie: one for each result, and one that lists them."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from warpsplat.files.remote import is_remote
 log = logging.getLogger(__name__)
 
 INDEX_NAME = "index.html"
-"""Of the list, where only a folder is named."""
+"""Name of the list in a folder."""
 
 ENDINGS = (".html", ".htm")
 
 HEAD = 40_000
-"""Bytes at the start of a report in which its thumbnail stands."""
+"""Bytes at the start of a report that contain its thumbnail."""
 
 THUMBNAIL = re.compile(r'<meta name="thumbnail" content="(data:image/webp;base64,[\w+/=&#;]+)">')
 
 
 @dataclass(frozen=True)
 class Reports:
-    """Where the pages of a batch lie."""
+    """The pages of a batch."""
 
     index: Path
-    """The list; reports lie in a folder beside it that has its name."""
+    """The list; reports lie in a folder beside it, which is named after it."""
     home: Path
-    """Folder from which results are named."""
+    """Folder that results are named relative to."""
     overwrite: bool = False
-    """Whether files of others may be replaced."""
+    """Whether files that warpsplat did not write may be replaced."""
 
     @staticmethod
     def at(place: Path, home: Path, *, taken: Iterable[Path] = (), overwrite: bool) -> Reports:
-        """Pages in the folder ``place``, or with the list of that name; ``taken``: other files of the batch.
+        """Return pages in a folder, or with the given list; ``taken``: other files of the batch.
 
         Raises:
             UsageError: the list cannot be written, or is one of these files.
@@ -60,11 +60,11 @@ class Reports:
 
     @property
     def folder(self) -> Path:
-        """Of the reports."""
+        """Folder of the reports."""
         return self.index.parent / f"{self.index.stem}-pages"
 
     def report_of(self, output: Path) -> Path:
-        """The report of a result."""
+        """Return the path of the report of a result."""
         if not is_remote(output):
             with contextlib.suppress(ValueError):  # on another drive
                 inside = Path(os.path.relpath(output, self.home))
@@ -73,12 +73,12 @@ class Reports:
         digest = hashlib.sha256(os.fsencode(str(output))).hexdigest()[:8]
         return self.folder / f"{digest}-{output.name}.html"
 
-    def way_back(self, output: Path) -> str:
-        """From the report of a result to the list, a relative path."""
+    def link_back(self, output: Path) -> str:
+        """Return the relative path from the report of a result to the list."""
         return Path(os.path.relpath(self.index, self.report_of(output).parent)).as_posix()
 
-    def lacks(self, output: Path) -> bool:
-        """Whether a result that is there has no report, or one that is older."""
+    def outdated(self, output: Path) -> bool:
+        """Return whether an existing result has no report, or an older one."""
         try:
             made = os.stat(self.report_of(output)).st_mtime
             return not is_remote(output) and made < os.stat(output).st_mtime
@@ -86,7 +86,7 @@ class Reports:
             return True
 
     def keep(self, output: Path, outcome: Outcome) -> None:
-        """Write the report that an outcome brings; that it cannot be is no reason to end the batch."""
+        """Write the report of an outcome; if that fails, the batch goes on after a warning."""
         error = outcome.report_error
         path = self.report_of(output)
         if outcome.report:
@@ -101,7 +101,7 @@ class Reports:
             log.warning("no report: %s", printable(error))
 
     def thumbnail_of(self, output: Path) -> str:
-        """That of a result which has a report, as a data URI; empty if there is none."""
+        """Return the thumbnail in the report of a result as a data URI; empty if there is none."""
         try:
             with self.report_of(output).open("rb") as file:
                 found = THUMBNAIL.search(file.read(HEAD).decode("utf-8", "replace"))

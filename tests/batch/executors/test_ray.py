@@ -17,10 +17,10 @@ from PIL import Image
 
 from tests.batch.executors.fake_ray import FakeRay
 from warpsplat.batch.executors import ray as module
-from warpsplat.batch.executors import ray_actor, ray_connection, work
+from warpsplat.batch.executors import ray_connection, ray_worker, work
+from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.ray import TRIES, RayCluster
-from warpsplat.batch.executors.ray_worker import Need
-from warpsplat.batch.executors.serial import Serial
+from warpsplat.batch.executors.ray_worker import TaskResources
 from warpsplat.batch.executors.tasks import Outcome, Stop, Task
 from warpsplat.errors import ResourceError, UsageError
 from warpsplat.fit.settings import make_settings
@@ -41,7 +41,7 @@ def ray(monkeypatch: pytest.MonkeyPatch) -> FakeRay:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tasks are done without doing anything."""
 
-    def do(task: Task, stop: Stop, report: Callable[[Any], None]) -> Outcome:
+    def do(task: Task, stop: Stop, report: Callable[[int, float], None]) -> Outcome:
         return Outcome(task.number, "stopped" if stop() else "made", data=b"<svg/>")
 
     monkeypatch.setattr(work, "do", do)
@@ -112,10 +112,10 @@ def test_two_kinds_of_tasks_get_round_a_full_cluster(ray: FakeRay, tasks: list[T
 
 
 def test_room_of_nodes() -> None:
-    assert Need(2, 0.0).fit({"CPU": 5.0}) == 2
-    assert Need(1, 0.4).fit({"CPU": 8.0, "GPU": 2.0}) == 4, "no task has parts of two GPUs"
-    assert Need(1, 2.0).fit({"CPU": 8.0, "GPU": 5.0}) == 2
-    assert Need(1, 1.0).fit({"CPU": 8.0}) == 0
+    assert TaskResources(2, 0.0).capacity({"CPU": 5.0}) == 2
+    assert TaskResources(1, 0.4).capacity({"CPU": 8.0, "GPU": 2.0}) == 4, "no task has parts of two GPUs"
+    assert TaskResources(1, 2.0).capacity({"CPU": 8.0, "GPU": 5.0}) == 2
+    assert TaskResources(1, 1.0).capacity({"CPU": 8.0}) == 0
 
 
 @pytest.mark.usefixtures("quick")
@@ -226,7 +226,7 @@ def test_a_node_without_the_package(ray: FakeRay, tasks: list[Task]) -> None:
 
 
 def test_a_node_of_another_version(ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_actor, "__version__", "0.0.1")
+    monkeypatch.setattr(ray_worker, "__version__", "0.0.1")
     with pytest.raises(UsageError, match=r"has warpsplat 0\.0\.1, here it is "):
         run(RayCluster(), tasks)
     assert not ray.sent
@@ -252,7 +252,7 @@ def test_paths_where_the_file_is_seen(
 def blind(do: Callable[..., Any]) -> Callable[..., Any]:
     """``Actor.do`` on a machine that has other files of the same names."""
 
-    def seen(actor: ray_actor.Actor, task: Task, sights: tuple[ray_actor.Sight, ...]) -> Any:
+    def seen(actor: ray_worker.Actor, task: Task, sights: tuple[ray_worker.FileStamp, ...]) -> Any:
         return do(actor, task, tuple(sight._replace(size=sight.size + 1) for sight in sights))
 
     return seen
@@ -261,7 +261,7 @@ def blind(do: Callable[..., Any]) -> Callable[..., Any]:
 @pytest.mark.usefixtures("quick")
 def test_bytes_where_it_is_not(ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
     images = {task.number: Path(str(task.image)).read_bytes() for task in tasks}
-    monkeypatch.setattr(ray_actor.Actor, "do", blind(ray_actor.Actor.do))
+    monkeypatch.setattr(ray_worker.Actor, "do", blind(ray_worker.Actor.do))
     assert statuses(run(RayCluster(), tasks)) == dict.fromkeys(range(6), "made")
     done = {sent.given[0].number: sent.given[0].image for sent in ray.sent}
     assert done == images
@@ -313,12 +313,12 @@ def test_what_does_not_end_is_ended(ray: FakeRay, tasks: list[Task], monkeypatch
 
 
 def test_an_actor_hears_while_it_works(tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
-    actor = ray_actor.Actor()
+    actor = ray_worker.Actor()
     actor.stop()  # of a task before
 
-    def do(task: Task, stop: Stop, report: Callable[[Any], None]) -> Outcome:
+    def do(task: Task, stop: Stop, report: Callable[[int, float], None]) -> Outcome:
         assert not stop()
-        report(type("Progress", (), {"work": 0.25}))
+        report(task.number, 0.25)
         assert actor.done() == 0.25
         actor.stop()
         return Outcome(task.number, "stopped" if stop() else "made")

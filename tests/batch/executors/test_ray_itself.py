@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.ray import RayCluster
-from warpsplat.batch.executors.serial import Serial
 from warpsplat.batch.executors.tasks import Executor, Outcome, Task
 from warpsplat.fit.settings import make_settings
 

@@ -1,6 +1,5 @@
-"""Where the images of a batch are done: in this process, by others, or wherever an ``Executor`` does them.
+"""Where the images of a batch are made: in this process, in others of this machine, or on a Ray cluster.
 
-An executor is given tasks (``tasks.Task``) and yields what became of them (``tasks.Outcome``); both are small
-and can be pickled. ``work.do`` does one, in whatever process.  serial.py: in this one, one after the other;
-pool.py: in several, whose side is worker.py;  ray.py: on a Ray cluster, whose side is ray_actor.py.
+An ``Executor`` (tasks.py) takes tasks and yields their outcomes, which can be pickled.  work.py: do one task;
+local.py: one after the other, here;  pool.py: in processes of this machine;  ray.py: on a cluster.
 """

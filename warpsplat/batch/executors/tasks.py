@@ -1,118 +1,109 @@
-"""What executors are given and give back."""
+"""The interface of executors: tasks, outcomes, and the base class."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from warpsplat.fit.settings import Settings
 
 Source = str | bytes
-"""Where an image is, or its bytes."""
+"""The path of an image, or its bytes."""
 
 Stop = Callable[[], bool]
-"""Whether work should end; it is asked often, from the thread that runs the executor."""
+"""Returns whether work should end; called often, from the thread that runs the executor."""
 
-Advance = Callable[[int, float], None]
-"""Told the number of a task and which part of it is done."""
+OnProgress = Callable[[int, float], None]
+"""Called with the number of a task and the fraction of it that is done."""
 
 
 @dataclass(frozen=True)
-class ReportWish:
-    """What a report says besides what its task says."""
+class ReportRequest:
+    """Contents of a report besides what its task says."""
 
     back: str
-    """Where its link to the index leads, a relative path."""
+    """Relative path of the page that the report links back to."""
     figures: Mapping[str, Any] = field(default_factory=dict)
-    """Of a result that was made earlier, what is known of it."""
+    """Figures of a result that was made earlier."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """An image to vectorize, or a result to measure.
-
-    What a worker needs is in here: paths where it sees the files, bytes where it does not.
-    """
+    """An image to vectorize, or a result to measure; with paths of files that the worker sees, else bytes."""
 
     number: int
-    """Names the task: its outcome has the same number."""
+    """Identifies the task: its outcome has the same number."""
     image: Source
     name: str
-    """How messages call the image."""
+    """Name of the image in messages."""
     output: str
-    """The result. Its ending says whether it is gzipped, also where it is not written."""
+    """Path of the result. Its ending decides the format, also if the worker does not write it."""
     settings: Settings
     device: str = "auto"
     threads: int | None = None
-    """Of a CPU; None: all cores."""
+    """Threads on a CPU; None: all cores."""
     mask: Source | None = None
-    """How much the error of a pixel counts."""
+    """Importance mask."""
     bring: bool = False
-    """Whether the worker brings the result's bytes (``Outcome.data``) instead of writing ``output``."""
+    """Whether the worker returns the result's bytes (``Outcome.data``) instead of writing ``output``."""
     measure: bool = False
-    """Whether ``output`` is there already, and only its figures are wanted."""
+    """Whether ``output`` exists already, and only its figures are wanted."""
     result: Source | None = None
-    """What is to be measured, where the worker does not see ``output``."""
-    report: ReportWish | None = None
-    """The report that is to be brought along; None: none."""
+    """The result to measure, if the worker does not see ``output``."""
+    report: ReportRequest | None = None
+    """The report to return as well; None: none."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task."""
+    """The outcome of a task."""
 
     number: int
-    """Of the task."""
     status: Literal["made", "measured", "stopped", "failed"]
-    """``stopped``: ended by ``stop``, with a file of the best so far, or none, where ``digest`` is empty."""
+    """``stopped``: by ``stop``, with a file of the best so far, or with none and an empty ``digest``."""
     key: str = ""
-    """Of the result, see ``vectorize.job_key``; empty where the image could not be read."""
+    """Key of the result, see ``run.keys.job_key``; empty if the image could not be read."""
     digest: str = ""
     """SHA-256 of the result's bytes, hexadecimal."""
     data: bytes | None = field(default=None, repr=False)
-    """The result's bytes, where they were to be brought."""
+    """The result's bytes, if the task has ``bring``."""
     figures: dict[str, Any] = field(default_factory=dict)
-    """See ``vectorize.Result.as_dict``; of a task that measured, what was measured of those."""
+    """See ``Result.as_dict``; for a task with ``measure``, those that can be measured."""
     error: str = ""
-    """One line that names the image, of a task that failed."""
+    """Why the task failed, in one line that names the image."""
     report: str = field(default="", repr=False)
-    """The page, where one was asked for and could be made."""
+    """The page, if it was requested and could be made."""
     report_error: str = ""
-    """One line on why it could not."""
+    """Why the page could not be made, in one line."""
 
 
-class Executor(Protocol):
-    """Does tasks. A context manager: what it holds (processes, connections) is gone after its block, whatever
-    ended that, and so are the tasks that were in work.
-    """
+class Executor:
+    """Base of executors: does tasks. At the end of its ``with`` block, all its workers have ended."""
 
-    @property
-    def workers(self) -> int:
-        """How many tasks it does at the same time; for messages."""
+    workers: int = 1
+    """How many tasks it does at the same time; for messages."""
 
     def __enter__(self) -> Executor:
-        """Begin. Nothing is started before there is a task."""
+        """Begin; nothing is started before there is a task."""
+        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """End all workers at once; return when none is left."""
+        self.close()
 
-    def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
+    def close(self) -> None:
+        """End all workers; by default there are none."""
+
+    def run(self, tasks: Iterable[Task], stop: Stop, on_progress: OnProgress) -> Iterator[Outcome]:
         """Do ``tasks``, and yield an outcome for each that was taken, in any order, as it ends.
 
-        May be called again, one run after the other; workers are kept for that.
+        May be called several times, one run after the other; workers are kept.
 
-        * ``tasks`` is taken from only when a worker is free, or soon will be: taking a task claims it, and
-          reads its image, so that no more are claimed than are in work (back-pressure).
-        * Whatever an image throws is its own outcome, ``failed``. A worker that is lost costs its task
-          another try, and after a few a ``failed`` outcome, never the batch.
-        * Once ``stop`` says so, no further task is taken; those in work end soon, as ``stopped`` or as they
-          would have.
-        * ``advance`` is told how far tasks are, now and then, where that is known.
+        * A task is taken only when a worker is free, or soon will be: that claims it and reads its image.
+        * Errors of an image are in its outcome, ``failed``. A worker that is lost costs its task a try; after
+          a few tries its outcome is ``failed``, and the batch goes on.
+        * Once ``stop`` returns true, no further task is taken; those in progress end soon.
+        * ``on_progress`` is called now and then, if the progress of tasks is known.
         """
+        raise NotImplementedError
