@@ -24,7 +24,7 @@ def stubbed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def tasks(folder: Path, *names: str) -> list[Task]:
-    return [Task(i, b"", name, str(folder / f"{i}.svg"), Settings()) for i, name in enumerate(names)]
+    return [Task(i, "key", b"", name, str(folder / f"{i}.svg"), Settings()) for i, name in enumerate(names)]
 
 
 def never() -> bool:

@@ -170,23 +170,24 @@ class Batch:
 
     def _task(self, number: int, inputs: JobInputs, *, measure: bool) -> Task:
         job, entry = self.jobs[number], self._claims[number].entry
-        away, mask, report = is_remote(job.output), job.importance, None
+        report = None
         if self._reports:
             report = ReportRequest(self._reports.link_back(job.output), entry.figures if entry else {})
         return Task(
             number,
-            inputs.image if is_remote(job.image) else str(job.image),
+            inputs.key,
+            inputs.image,
             str(job.image),
             str(job.output),
             job.settings,
             job.device,
             self._threads,
-            inputs.mask if mask is None or is_remote(mask) else str(mask),
+            inputs.mask,
+            str(job.importance),
             # A result without a key in it is known by its digest, which is noted before it is written; a
             # picture is drawn once, for both.
-            bring=away or job.settings.minify or is_picture(job.output),
-            measure=measure,
-            result=read_result(job.output) if measure and away else None,
+            bring=is_remote(job.output) or job.settings.minify or is_picture(job.output),
+            result=read_result(job.output) if measure else None,
             report=report,
         )
 

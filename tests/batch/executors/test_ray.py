@@ -54,7 +54,9 @@ def tasks(tmp_path: Path) -> list[Task]:
     for i in range(6):
         path = tmp_path / f"{i}.png"
         Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
-        found.append(Task(i, str(path), path.name, str(tmp_path / f"{i}.svg"), SETTINGS, "cpu"))
+        found.append(
+            Task(i, "key", path.read_bytes(), path.name, str(tmp_path / f"{i}.svg"), SETTINGS, "cpu")
+        )
     return found
 
 
@@ -232,50 +234,6 @@ def test_a_node_of_another_version(ray: FakeRay, tasks: list[Task], monkeypatch:
     assert not ray.sent
 
 
-# Paths and bytes.
-
-
-@pytest.mark.usefixtures("quick")
-def test_paths_where_the_file_is_seen(
-    ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = Path(str(tasks[0].image)).parent
-    monkeypatch.chdir(folder)
-    mask = replace(tasks[0], image="0.png", mask="1.png", result=None, measure=True, output="2.png")
-    run(RayCluster(), [mask])
-    (sent,) = ray.sent
-    assert [sent.given[0].image, sent.given[0].mask, sent.given[0].result] == [
-        str(folder / name) for name in ("0.png", "1.png", "2.png")
-    ]
-
-
-def blind(do: Callable[..., Any]) -> Callable[..., Any]:
-    """``Actor.do`` on a machine that has other files of the same names."""
-
-    def seen(actor: ray_worker.Actor, task: Task, sights: tuple[ray_worker.FileStamp, ...]) -> Any:
-        return do(actor, task, tuple(sight._replace(size=sight.size + 1) for sight in sights))
-
-    return seen
-
-
-@pytest.mark.usefixtures("quick")
-def test_bytes_where_it_is_not(ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
-    images = {task.number: Path(str(task.image)).read_bytes() for task in tasks}
-    monkeypatch.setattr(ray_worker.Actor, "do", blind(ray_worker.Actor.do))
-    assert statuses(run(RayCluster(), tasks)) == dict.fromkeys(range(6), "made")
-    done = {sent.given[0].number: sent.given[0].image for sent in ray.sent}
-    assert done == images
-    assert len(ray.sent) <= len(tasks) + 2, "asked once by each worker"
-
-
-@pytest.mark.usefixtures("quick")
-def test_an_image_that_is_gone_fails_alone(ray: FakeRay, tasks: list[Task]) -> None:
-    Path(str(tasks[2].image)).unlink()
-    found = run(RayCluster(), tasks)
-    assert statuses(found) == {**dict.fromkeys(range(6), "made"), 2: "failed"}
-    assert [o.error for o in found if o.error] == [f"{tasks[2].image!s}: no such file"]
-
-
 # Stopping.
 
 
@@ -324,8 +282,7 @@ def test_an_actor_hears_while_it_works(tasks: list[Task], monkeypatch: pytest.Mo
         return Outcome(task.number, "stopped" if stop() else "made")
 
     monkeypatch.setattr(work, "do", do)
-    found = actor.do(tasks[0], ())
-    assert isinstance(found, Outcome)
+    found = actor.do(tasks[0])
     assert found.status == "stopped"
 
 

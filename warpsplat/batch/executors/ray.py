@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -20,8 +19,7 @@ from warpsplat._version import __version__
 from warpsplat.batch.executors.ray_connection import connected, ray_cause
 from warpsplat.batch.executors.ray_worker import RayWorker, TaskResources
 from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, Stop, Task
-from warpsplat.batch.executors.work import failure
-from warpsplat.errors import ImageError, ResourceError, UsageError, printable
+from warpsplat.errors import ResourceError, UsageError, printable
 
 log = logging.getLogger("warpsplat")
 
@@ -72,8 +70,6 @@ class RayCluster(Executor):
         self._answered = 0
         """Most workers that there were."""
         self._stillborn = 0
-        self._unseen: set[tuple[str, str]] = set()
-        """Nodes, and folders that they do not see."""
         self._tries: Counter[int] = Counter()
         self._waiting: Iterator[Task] | None = None
         """Tasks that were not taken yet; None: all were."""
@@ -94,7 +90,7 @@ class RayCluster(Executor):
         self._tries.clear()
         begun = asked = time.monotonic()
         while not stop():
-            yield from self._give()
+            self._give()
             if not self._waiting and not self._again and not self._busy():
                 return
             now = time.monotonic()
@@ -112,12 +108,8 @@ class RayCluster(Executor):
     def _busy(self) -> list[RayWorker]:
         return [worker for worker in self._workers if worker.task]
 
-    def _give(self) -> Iterator[Outcome]:
-        """Hand tasks to idle workers; at most one more is taken, for a worker that is starting.
-
-        Yields:
-            Failures of images that cannot be read.
-        """
+    def _give(self) -> None:
+        """Hand tasks to idle workers; at most one more is taken, for a worker that is starting."""
         while self._again or not self._workers or any(worker.idle for worker in self._workers):
             task = self._again.pop() if self._again else next(self._waiting or iter(()), None)
             if task is None:
@@ -132,10 +124,7 @@ class RayCluster(Executor):
                 self._again.append(task)
                 self._hire()
                 return
-            try:
-                worker.give(task, self._unseen)
-            except ImageError as error:
-                yield Outcome(task.number, "failed", error=failure(error, task.name))
+            worker.give(task)
 
     def _resources(self, task: Task) -> TaskResources:
         """Return what a task takes: GPUs if it asks for one, or leaves it open and the cluster has any."""
@@ -204,13 +193,10 @@ class RayCluster(Executor):
             self._count_stillborn(error)
             return None
         self._stillborn = 0
-        if task is None:
-            self._greet(worker, *answer)
-        elif isinstance(answer, Outcome):
-            return answer
-        else:
-            self._unseen |= {(worker.node, os.path.dirname(path)) for path in answer}
-            self._again.append(task)
+        if task:
+            outcome: Outcome = answer
+            return outcome
+        self._greet(worker, *answer)
         return None
 
     def _greet(self, worker: RayWorker, version: str, node: str) -> None:

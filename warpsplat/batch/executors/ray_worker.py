@@ -6,36 +6,15 @@ Ray itself is not imported here.
 from __future__ import annotations
 
 import contextlib
-import os
 import platform
 import threading
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from warpsplat._version import __version__
-from warpsplat.batch.executors.tasks import Outcome, Source, Task
-from warpsplat.files.inputs import read_input
-
-
-class FileStamp(NamedTuple):
-    """A file as one machine sees it; another one that sees the same stamp sees the same file."""
-
-    path: str
-    size: int
-    modified: int
-    """Whole seconds: file systems differ in the fraction that they keep."""
-
-    @staticmethod
-    def of(path: str) -> FileStamp | None:
-        """Return the stamp of a file on this machine, or None if it is not there."""
-        try:
-            found = os.stat(path)
-        except OSError:
-            return None
-        return FileStamp(path, found.st_size, int(found.st_mtime))
+from warpsplat.batch.executors.tasks import Outcome, Task
 
 
 class Actor:
@@ -49,19 +28,8 @@ class Actor:
         """Return the version of the package, and the node; plain types, which other versions understand."""
         return __version__, platform.node()
 
-    def do(self, task: Task, stamps: tuple[FileStamp, ...]) -> Outcome | tuple[str, ...]:
-        """Do a task.
-
-        Args:
-            task: its paths are those of ``stamps``.
-            stamps: files as the parent sees them.
-
-        Returns:
-            The outcome; or, if nothing was done, the files that are not seen here.
-        """
-        unseen = tuple(stamp.path for stamp in stamps if FileStamp.of(stamp.path) != stamp)
-        if unseen:
-            return unseen
+    def do(self, task: Task) -> Outcome:
+        """Do a task."""
         from warpsplat.batch.executors.work import do  # heavy, and hello is to be quick
 
         self._stop.clear()
@@ -123,41 +91,13 @@ class RayWorker:
         """Whether it can be given a task."""
         return self.answer is None
 
-    def give(self, task: Task, unseen: set[tuple[str, str]]) -> None:
-        """Hand it a task with paths of the files that its node sees, and the bytes of others.
-
-        Args:
-            task: the task.
-            unseen: nodes, and folders that they do not see.
-
-        Raises:
-            ImageError: a file that it does not see cannot be read here either.
-        """
-        stamps: list[FileStamp] = []
-
-        def sent(source: Source) -> Source:
-            if isinstance(source, bytes):
-                return source
-            stamp = FileStamp.of(os.path.abspath(source))
-            if not stamp or (self.node, os.path.dirname(stamp.path)) in unseen:
-                return read_input(Path(source))
-            stamps.append(stamp)
-            return stamp.path
-
-        # Ray shows a process only the GPUs that it may use.
-        self.answer = self._actor.do.remote(
-            replace(
-                task,
-                image=sent(task.image),
-                mask=None if task.mask is None else sent(task.mask),
-                device="cuda:0" if self.resources.gpus else "cpu",
-                threads=self.resources.cpus,
-                result=sent(task.output) if task.measure else None,
-                bring=True,
-            ),
-            tuple(stamps),
-        )
+    def give(self, task: Task) -> None:
+        """Hand it a task."""
         self.task = task
+        # Ray shows a process only the GPUs that it may use.
+        device = "cuda:0" if self.resources.gpus else "cpu"
+        task = replace(task, device=device, threads=self.resources.cpus, bring=True)
+        self.answer = self._actor.do.remote(task)
 
     def ask_progress(self) -> None:
         """Ask for its progress, unless it has not answered that yet."""

@@ -8,9 +8,6 @@ from typing import Any, Literal
 
 from warpsplat.fit.settings import Settings
 
-Source = str | bytes
-"""The path of an image, or its bytes."""
-
 Stop = Callable[[], bool]
 """Returns whether work should end; called often, from the thread that runs the executor."""
 
@@ -30,11 +27,13 @@ class ReportRequest:
 
 @dataclass(frozen=True)
 class Task:
-    """An image to vectorize, or a result to measure; with paths of files that the worker sees, else bytes."""
+    """An image to vectorize, or a result to measure."""
 
     number: int
     """Identifies the task: its outcome has the same number."""
-    image: Source
+    key: str
+    """Key of the result, see ``run.keys.job_key``."""
+    image: bytes = field(repr=False)
     name: str
     """Name of the image in messages."""
     output: str
@@ -43,14 +42,14 @@ class Task:
     device: str = "auto"
     threads: int | None = None
     """Threads on a CPU; None: all cores."""
-    mask: Source | None = None
+    mask: bytes | None = field(default=None, repr=False)
     """Importance mask."""
+    mask_name: str = ""
+    """Name of the mask in messages."""
     bring: bool = False
     """Whether the worker returns the result's bytes (``Outcome.data``) instead of writing ``output``."""
-    measure: bool = False
-    """Whether ``output`` exists already, and only its figures are wanted."""
-    result: Source | None = None
-    """The result to measure, if the worker does not see ``output``."""
+    result: bytes | None = field(default=None, repr=False)
+    """The result if it exists already, and only its figures are wanted."""
     report: ReportRequest | None = None
     """The report to return as well; None: none."""
 
@@ -63,13 +62,13 @@ class Outcome:
     status: Literal["made", "measured", "stopped", "failed"]
     """``stopped``: by ``stop``, with a file of the best so far, or with none and an empty ``digest``."""
     key: str = ""
-    """Key of the result, see ``run.keys.job_key``; empty if the image could not be read."""
+    """Key of the task; empty if its worker was lost or ended before the task."""
     digest: str = ""
     """SHA-256 of the result's bytes, hexadecimal."""
     data: bytes | None = field(default=None, repr=False)
     """The result's bytes, if the task has ``bring``."""
     figures: dict[str, Any] = field(default_factory=dict)
-    """See ``Result.as_dict``; for a task with ``measure``, those that can be measured."""
+    """See ``Result.as_dict``; for a task with a ``result``, those that can be measured."""
     error: str = ""
     """Why the task failed, in one line that names the image."""
     report: str = field(default="", repr=False)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from warpsplat.batch.executors.tasks import OnProgress, Outcome, Source, Stop, Task
+from warpsplat.batch.executors.tasks import OnProgress, Outcome, Stop, Task
 from warpsplat.errors import WarpsplatError, explain, printable
-from warpsplat.files.inputs import read_input
 from warpsplat.files.output import make_folder
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress
@@ -20,7 +20,7 @@ from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.turns import turn
 from warpsplat.run.command_line import vectorize_command
 from warpsplat.run.formats import named_bytes, write_named
-from warpsplat.run.keys import STOPPED, job_key
+from warpsplat.run.keys import STOPPED
 from warpsplat.run.prepare import load_target, prepare
 from warpsplat.run.result import Result
 from warpsplat.run.vectorize import make_result
@@ -38,18 +38,12 @@ def do(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
     Raises:
         KeyboardInterrupt: by a signal's handler, with nothing of this image to save.
     """
-    key = ""
     try:
-        image = read(task.image)
-        mask = None if task.mask is None else read(task.mask)
-        key = job_key(task.settings, image, mask)
-        if task.measure:
-            return _measured(task, key, image)
-        return _made(task, key, image, stop, on_progress)
+        return _made(task, stop, on_progress) if task.result is None else _measured(task, task.result)
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:  # a panic of Rust code derives from no Exception
-        return Outcome(task.number, "failed", key=key, error=failure(error, task.name, task.output))
+        return Outcome(task.number, "failed", key=task.key, error=failure(error, task.name, task.output))
 
 
 def failure(error: BaseException, *names: str) -> str:
@@ -59,16 +53,7 @@ def failure(error: BaseException, *names: str) -> str:
     return message if any(name in message for name in shown) else f"{shown[0]}: {message}"
 
 
-def read(source: Source, what: str = "an image") -> bytes:
-    """Return the bytes of an image, or of ``what`` it should be.
-
-    Raises:
-        ImageError: it cannot be read.
-    """
-    return source if isinstance(source, bytes) else read_input(Path(source), what)
-
-
-def _made(task: Task, key: str, image: bytes, stop: Stop, on_progress: OnProgress) -> Outcome:
+def _made(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
     """Vectorize an image."""
 
     def advance(progress: Progress) -> None:
@@ -77,33 +62,36 @@ def _made(task: Task, key: str, image: bytes, stop: Stop, on_progress: OnProgres
     output, backend = Path(task.output), _backend(task)
     if not task.bring:
         make_folder(output.parent)
+    mask = None
+    if task.mask is not None:
+        mask = io.BytesIO(task.mask)
+        mask.name = task.mask_name
     with turn(backend.device):
-        prepared = prepare(image, task.settings, name=task.name, importance=task.mask, keyed=True)
+        prepared = prepare(task.image, task.settings, name=task.name, importance=mask, keyed=True)
         write = None if task.bring else partial(write_named, output)
         result = make_result(prepared, Run(backend, advance, stop), write)
-        data = named_bytes(output, result.svg, key=STOPPED if result.stopped else key)
+        data = named_bytes(output, result.svg, key=STOPPED if result.stopped else task.key)
         outcome = Outcome(
             task.number,
             "stopped" if result.stopped else "made",
-            key,
+            task.key,
             digest(data),
             data if task.bring else None,
             result.as_dict(),
         )
-        return outcome if result.stopped else _with_report(outcome, task, image, result.svg, backend, result)
+        return outcome if result.stopped else _with_report(outcome, task, result.svg, backend, result)
 
 
-def _measured(task: Task, key: str, image: bytes) -> Outcome:
+def _measured(task: Task, data: bytes) -> Outcome:
     """Measure a result that exists."""
-    data = read(task.result or task.output, "an SVG")
     svg = svg_text(data, task.output)
-    score = score_svg(svg, load_target(image, task.name, task.settings.background), eyes=False)
-    outcome = Outcome(task.number, "measured", key, digest(data), figures=score.as_dict())
+    score = score_svg(svg, load_target(task.image, task.name, task.settings.background), eyes=False)
+    outcome = Outcome(task.number, "measured", task.key, digest(data), figures=score.as_dict())
     if not task.report:
         return outcome
     backend = _backend(task)
     with turn(backend.device):
-        return _with_report(outcome, task, image, svg, backend)
+        return _with_report(outcome, task, svg, backend)
 
 
 def _backend(task: Task) -> Backend:
@@ -112,7 +100,7 @@ def _backend(task: Task) -> Backend:
 
 
 def _with_report(
-    outcome: Outcome, task: Task, image: bytes, svg: str, backend: Backend, result: Result | None = None
+    outcome: Outcome, task: Task, svg: str, backend: Backend, result: Result | None = None
 ) -> Outcome:
     """Return an outcome with the page on its SVG if one is requested, or with the error that prevented it.
 
@@ -127,7 +115,7 @@ def _with_report(
     try:
         page = report_page(
             svg,
-            image,
+            task.image,
             backend,
             Facts.of(result, line) if result else Facts(figures, command=line),
             name=os.path.basename(task.name),
