@@ -18,7 +18,7 @@ from warpsplat.files.output import check_output
 from warpsplat.fit.settings import Settings
 from warpsplat.run.command_line import several_command
 from warpsplat.run.formats import ENDINGS
-from warpsplat.run.names import Found, Place, Wanted, check_outputs, fields_of, name_results
+from warpsplat.run.names import ErrorAt, FoundImage, ResultRequest, check_outputs, fields_of, name_results
 from warpsplat.run.options import settings_from
 from warpsplat.run.result import Result
 from warpsplat.run.several import check_several
@@ -38,7 +38,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     check_several(settings, numbers)
     outputs = named(image, request.output, numbers, settings)
     data = read_input(image)
-    check_outputs([_place(request.output)] * len(outputs), outputs)
+    check_outputs([_error_at(request.output)] * len(outputs), outputs)
     for path in outputs:
         if path.parent.exists():
             check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
@@ -77,17 +77,17 @@ def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Se
     elif not re.search(r"(?<!\{)\{[^{}]", str(pattern)):
         pattern = pattern.with_name(f"{pattern.stem}-{{curves}}{pattern.suffix}")
 
-    found, place = Found(image, image.parent), _place(output)
+    found, error_at = FoundImage(image, image.parent), _error_at(output)
     return name_results(
         [
-            Wanted(found, pattern, settings, {**fields_of(settings, {}), "curves": number}, place)
+            ResultRequest(found, pattern, settings, {**fields_of(settings, {}), "curves": number}, error_at)
             for number in numbers
         ]
     )
 
 
-def _place(output: Path | None) -> Place:
-    """Return a function that makes errors about ``-o``."""
+def _error_at(output: Path | None) -> ErrorAt:
+    """Return a function that returns errors about ``-o``."""
     return lambda message: UsageError(f"-o {output or '.'}: {message.removeprefix('output: ')}")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat.batch.layers import Layer
-from warpsplat.batch.plan import Job, plan_jobs
+from warpsplat.batch.plan import BatchJob, plan_jobs
 
 
 def write(folder: Path, text: str) -> Path:
@@ -16,7 +16,7 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def load_jobs(path: Path, command: Layer | None = None) -> list[Job]:
+def load_jobs(path: Path, command: Layer | None = None) -> list[BatchJob]:
     """Of a batch file."""
     return plan_jobs([str(path)], command)
 

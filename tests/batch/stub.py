@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import time
@@ -9,20 +10,19 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from warpsplat.batch.executors.tasks import Outcome, Task
-from warpsplat.batch.executors.worker import Notice, Part
 
 
-def main(channel: Connection, parent: int, level: int, workers: int) -> None:
+def main(channel: Connection, level: int, workers: int) -> None:
     while isinstance(task := channel.recv(), Task):
         what = task.name
         if what == "stillborn":
             os._exit(3)
-        channel.send(Part(task.number, 0.5))
+        channel.send(0.5)
         if what == "die" or (what == "die once" and not Path(task.output).exists()):
             Path(task.output).touch()
             os.kill(os.getpid(), signal.SIGKILL)
         if what == "notice":
-            channel.send(Notice(30, "a notice"))
+            channel.send(logging.makeLogRecord({"name": "warpsplat", "levelno": 30, "msg": "a notice"}))
         status = "made"
         if what == "wait":
             channel.recv()

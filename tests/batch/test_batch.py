@@ -14,9 +14,9 @@ from PIL import Image
 
 from tests.batch.helpers import answers, load_jobs, write
 from tests.cli.helpers import one_line, run
+from warpsplat.batch.display import BatchDisplay
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
-from warpsplat.batch.run import JobReport
-from warpsplat.batch.show import Show
+from warpsplat.batch.run import JobOutcome
 
 
 def test_a_run_reports_skips_and_redoes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -55,13 +55,13 @@ def test_an_interrupted_run_says_what_is_left(
 ) -> None:
     for i in range(5):
         shutil.copy(folder / "in" / "a.png", folder / "in" / f"more{i}.png")
-    usual = Show.add
+    usual = BatchDisplay.add
 
-    def interrupting(show: Show, report: JobReport) -> None:
-        usual(show, report)
+    def interrupting(display: BatchDisplay, report: JobOutcome) -> None:
+        usual(display, report)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Show, "add", interrupting)
+    monkeypatch.setattr(BatchDisplay, "add", interrupting)
     settings = ("--curves", 4, "--iterations", 6, "--device", "cpu", "--workers", 1)
     arguments = ("batch", folder / "in", "-o", folder / "out", *settings, *(["--json"] if as_json else []))
     assert run(*arguments) == 130

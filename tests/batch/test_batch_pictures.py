@@ -10,11 +10,11 @@ from PIL import Image
 
 from tests.batch.helpers import answers, load_jobs, write
 from tests.cli.helpers import run
-from warpsplat.batch.executors.serial import Serial
+from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.tasks import Stop
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.batch.plan import plan_jobs
-from warpsplat.batch.run import Batch, JobReport
+from warpsplat.batch.run import Batch, JobOutcome
 from warpsplat.files.marks import mark_pdf, mark_png, picture_key
 from warpsplat.files.output import may_replace
 
@@ -121,13 +121,13 @@ def test_results_beside_the_images_are_no_images(folder: Path, capsys: pytest.Ca
 
 def test_a_stopped_picture_is_made_again(folder: Path) -> None:
     path = write(folder, "jobs: [{images: in/a.png, output: 'out/{stem}.png', curves: 3, iterations: 30}]")
-    reports: list[JobReport] = []
+    reports: list[JobOutcome] = []
 
     def done(stop: Stop) -> None:
         notes = Manifest(folder / NAME)
         notes.open()
         with contextlib.closing(notes):
-            Batch(load_jobs(path), notes, on_report=reports.append).run(
+            Batch(load_jobs(path), notes, on_outcome=reports.append).run(
                 Serial(), stop, lambda number, part: None
             )
 

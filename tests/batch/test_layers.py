@@ -11,12 +11,12 @@ from tests.batch.helpers import load_jobs, write
 from tests.cli.helpers import run
 from warpsplat.batch.command import flags_of
 from warpsplat.batch.layers import assigned, command_layer
-from warpsplat.batch.plan import Job, home_of, in_shard, plan_jobs
+from warpsplat.batch.plan import BatchJob, home_of, in_shard, plan_jobs
 from warpsplat.errors import UsageError
 from warpsplat.scene import Kind
 
 
-def names(jobs: list[Job], folder: Path) -> list[str]:
+def names(jobs: list[BatchJob], folder: Path) -> list[str]:
     return [job.output.relative_to(folder).as_posix() for job in jobs]
 
 

@@ -23,20 +23,16 @@ def notes(tmp_path: Path) -> Manifest:
     return made
 
 
-def test_what_was_appended_is_found_by_name_and_key(notes: Manifest) -> None:
+def test_entries_are_found_by_name(notes: Manifest) -> None:
     output = notes.path.parent / "a.svg"
     for digest, key in (("d1", "key"), ("d2", "key"), ("d3", "other")):
         notes.append(Entry(notes.name(output), key, "made", digest, figures={"psnr": 20.5}))
     again = Manifest(notes.path)
     again.open(write=False)
     assert [entry.digest for entry in again.entries(output)] == ["d1", "d2", "d3"]
-    found = again.latest(output, "key")
-    assert found
-    assert (found.digest, found.figures) == ("d2", {"psnr": 20.5})
-    assert again.latest(output, "third") is None
     notes.append(Entry("b.svg", "key", "failed", error="e"))
     again.refresh()
-    assert again.latest(notes.path.parent / "b.svg", "key") == Entry("b.svg", "key", "failed", error="e")
+    assert again.entries(notes.path.parent / "b.svg") == [Entry("b.svg", "key", "failed", error="e")]
 
 
 def test_a_torn_line_is_ignored_and_ends_where_the_next_begins(notes: Manifest) -> None:

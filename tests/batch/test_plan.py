@@ -15,7 +15,7 @@ from tests.cli.helpers import one_line, run
 from tests.scenes import random_scene
 from warpsplat.batch.file import MAX_FILE
 from warpsplat.batch.layers import KEYS, command_layer
-from warpsplat.batch.run import marked
+from warpsplat.batch.results import marked_key
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.run.result import job_key
@@ -300,8 +300,8 @@ def test_a_result_that_was_cut_short_is_not_done(folder: Path, size: int) -> Non
     data = job.image.read_bytes()
     key = job_key(job.settings, data)
     whole = write_svg(random_scene(Kind.FILL, count=9, width=32, height=24), metadata=key).encode()
-    assert marked(whole) == key
+    assert marked_key(whole) == key
     assert job_key(job.settings, data + b" ") != key, "another image"
-    assert marked(gzip.compress(whole)) == key
-    assert not marked(whole[:size])
-    assert not marked(gzip.compress(whole)[:size])
+    assert marked_key(gzip.compress(whole)) == key
+    assert not marked_key(whole[:size])
+    assert not marked_key(gzip.compress(whole)[:size])

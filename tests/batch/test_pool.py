@@ -18,13 +18,13 @@ from warpsplat.fit.settings import Settings
 
 @pytest.fixture(autouse=True)
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(pool, "main", stub.main)
+    monkeypatch.setattr(pool, "do_tasks", stub.main)
     yield
     assert not multiprocessing.active_children(), "no process is left"
 
 
 def tasks(folder: Path, *names: str) -> list[Task]:
-    return [Task(i, b"", name, str(folder / f"{i}.svg"), Settings()) for i, name in enumerate(names)]
+    return [Task(i, "key", b"", name, str(folder / f"{i}.svg"), Settings()) for i, name in enumerate(names)]
 
 
 def never() -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from warpsplat.batch.executors import split
-from warpsplat.batch.executors.split import MEMORY, divided
+from warpsplat.batch.executors import local
+from warpsplat.batch.executors.local import MEMORY, split_cores
 from warpsplat.fit.settings import Settings, make_settings
 
 LONG, SHORT = make_settings(), make_settings(curves=4, iterations=6)
@@ -36,11 +36,11 @@ def test_cores_are_shared(
     memory: int,
     made: tuple[int, int],
 ) -> None:
-    monkeypatch.setattr(split, "available_cores", lambda: 8)
-    monkeypatch.setattr(split, "free_memory", lambda: memory * MEMORY)
-    assert divided(settings, workers, threads, on_cpu=True) == made
+    monkeypatch.setattr(local, "available_cores", lambda: 8)
+    monkeypatch.setattr(local, "free_memory", lambda: memory * MEMORY)
+    assert split_cores(settings, workers, threads, on_cpu=True) == made
 
 
 def test_a_gpu_is_not_shared() -> None:
-    assert divided([LONG] * 9, None, None, on_cpu=False) == (1, None)
-    assert divided([LONG] * 9, 2, None, on_cpu=False) == (2, None)
+    assert split_cores([LONG] * 9, None, None, on_cpu=False) == (1, None)
+    assert split_cores([LONG] * 9, 2, None, on_cpu=False) == (2, None)

@@ -1,6 +1,7 @@
-"""Batches: many images, found by their names or by YAML files, each made once.
+"""Batches: many images, named on the command line or in YAML files, each made once.
 
-file.py, layers.py: YAML and flags -> settings;  images.py: names, folders, patterns -> images;  names.py:
-what results are called;  plan.py: all of that -> jobs;  manifest.py: what was made, and who makes what now;
-run.py: doing the jobs;  totals.py: figures of all of them.
+file.py, layers.py: YAML and flags -> settings;  images.py: names, folders, patterns -> images;  plan.py: all
+of that -> jobs;  manifest.py: what was made, and who makes what;  results.py: which results exist;  run.py:
+do the jobs;  executors/: where they are done;  options.py, command.py, display.py, totals.py: the command;
+reports.py, index.py: pages.
 """

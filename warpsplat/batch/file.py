@@ -13,16 +13,16 @@ from warpsplat.errors import ImageError, UsageError, cut, shown
 from warpsplat.files.inputs import read_input
 
 MAX_FILE = 1 << 20
-"""Largest batch file [bytes]: reading a mebibyte of YAML takes some seconds."""
+"""Largest batch file [bytes]: a mebibyte of YAML takes seconds to read."""
 
 MAX_DEPTH = 16
-"""Maximum nesting of a batch file; four are needed."""
+"""Deepest nesting of a batch file; four levels are needed."""
 
 MAX_SCALAR = 4096
-"""Longest single value [characters], as of the longest path."""
+"""Longest single value [characters]: as long as the longest path."""
 
 MAX_ALIASED = 100_000
-"""Maximum number of values after aliases are expanded: nested aliases multiply."""
+"""Most values that the aliases of a file stand for: aliases of aliases multiply."""
 
 
 class BatchFile:
@@ -57,8 +57,8 @@ class BatchFile:
         """Return an error that names the file and the line."""
         return UsageError(f"{self.path}:{line}: {message}")
 
-    def place(self, line: int) -> Callable[[str], UsageError]:
-        """Return ``error`` with a fixed line."""
+    def error_at(self, line: int) -> Callable[[str], UsageError]:
+        """Return ``error`` for a line."""
         return partial(self.error, line)
 
     def mapping(
@@ -82,11 +82,7 @@ class BatchFile:
         return result
 
     def value(self, node: yaml.Node) -> Any:
-        """Return the value of a node.
-
-        Raises:
-            UsageError: nothing plain.
-        """
+        """Return the value of a node; raise ``UsageError`` if it is no plain value."""
         try:
             return self.loader.construct_object(node, deep=True)
         except Exception as error:  # tags and scalars of YAML's own types raise what their constructors raise
@@ -95,11 +91,7 @@ class BatchFile:
             raise self.error(line, f"not a plain value: {cause}") from error
 
     def text(self, line: int, key: str, value: Any) -> str:
-        """Return ``value`` as a path or name.
-
-        Raises:
-            UsageError: it is no text, or holds what no name can.
-        """
+        """Return ``value`` as a path or name; raise ``UsageError`` if it is no text, or cannot be a name."""
         if not isinstance(value, str):
             raise self.error(line, f"{key}: must be text, not {shown(value)}")
         if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
@@ -108,15 +100,15 @@ class BatchFile:
 
 
 def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
-    """Check depth, lengths and number of values before anything is built.
+    """Check the size and depth of a document before it is built.
 
     Raises:
-        UsageError: by ``error``, of a line and a message.
+        UsageError: made by ``error`` from a line and a message.
     """
     sizes: dict[str, int] = {}
-    """Number of values of each anchor, including itself."""
-    around: list[tuple[str, int]] = []
-    """Anchors of open collections, and the number of values before each."""
+    """Number of values that each anchor stands for, including itself."""
+    open_: list[tuple[str, int]] = []
+    """Anchors of the open collections, and the number of values before each."""
     values = aliased = 0
     while loader.check_event():
         event = loader.get_event()
@@ -131,9 +123,9 @@ def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
                     line, f"aliases stand for more than {MAX_ALIASED} values, the last is *{cut(anchor)}"
                 )
         elif isinstance(event, yaml.CollectionStartEvent):
-            around.append((anchor, values))
+            open_.append((anchor, values))
             size = 1
-            if len(around) > MAX_DEPTH:
+            if len(open_) > MAX_DEPTH:
                 raise error(line, f"nested deeper than {MAX_DEPTH} levels")
         elif isinstance(event, yaml.ScalarEvent):
             size = sizes[anchor] = 1 + len(event.value) // CHARACTERS
@@ -141,20 +133,20 @@ def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
                 raise error(line, f"a value of more than {MAX_SCALAR} characters")
         values += size
         if isinstance(event, yaml.CollectionEndEvent):
-            anchor, before = around.pop()
+            anchor, before = open_.pop()
             sizes[anchor] = values - before
 
 
 CHARACTERS = 100
-"""Characters of a long value that count as one more value."""
+"""Number of characters of a long value that count as one more value."""
 
 
 def plain(text: str) -> Any:
-    """Parse YAML within the bounds of batch files.
+    """Parse a YAML value within the limits of batch files.
 
     Raises:
-        UsageError: beyond them.
-        yaml.YAMLError: no plain value.
+        UsageError: it is beyond them.
+        yaml.YAMLError: it is no plain value.
     """
     _check(yaml.SafeLoader(text), lambda _, message: UsageError(message))
     return yaml.safe_load(text)

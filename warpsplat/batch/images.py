@@ -1,4 +1,4 @@
-"""Find the images that a name means: a file, a folder's, or those that match a pattern."""
+"""Find the images that a name means: a file, those in a folder, or those that match a pattern."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from pathlib import Path
 from warpsplat.errors import UsageError
 from warpsplat.files.marks import HEAD, is_result
 from warpsplat.files.remote import WILD, find_remote, is_remote, is_url, remote
-from warpsplat.run.names import Found
+from warpsplat.run.names import FoundImage
 
 ENDINGS = (
     *(".png", ".jpg", ".jpeg", ".jfif", ".webp", ".avif", ".gif", ".bmp", ".tif", ".tiff"),
     *(".ppm", ".pgm", ".pbm", ".pnm", ".tga", ".jp2", ".ico"),
 )
-"""File name endings of images in a folder."""
+"""Endings of the files of a folder that are taken for images."""
 
 
-def find_images(name: str, base: Path) -> list[Found]:
-    """Return the images that ``name`` means, relative to ``base``, sorted. A named file that is missing is
-    included: it fails on its own.
+def find_images(name: str, base: Path) -> list[FoundImage]:
+    """Return the images that ``name`` means, relative to ``base``, sorted.
+
+    A single file is returned even if it is missing: then only that image fails.
 
     Raises:
         UsageError: nothing is found, or ``name`` is no usable pattern.
@@ -34,11 +35,11 @@ def find_images(name: str, base: Path) -> list[Found]:
     return found
 
 
-def _found(name: str, base: Path) -> Iterator[Found]:
+def _found(name: str, base: Path) -> Iterator[FoundImage]:
     if is_url(name):
         if is_remote(remote(name)):
             images, root = find_remote(name, ENDINGS)
-            yield from (Found(image, root) for image in images)
+            yield from (FoundImage(image, root) for image in images)
             return
         name = str(remote(name))
     path = Path(name).expanduser()
@@ -60,24 +61,21 @@ def _found(name: str, base: Path) -> Iterator[Found]:
 
 
 def _is_image(path: Path) -> bool:
-    """Return whether a file is an image: not hidden, and no result of a batch."""
+    """Return whether a pattern or folder may mean a file: one that is not hidden, nor a result."""
     if not path.is_file() or path.name.startswith("."):
         return False
-    ending = path.suffix.lower()
-    return ending not in RESULTS and not (ending == ".png" and _is_result(path))
+    if path.suffix.lower() != ".png":
+        return path.suffix.lower() not in RESULTS
+    try:
+        with path.open("rb") as file:
+            return not is_result(file.read(HEAD))
+    except OSError:  # the run will report it
+        return True
 
 
 RESULTS = (".svg", ".svgz", ".pdf")
-"""File name endings of results that are not images."""
+"""Endings of results that are no images; a PNG may be either."""
 
 
-def _is_result(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return is_result(file.read(HEAD))
-    except OSError:  # the run reports it
-        return False
-
-
-def _normal(path: Path, root: Path) -> Found:
-    return Found(Path(os.path.normpath(path)), Path(os.path.normpath(root)))
+def _normal(path: Path, root: Path) -> FoundImage:
+    return FoundImage(Path(os.path.normpath(path)), Path(os.path.normpath(root)))

@@ -1,4 +1,4 @@
-"""The page that lists what became of a batch."""
+"""The page that lists the images of a batch."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat.batch.manifest import Manifest
-from warpsplat.batch.plan import Job
+from warpsplat.batch.plan import BatchJob
 from warpsplat.batch.reports import Reports
-from warpsplat.batch.run import JobReport
+from warpsplat.batch.run import JobOutcome
 from warpsplat.errors import printable
 from warpsplat.files.output import write_result
 from warpsplat.files.remote import is_remote
@@ -18,26 +18,26 @@ from warpsplat.files.remote import is_remote
 ASSETS = ("index.css", "index.js")
 
 MOST_THUMBNAILS = 2000
-"""Lists of more images have none: each is 3 kB."""
+"""Longer lists have no thumbnails: each is 3 kB."""
 
 FIGURES = ("psnr", "bytes", "shapes", "seconds")
-"""What images can be sorted by, besides their names."""
+"""Figures that images can be sorted by, besides their names."""
 
 
 class Index:
-    """Collects what becomes of a batch's jobs, and writes the page that lists them."""
+    """Collects the outcomes of a batch's jobs, and writes the page that lists them."""
 
-    def __init__(self, jobs: Sequence[Job], reports: Reports) -> None:
-        """``jobs``: all, also those that other processes do."""
+    def __init__(self, jobs: Sequence[BatchJob], reports: Reports) -> None:
+        """``jobs``: all of them, also those that other processes do."""
         self._jobs, self._reports = jobs, reports
-        self._reported: dict[Path, JobReport] = {}
+        self._outcomes: dict[Path, JobOutcome] = {}
 
-    def add(self, report: JobReport) -> None:
-        """Keep what became of a job."""
-        self._reported[report.job.output] = report
+    def add(self, outcome: JobOutcome) -> None:
+        """Keep the outcome of a job."""
+        self._outcomes[outcome.job.output] = outcome
 
     def write(self, manifest: Manifest) -> None:
-        """Write the list as of now.
+        """Write the current list.
 
         Raises:
             OutputError: it cannot be written.
@@ -49,7 +49,7 @@ class Index:
         text = page("index.html.j2", assets=ASSETS, totals=totals(rows), data={"rows": rows})
         write_result(self._reports.index, text.encode())
 
-    def _row(self, job: Job, manifest: Manifest, *, with_thumbnail: bool) -> dict[str, Any]:
+    def _row(self, job: BatchJob, manifest: Manifest, *, with_thumbnail: bool) -> dict[str, Any]:
         """Return a job's row of the list."""
         status, figures, error = self._state(job, manifest)
         there = status == "made" or (status == "stopped" and bool(figures))
@@ -64,22 +64,19 @@ class Index:
             "status": status,
             "error": printable(error),
             "exact": "psnr" in figures and figures["psnr"] is None and figures.get("ssim") == 1,
-            **_numbers(figures),
+            **{name: figures.get(name) for name in FIGURES},
         }
 
-    def _state(self, job: Job, manifest: Manifest) -> tuple[str, Mapping[str, Any], str]:
-        """Return a job's status, figures and error: as reported in this run, else from the manifest."""
-        reported = self._reported.get(job.output)
-        if reported:
-            return (
-                "made" if reported.status == "skipped" else reported.status,
-                reported.figures,
-                reported.error,
-            )
-        noted = [entry for entry in manifest.entries(job.output) if entry.event in ("made", "failed")]
-        if not noted:
+    def _state(self, job: BatchJob, manifest: Manifest) -> tuple[str, Mapping[str, Any], str]:
+        """Return a job's status, figures and error: of this run, else from the manifest."""
+        outcome = self._outcomes.get(job.output)
+        if outcome:
+            status = "made" if outcome.status == "skipped" else outcome.status
+            return status, outcome.figures, outcome.error
+        entries = [entry for entry in manifest.entries(job.output) if entry.event != "writing"]
+        if not entries:
             return "open", {}, ""
-        return noted[-1].event, noted[-1].figures, noted[-1].error
+        return entries[-1].event, entries[-1].figures, entries[-1].error
 
     def _address(self, path: Path) -> str:
         """Return a relative link from the list to a file; empty if there is none."""
@@ -93,18 +90,8 @@ class Index:
             return ""
 
 
-def _numbers(figures: Mapping[str, Any]) -> dict[str, float | None]:
-    """Return the figures that images are sorted by; a manifest may hold anything."""
-    found = {}
-    for name in FIGURES:
-        value = figures.get(name)
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        found[name] = value if is_number and value is not None and abs(value) < 1e15 else None
-    return found
-
-
 def totals(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
-    """Figures of all images: name, value, unit."""
+    """Return figures of all images: name, value, unit."""
     counts = {name: sum(row["status"] == name for row in rows) for name in ("made", "failed")}
     found = [("Images", str(len(rows)), ""), ("Made", str(counts["made"]), "")]
     if counts["failed"]:

@@ -1,6 +1,6 @@
-"""Settings of jobs, in layers: a batch file's defaults, a preset of it, the job's own, the command line's.
+"""Layers of a job's settings: a batch file's defaults, its preset, the job's own, those of the command line.
 
-Each value is checked by itself where it is given, so that an error names its place.
+Each value is checked where it is given, so that an error names its line or flag.
 """
 
 from __future__ import annotations
@@ -16,68 +16,67 @@ import yaml
 
 from warpsplat.batch.file import BatchFile, plain
 from warpsplat.errors import UsageError, cut, shown
-from warpsplat.run.names import Place
+from warpsplat.run.names import ErrorAt
 from warpsplat.run.options import BY_NAME, KINDS, NESTED, RESEARCH_KEYS, settings_from
 
 TEXT_KEYS = ("output", "device", "importance")
 KEYS = (*BY_NAME, *TEXT_KEYS, *RESEARCH_KEYS, *NESTED)
 
 MATRIX = "matrix"
-"""Key of lists of values: the job is done with each combination of them."""
+"""Key of lists of values: a job is done with each combination of them."""
 
 MOST_COMBINATIONS = 1000
 """Maximum number of combinations of a matrix."""
 
 
 @dataclass(frozen=True)
-class Value:
-    """Value of a key."""
+class GivenValue:
+    """A value, and where it was given."""
 
     value: Any
-    place: Place
+    error: ErrorAt
     base: Path
     """Folder that paths are relative to."""
 
 
-Layer = Mapping[str, Value]
+Layer = Mapping[str, GivenValue]
 
 
-def layer_of(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, Value]:
+def layer_of(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict[str, GivenValue]:
     """Return the values of KEYS and of a matrix in a mapping of a batch file."""
-    layer: dict[str, Value] = {}
+    layer: dict[str, GivenValue] = {}
     for key, (line, node) in entries.items():
-        if key == MATRIX:
-            layer[key] = Value(_axes(file, node), file.place(line), file.path.parent)
-        elif key in NESTED:
-            layer[key] = Value(_nested(file, key, node), file.place(line), file.path.parent)
+        if key == MATRIX or key in NESTED:
+            value = _axes(file, node) if key == MATRIX else _nested(file, key, node)
+            layer[key] = GivenValue(value, file.error_at(line), file.path.parent)
         elif key in KEYS:
             layer[key] = _single(file, key, line, node)
     _check_kinds(layer)
     return layer
 
 
-def _single(file: BatchFile, key: str, line: int, node: yaml.Node) -> Value:
+def _single(file: BatchFile, key: str, line: int, node: yaml.Node) -> GivenValue:
     value = file.value(node)
     if not isinstance(node, yaml.ScalarNode):
         hint = f"; for one job with each, {MATRIX}: {{{key}: [...]}}" if key in BY_NAME else ""
         raise file.error(line, f"{key}: must be one value, not a list or mapping{hint}")
     if key in TEXT_KEYS or (key in BY_NAME and BY_NAME[key].choices):
         file.text(line, key, value)
-    checked(key, value, file.place(line))
-    return Value(value, file.place(line), file.path.parent)
+    check_value(key, value, file.error_at(line))
+    return GivenValue(value, file.error_at(line), file.path.parent)
 
 
 def _nested(file: BatchFile, key: str, node: yaml.Node) -> dict[str, Any]:
-    """Return the mapping of a key of NESTED, each value checked on its own."""
+    """Return the mapping of a key of NESTED, after checking each value."""
     values = {}
     for name, (line, inner) in file.mapping(node, key, NESTED[key]).items():
         values[name] = file.value(inner)
-        checked(key, {name: values[name]}, file.place(line))
+        check_value(key, {name: values[name]}, file.error_at(line))
     return values
 
 
-def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[Value]]:
-    axes: dict[str, list[Value]] = {}
+def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[GivenValue]]:
+    axes: dict[str, list[GivenValue]] = {}
     for key, (line, inner) in file.mapping(node, MATRIX, (*BY_NAME, *RESEARCH_KEYS)).items():
         if not isinstance(inner, yaml.SequenceNode) or not inner.value:
             raise file.error(line, f"{MATRIX}: {key}: must be a list of values")
@@ -87,12 +86,8 @@ def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[Value]]:
     return axes
 
 
-def checked(key: str, value: Any, place: Place) -> None:
-    """Check the value of one key on its own.
-
-    Raises:
-        UsageError: ``key`` cannot have it; the message names the place and the key.
-    """
+def check_value(key: str, value: Any, error_at: ErrorAt) -> None:
+    """Check a value by itself; raise ``UsageError`` from ``error_at`` if ``key`` cannot have it."""
     name = f"{key}: {next(iter(value))}" if key in NESTED else key
     inner = next(iter(value.values())) if key in NESTED else value
     try:
@@ -104,22 +99,22 @@ def checked(key: str, value: Any, place: Place) -> None:
         elif key == "curves" and isinstance(value, str) and "," in value:
             numbers = ", ".join(word.strip() for word in value.split(","))
             raise UsageError(f"takes one number; for one job with each, {MATRIX}: {{{key}: [{numbers}]}}")
-        elif key not in TEXT_KEYS:  # which are texts already
+        elif key not in TEXT_KEYS:  # they are texts already
             settings_from({key.replace("-", "_"): value})
     except (UsageError, TypeError) as error:
-        raise place(f"{name}: {error}") from error
+        raise error_at(f"{name}: {error}") from error
 
 
 def _check_kinds(layer: Layer) -> None:
     if "closed" in layer and "open" in layer:
-        raise layer["open"].place("open: closed is there as well; give one of them")
+        raise layer["open"].error("open: closed is there as well; give one of them")
 
 
 def assigned(text: str) -> tuple[str, Any]:
-    """Parse ``--set``: ``key=value``, or ``rates.points=0.5`` for a key within a mapping; the value is YAML.
+    """Parse ``--set``: ``key=value``, or ``rates.points=0.5`` for a key in a mapping, with a YAML value.
 
     Raises:
-        UsageError: neither, or an unknown key.
+        UsageError: it has another form, or an unknown key.
     """
     name, found, written = text.partition("=")
     key, dot, inner = name.partition(".")
@@ -134,7 +129,7 @@ def assigned(text: str) -> tuple[str, Any]:
     return key, {inner: value} if dot else value
 
 
-def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Value]:
+def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, GivenValue]:
     """Return the layer of the command line.
 
     Args:
@@ -142,9 +137,9 @@ def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Va
         sets: values of ``--set``.
 
     Raises:
-        UsageError: a value is out of range, or one key has two.
+        UsageError: a value is out of range, or a key has two values.
     """
-    layer: dict[str, Value] = {}
+    layer: dict[str, GivenValue] = {}
     for key, value in flags.items():
         if value is not None:
             layer[key] = _given(f"--{key}", key, value)
@@ -153,35 +148,39 @@ def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Va
         if key in layer and not (key in NESTED and not layer[key].value.keys() & value.keys()):
             raise UsageError(f"--set {cut(text)}: {key} is given twice")
         one = _given(f"--set {cut(text)}", key, value)
-        layer[key] = Value({**layer[key].value, **value}, one.place, one.base) if key in layer else one
+        layer[key] = GivenValue({**layer[key].value, **value}, one.error, one.base) if key in layer else one
     _check_kinds(layer)
     return layer
 
 
-def _given(flag: str, key: str, value: Any) -> Value:
-    def place(message: str) -> UsageError:
+def _given(flag: str, key: str, value: Any) -> GivenValue:
+    def error_at(message: str) -> UsageError:
         return UsageError(f"{flag}: {message.removeprefix(f'{key}: ')}")
 
-    checked(key, value, place)
-    return Value(value, place, Path())
+    check_value(key, value, error_at)
+    return GivenValue(value, error_at, Path())
 
 
-def merged(layers: Sequence[Layer]) -> dict[str, Value]:
-    """Merge layers, later ones winning, also within mappings; a kind replaces the other kind."""
-    whole: dict[str, Value] = {}
+def merged(layers: Sequence[Layer]) -> dict[str, GivenValue]:
+    """Merge layers, also within mappings; later ones override earlier ones, and a kind the other kind."""
+    whole: dict[str, GivenValue] = {}
     for layer in layers:
-        if layer.keys() & KINDS.keys():
-            whole = {key: item for key, item in whole.items() if key not in KINDS}
+        if any(kind in layer for kind in KINDS):
+            for kind in KINDS:
+                whole.pop(kind, None)
         for key, item in layer.items():
             value = item.value
             if key in NESTED and key in whole:
                 value = {**whole[key].value, **value}
-            whole[key] = Value(value, item.place, item.base)
+            whole[key] = GivenValue(value, item.error, item.base)
     return whole
 
 
-def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, Value]]:
-    """Yield the settings of a job for each combination of the last matrix; keys of later layers are fixed."""
+def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, GivenValue]]:
+    """Yield a job's settings: one mapping for each combination of the last matrix.
+
+    A key that a later layer gives is no axis any more.
+    """
     whole = merged(layers)
     if MATRIX not in whole:
         yield whole
@@ -189,7 +188,7 @@ def combinations(layers: Sequence[Layer]) -> Iterator[dict[str, Value]]:
     axes = whole.pop(MATRIX).value
     at = max(i for i, layer in enumerate(layers) if MATRIX in layer)
     later = merged(layers[at + 1 :])
-    fixed = later.keys() | (KINDS.keys() if later.keys() & KINDS.keys() else ())
+    fixed = {*later} | (set(KINDS) if later.keys() & KINDS.keys() else set())
     axes = {key: values for key, values in axes.items() if key not in fixed}
     for values in itertools.product(*axes.values()):
         yield merged([whole, dict(zip(axes, values, strict=True))])

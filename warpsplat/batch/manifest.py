@@ -1,11 +1,11 @@
-"""The manifest of a batch: results with their figures, and claims on work in progress.
+"""The manifest of a batch: which results were made, their figures, and which process makes what.
 
-A file of JSON lines, each an event, appended in one write. A crash damages one line at most, which is
-ignored, as are lines of later versions. Entries are found by the result's name and its key (``job_key``:
-content of the image, settings), so that a changed image or setting has none.
+A file of JSON lines, each an event, appended in one write. A crash can damage only the last line; damaged
+lines are ignored, as are those of later versions. Entries are found by the result's name and its key
+(``job_key``: content of the image, settings), so that a changed image or setting finds none.
 
-Work is claimed by locking one byte of the same file, far behind its end, at a hash of name and key. Such a
-lock ends with its process, and works across machines that share the folder.
+A job is claimed by locking one byte of the same file, far behind its end, whose position is a hash of name
+and key. Such a lock ends with its process, however that ends, and machines that share the folder see it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from warpsplat.errors import OutputError, UsageError, printable
+from warpsplat.errors import OutputError, UsageError, cause_of, printable
 from warpsplat.files.remote import is_remote
 
 try:
@@ -31,10 +31,10 @@ except ImportError:  # Windows: two batches at once may both make an image
     fcntl = None  # type: ignore[assignment]
 
 NAME = "warpsplat-manifest.jsonl"
-"""File name, in the folder of the results."""
+"""Default name, in the folder of the results."""
 
 VERSION = 1
-"""Version of a line; later ones are ignored."""
+"""Version of a line; later ones are not read."""
 
 MAX_LINE = 1 << 16
 """Longest line that is read [bytes]."""
@@ -43,10 +43,10 @@ MAX_FILE = 1 << 30
 """Largest manifest [bytes]: 100,000 images take 60 MB."""
 
 FIRST_LOCK = 1 << 40
-"""First of the bytes that are locked, and their number."""
+"""First of the bytes that stand for claims; there are as many."""
 
 Event = Literal["made", "failed", "writing"]
-"""``writing``: the result is about to be written; its digest identifies a result without a key in it."""
+"""``writing``: the result is about to be written; by this, one without a mark is known to be ours."""
 
 
 @dataclass(frozen=True)
@@ -64,90 +64,80 @@ class Entry:
     figures: Mapping[str, Any] = field(default_factory=dict)
 
     def line(self) -> bytes:
-        """Return the line of the file."""
+        """Return the entry as a line of the file."""
         now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
         values = {"v": VERSION, "time": now, **vars(self)}
-        return (
-            json.dumps({key: value for key, value in values.items() if value not in ("", {})}).encode()
-            + b"\n"
-        )
+        text = json.dumps({key: value for key, value in values.items() if value not in ("", {})})
+        return text.encode() + b"\n"
 
 
 def entry_of(line: bytes) -> Entry | None:
-    """Parse a line; None if it is damaged or of a later version."""
+    """Parse a line; return None if it is damaged, of a later version, or something else."""
     if len(line) > MAX_LINE:
         return None
     try:
         values = json.loads(line)
-        if (
-            not isinstance(values, dict)
-            or values.get("v") != VERSION
-            or values.get("event") not in get_args(Event)
-        ):
+        if values["v"] != VERSION or values["event"] not in get_args(Event):
             return None
         texts = {name: values.get(name, "") for name in ("output", "key", "digest", "image", "error")}
-        figures = values.get("figures", {})
-        if not all(isinstance(text, str) for text in texts.values()) or not isinstance(figures, dict):
-            return None
-        if not texts["output"] or not texts["key"]:
+        figures = {name: value for name, value in values.get("figures", {}).items() if _is_valid(name, value)}
+        if (
+            not all(isinstance(text, str) for text in texts.values())
+            or not texts["output"]
+            or not texts["key"]
+        ):
             return None
         texts["error"] = printable(texts["error"])  # it is shown, whoever wrote it
-        return Entry(event=values["event"], figures=sound(figures), **texts)
-    except (ValueError, RecursionError):
+        return Entry(event=values["event"], figures=figures, **texts)
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
         return None
 
 
-def sound(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Drop figures that should be numbers but are not."""
-    return {
-        name: value
-        for name, value in figures.items()
-        if name not in NUMBERS
-        or (isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGE)
-    }
+def _is_valid(name: str, value: Any) -> bool:
+    """Return whether a figure is a number if sums are made of it or images sorted by it."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return name not in NUMBERS or (is_number and abs(value) < LARGE)
 
 
-NUMBERS = ("psnr", "bytes", "seconds")
-"""Figures that are summed."""
+NUMBERS = ("psnr", "bytes", "shapes", "seconds")
 
 LARGE = 1e15
-"""Limit of figures, which excludes infinite ones and integers of a million digits."""
+"""Larger than all figures; excludes infinity, and integers of a million digits."""
 
 
 class Manifest:
-    """An open manifest. Nothing else in this process may open the file: closing it would end all claims."""
+    """A manifest file. Nothing else in this process may open it meanwhile: closing it ends all claims."""
 
     def __init__(self, path: Path) -> None:
-        """Read and create nothing yet."""
+        """Nothing is read or created yet."""
         self.path = path
         self.damaged = 0
-        """Number of ignored lines."""
+        """Lines that were ignored."""
         self._folder = Path(os.path.abspath(path)).parent
         self._handle: int | None = None
-        self._read = 0
+        self._position = 0
+        """Bytes that were read."""
         self._lines: dict[str, list[bytes]] = {}
 
     def open(self, *, write: bool = True) -> None:
-        """Read the file, if it exists; with ``write``, create it. May be called again to write.
+        """Read the file if it exists; with ``write``, create it. May be called again, to write as well.
 
         Raises:
-            UsageError: it is no file, too large, or cannot be read or made.
+            UsageError: it is no file, too large, or cannot be read or created.
         """
         flags = (os.O_RDWR | os.O_CREAT | os.O_APPEND) if write else os.O_RDONLY
         try:
             if write:
                 self._folder.mkdir(parents=True, exist_ok=True)
-            # Opening a pipe would wait for its other end.
+            # Opening a pipe would block.
             handle = os.open(
                 self.path, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0), 0o666
             )
         except FileNotFoundError:
             return
         except (OSError, ValueError) as error:
-            cause = (error.strerror if isinstance(error, OSError) else "") or str(error)
-            raise UsageError(
-                f"manifest {self.path}: cannot be opened: {cause}; --manifest FILE names another place"
-            ) from error
+            cause = f"cannot be opened: {cause_of(error)}; --manifest FILE names another place"
+            raise UsageError(f"manifest {self.path}: {cause}") from error
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode) or found.st_size > MAX_FILE:
             os.close(handle)
@@ -158,34 +148,29 @@ class Manifest:
         self.refresh()
 
     def close(self) -> None:
-        """Close the file, which releases all claims."""
+        """Close the file and release all claims."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
     def refresh(self) -> None:
-        """Read the lines added since, by any process; an incomplete one is left for later."""
+        """Read the lines that any process added; an incomplete one is left for the next time."""
         if self._handle is None:
             return
         size = os.fstat(self._handle).st_size
-        if size <= self._read:
+        if size <= self._position:
             return
-        os.lseek(self._handle, self._read, os.SEEK_SET)
+        os.lseek(self._handle, self._position, os.SEEK_SET)
         with open(self._handle, "rb", closefd=False) as file:
             for line in file:
                 if not line.endswith(b"\n"):
                     break
-                self._read += len(line)
-                self._note(line)
-
-    def _note(self, line: bytes) -> None:
-        if not line.strip():
-            return
-        entry = entry_of(line)
-        if entry is None:
-            self.damaged += 1
-            return
-        self._lines.setdefault(entry.output, []).append(line)
+                self._position += len(line)
+                entry = entry_of(line)
+                if entry:
+                    self._lines.setdefault(entry.output, []).append(line)
+                elif line.strip():
+                    self.damaged += 1
 
     def name(self, output: Path) -> str:
         """Return the name of a result in entries."""
@@ -195,15 +180,11 @@ class Manifest:
         return Path(relative).as_posix().encode("utf-8", "backslashreplace").decode()
 
     def entries(self, output: Path) -> list[Entry]:
-        """Return the entries of a result, oldest first."""
+        """Return the entries of a result, the latest last."""
         return [entry for line in self._lines.get(self.name(output), ()) if (entry := entry_of(line))]
 
-    def latest(self, output: Path, key: str) -> Entry | None:
-        """Return the last entry of a result with this key."""
-        return next((entry for entry in reversed(self.entries(output)) if entry.key == key), None)
-
     def append(self, entry: Entry) -> None:
-        """Append a line in one write.
+        """Add a line in one write.
 
         Raises:
             OutputError: it cannot be written.
@@ -218,7 +199,7 @@ class Manifest:
             raise OutputError(f"manifest {self.path}: could not be written: {error.strerror}") from error
 
     def _ends_whole(self) -> bool:
-        """Return whether the file is empty or ends with a complete line."""
+        """Return whether the file is empty or ends with a complete line, which a crash may have prevented."""
         assert self._handle is not None
         size = os.fstat(self._handle).st_size
         if size == 0:
@@ -228,7 +209,7 @@ class Manifest:
 
     @contextlib.contextmanager
     def _locked(self, byte: int) -> Iterator[None]:
-        """Hold a lock, after waiting for it."""
+        """Wait for the lock of a byte, and hold it during the block."""
         if fcntl is None:
             yield
             return
@@ -240,7 +221,7 @@ class Manifest:
             fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, FIRST_LOCK + byte)
 
     def claim(self, output: Path, key: str) -> bool:
-        """Claim a result; return False if another process has it.
+        """Claim a result; return False if another process has.
 
         Raises:
             OutputError: the file system has no locks.

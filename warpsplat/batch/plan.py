@@ -1,8 +1,8 @@
-"""Command line and batch files -> jobs, checked before anything starts.
+"""Plan the jobs of a command line and its batch files, and check them before anything starts.
 
 ::
 
-    defaults:            # of every job; keys are the long flags of `warpsplat vectorize`, and jobs.research's
+    defaults:            # of every job; keys: the long flags of `warpsplat vectorize`, and RESEARCH_KEYS
       curves: 512
       output: svg        # folder for the results, or their names; default: beside each image
     presets:
@@ -14,7 +14,7 @@
       - images: [logo.png, icons/**/*.png]
         preset: icons
 
-Paths are relative to the YAML file. Later ones win: defaults, preset, job, command line.
+Paths are relative to the YAML file. Defaults < preset < job < command line.
 """
 
 from __future__ import annotations
@@ -25,31 +25,39 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
 from warpsplat.batch.file import BatchFile
 from warpsplat.batch.images import find_images
-from warpsplat.batch.layers import KEYS, MATRIX, Layer, Value, combinations, layer_of
+from warpsplat.batch.layers import KEYS, MATRIX, GivenValue, Layer, combinations, layer_of
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.remote import is_remote, is_url, remote
 from warpsplat.fit.settings import Settings
-from warpsplat.run.names import Found, Place, Wanted, check_outputs, fields_of, name_results, root_of
+from warpsplat.run.names import (
+    ErrorAt,
+    FoundImage,
+    ResultRequest,
+    check_outputs,
+    fields_of,
+    name_results,
+    root_of,
+)
 from warpsplat.run.options import NESTED, settings_from
 
 BATCH_ENDINGS = (".yaml", ".yml")
-"""File name endings of batch files."""
+"""Endings of batch files."""
 
 PRESET = "preset"
-"""Key of a job: the name of the preset that it takes."""
+"""Key of a job: the name of its preset."""
 
 JOB_KEYS = ("images", PRESET, MATRIX, *KEYS)
 
 
 @dataclass(frozen=True)
-class Job:
+class BatchJob:
     """One image to vectorize."""
 
     image: Path
@@ -57,33 +65,32 @@ class Job:
     settings: Settings
     device: str
     importance: Path | None = None
-    """Mask of how much the error of a pixel counts."""
+    """Importance mask."""
     root: Path = Path()
-    """Folder that the results of its kind lie in."""
+    """Folder of all results of its output."""
 
 
-@dataclass(frozen=True)
-class _Planned:
-    wanted: Wanted
+class _PlannedJob(NamedTuple):
+    request: ResultRequest
     device: str
     importance: Path | None
 
 
-def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Job]:
-    """Return the jobs of names on the command line: batch files, images, folders of them and patterns.
+def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[BatchJob]:
+    """Return the jobs of batch files, images, folders and patterns.
 
     Args:
-        inputs: the names.
+        inputs: their names.
         command: settings of the command line, see ``layers.command_layer``.
 
     Raises:
-        UsageError: anything wrong with them; of a file the message names its line and key.
+        UsageError: anything is wrong with them; the message names the line and key of a batch file.
     """
-    planned: list[_Planned] = []
-    named: dict[Path, Found] = {}
+    planned: list[_PlannedJob] = []
+    named: dict[Path, FoundImage] = {}
     for name in inputs:
         if name == str(STANDARD) or name.lower().endswith(BATCH_ENDINGS):
-            planned += _of_file(Path(name), command or {})
+            planned += _jobs_of_file(Path(name), command or {})
         else:
             for image in find_images(name, Path()):
                 named.setdefault(image.path, image)
@@ -91,7 +98,7 @@ def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Job]:
     return _jobs(planned)
 
 
-def _of_file(path: Path, command: Layer) -> Iterator[_Planned]:
+def _jobs_of_file(path: Path, command: Layer) -> Iterator[_PlannedJob]:
     file = BatchFile(path)
     top = file.mapping(file.root, "a batch file", ("defaults", "presets", "jobs"))
     defaults: Layer = {}
@@ -109,7 +116,7 @@ def _of_file(path: Path, command: Layer) -> Iterator[_Planned]:
         if "images" not in entries:
             raise file.error(start, "key 'images' is missing in a job")
         layers = [defaults, _preset(file, entries, presets), layer_of(file, entries), command]
-        yield from _expanded(_images(file, *entries["images"]), layers, file.place(start))
+        yield from _expanded(_images(file, *entries["images"]), layers, file.error_at(start))
 
 
 def _presets(file: BatchFile, line: int, node: yaml.Node) -> dict[str, Layer]:
@@ -123,7 +130,7 @@ def _presets(file: BatchFile, line: int, node: yaml.Node) -> dict[str, Layer]:
 
 
 def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets: dict[str, Layer]) -> Layer:
-    """Return the preset of a job, with its name as a field for names of results."""
+    """Return the preset that a job names, with its name as a field for names of results."""
     if PRESET not in entries:
         return {}
     line, node = entries[PRESET]
@@ -131,17 +138,17 @@ def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets:
     if name not in presets:
         known = ", ".join(presets) or "none"
         raise file.error(line, f"{PRESET}: there is no {shown(name)}; known are: {known}")
-    return {**presets[name], PRESET: Value(name, file.place(line), file.path.parent)}
+    return {**presets[name], PRESET: GivenValue(name, file.error_at(line), file.path.parent)}
 
 
-def _images(file: BatchFile, line: int, node: yaml.Node) -> list[Found]:
-    """Return the files that match the patterns, without duplicates, sorted within each pattern."""
+def _images(file: BatchFile, line: int, node: yaml.Node) -> list[FoundImage]:
+    """Return the files that match the patterns, each once, sorted within each pattern."""
     patterns = file.value(node)
     if isinstance(patterns, str):
         patterns = [patterns]
     if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) and p for p in patterns):
         raise file.error(line, "images: must be a path or pattern, or a list of them")
-    found: dict[Path, Found] = {}
+    found: dict[Path, FoundImage] = {}
     for pattern in [file.text(line, "images", pattern) for pattern in patterns]:
         try:
             for image in find_images(pattern, file.path.parent):
@@ -151,7 +158,7 @@ def _images(file: BatchFile, line: int, node: yaml.Node) -> list[Found]:
     return list(found.values())
 
 
-def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Iterator[_Planned]:
+def _expanded(images: list[FoundImage], layers: Sequence[Layer], start: ErrorAt) -> Iterator[_PlannedJob]:
     """Yield the jobs of one description: each combination of its settings for each image."""
     for values in combinations(layers):
         given: dict[str, Any] = {key: item.value for key, item in values.items()}
@@ -167,42 +174,43 @@ def _expanded(images: list[Found], layers: Sequence[Layer], start: Place) -> Ite
             settings = settings_from(options)
         except UsageError as error:  # values that do not go together
             raise start(str(error)) from error
-        place = values["output"].place if "output" in values else start
+        error_at = values["output"].error if "output" in values else start
         fields = fields_of(settings, {key: value for key, value in given.items() if key not in NESTED})
         device = given.get("device", "auto")
         for image in images:
-            yield _Planned(Wanted(image, output, settings, fields, place), device, mask)
+            yield _PlannedJob(ResultRequest(image, output, settings, fields, error_at), device, mask)
 
 
-def _path(key: str, item: Value) -> Path:
-    """Return the path that a key gives, relative to its file."""
+def _path(key: str, item: GivenValue) -> Path:
+    """Return the path that a key gives, relative to where it was given."""
     try:
         return remote(item.value) if is_url(item.value) else item.base / Path(item.value).expanduser()
     except RuntimeError as error:
-        raise item.place(f"{key}: {item.value!r}: {error}") from error
+        raise item.error(f"{key}: {item.value!r}: {error}") from error
 
 
-def _jobs(planned: list[_Planned]) -> list[Job]:
-    wanted = [item.wanted for item in planned]
-    outputs = name_results(wanted, {item.importance for item in planned if item.importance})
-    check_outputs([item.place for item in wanted], outputs)
+def _jobs(planned: list[_PlannedJob]) -> list[BatchJob]:
+    requests = [item.request for item in planned]
+    outputs = name_results(requests, {item.importance for item in planned if item.importance})
+    check_outputs([request.error for request in requests], outputs)
     return [
-        Job(
-            item.wanted.image.path,
+        BatchJob(
+            request.image.path,
             output,
-            item.wanted.settings,
-            item.device,
-            item.importance,
-            root_of(item.wanted.output) if item.wanted.output else item.wanted.image.root,
+            request.settings,
+            device,
+            importance,
+            root_of(request.output) if request.output else request.image.root,
         )
-        for item, output in zip(planned, outputs, strict=True)
+        for (request, device, importance), output in zip(planned, outputs, strict=True)
     ]
 
 
-def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
-    """Return the folder of a batch's manifest: the folder that contains all results, if there is one.
+def home_of(jobs: Sequence[BatchJob], inputs: Sequence[str]) -> Path:
+    """Return the folder of a batch's manifest: the one of its results that contains the others.
 
-    Else that of the batch file, or the current folder if there is not exactly one batch file.
+    If there is none, or results lie behind URLs, it is the folder of the batch file, or, unless there is
+    exactly one input, the current folder.
     """
     away = any(is_remote(job.root) for job in jobs)
     roots = set() if away else {os.path.abspath(job.root) for job in jobs}
@@ -214,10 +222,10 @@ def home_of(jobs: Sequence[Job], inputs: Sequence[str]) -> Path:
     return Path(inputs[0]).parent if is_file else Path()
 
 
-def in_shard(job: Job, root: Path, index: int, count: int) -> bool:
-    """Return whether ``job`` belongs to part ``index`` (from 1) of ``count``.
+def in_shard(job: BatchJob, root: Path, index: int, count: int) -> bool:
+    """Return whether ``job`` is in part ``index`` (from 1) of ``count``, by its result's name below ``root``.
 
-    It depends on the path of its result below ``root`` only, not on other jobs or the image's content.
+    This depends neither on other jobs nor on the content of the image.
     """
     away = is_remote(job.output)
     name = str(job.output) if away else Path(os.path.relpath(job.output, root)).as_posix()

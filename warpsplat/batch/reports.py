@@ -1,4 +1,4 @@
-"""The pages of a batch: one for each result, and one that lists them."""
+"""Where the pages of a batch lie: one for each result, and one that lists them."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ INDEX_NAME = "index.html"
 ENDINGS = (".html", ".htm")
 
 HEAD = 40_000
-"""Bytes at the start of a report in which its thumbnail stands."""
+"""Bytes at the start of a report that contain its thumbnail."""
 
 THUMBNAIL = re.compile(r'<meta name="thumbnail" content="(data:image/webp;base64,[\w+/=&#;]+)">')
 
 
 @dataclass(frozen=True)
 class Reports:
-    """Places of a batch's pages."""
+    """The pages of a batch."""
 
     index: Path
-    """The list; reports are in a folder beside it with its name."""
+    """The list; reports lie in a folder beside it, which is named after it."""
     home: Path
-    """Folder that results are relative to."""
+    """Folder that results are named relative to."""
     overwrite: bool = False
-    """Whether to replace files that warpsplat did not write."""
+    """Whether files that warpsplat did not write may be replaced."""
 
     @staticmethod
     def at(place: Path, home: Path, *, taken: Iterable[Path] = (), overwrite: bool) -> Reports:
-        """Return the pages in a folder, or with a list of that name; ``taken``: other files of the batch.
+        """Return pages in a folder, or with the given list; ``taken``: other files of the batch.
 
         Raises:
             UsageError: the list cannot be written, or is one of these files.
@@ -64,7 +64,7 @@ class Reports:
         return self.index.parent / f"{self.index.stem}-pages"
 
     def report_of(self, output: Path) -> Path:
-        """Return the path of a result's report."""
+        """Return the path of the report of a result."""
         if not is_remote(output):
             with contextlib.suppress(ValueError):  # on another drive
                 inside = Path(os.path.relpath(output, self.home))
@@ -73,12 +73,12 @@ class Reports:
         digest = hashlib.sha256(os.fsencode(str(output))).hexdigest()[:8]
         return self.folder / f"{digest}-{output.name}.html"
 
-    def link_to_index(self, output: Path) -> str:
+    def link_back(self, output: Path) -> str:
         """Return the relative path from the report of a result to the list."""
         return Path(os.path.relpath(self.index, self.report_of(output).parent)).as_posix()
 
-    def lacks(self, output: Path) -> bool:
-        """Return whether a result has no report, or only an older one."""
+    def outdated(self, output: Path) -> bool:
+        """Return whether an existing result has no report, or an older one."""
         try:
             made = os.stat(self.report_of(output)).st_mtime
             return not is_remote(output) and made < os.stat(output).st_mtime
@@ -86,7 +86,7 @@ class Reports:
             return True
 
     def keep(self, output: Path, outcome: Outcome) -> None:
-        """Write the report of an outcome; errors are only logged."""
+        """Write the report of an outcome; if that fails, the batch goes on after a warning."""
         error = outcome.report_error
         path = self.report_of(output)
         if outcome.report:
@@ -101,7 +101,7 @@ class Reports:
             log.warning("no report: %s", printable(error))
 
     def thumbnail_of(self, output: Path) -> str:
-        """Return the thumbnail in a result's report, as a data URI; empty if there is none."""
+        """Return the thumbnail in the report of a result as a data URI; empty if there is none."""
         try:
             with self.report_of(output).open("rb") as file:
                 found = THUMBNAIL.search(file.read(HEAD).decode("utf-8", "replace"))

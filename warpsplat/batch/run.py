@@ -4,55 +4,47 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import stat
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from warpsplat.batch.executors.tasks import Advance, Executor, Outcome, ReportRequest, Source, Stop, Task
-from warpsplat.batch.executors.work import digest, failure
-from warpsplat.batch.manifest import Entry, Manifest
-from warpsplat.batch.plan import Job
+from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, ReportRequest, Stop, Task
+from warpsplat.batch.executors.work import failure
+from warpsplat.batch.manifest import Entry, Event, Manifest
+from warpsplat.batch.plan import BatchJob
 from warpsplat.batch.reports import Reports
-from warpsplat.errors import ImageError, OutputError
-from warpsplat.files.inputs import MAX_INPUT, read_input
-from warpsplat.files.marks import GZIP, HEAD, picture_key
-from warpsplat.files.output import make_folder, may_replace, write_result
-from warpsplat.files.remote import exists, is_remote, listed, read_remote
+from warpsplat.batch.results import ResultState, read_result, result_state
+from warpsplat.errors import OutputError
+from warpsplat.files.inputs import read_input
+from warpsplat.files.output import make_folder, write_result
+from warpsplat.files.remote import is_remote
 from warpsplat.run.formats import is_picture
 from warpsplat.run.result import STOPPED, job_key
-from warpsplat.svg.inspect import svg_text
-from warpsplat.svg.write import read_metadata
 
 log = logging.getLogger(__name__)
 
 Status = Literal["made", "skipped", "failed", "stopped", "planned"]
 
 PAUSE = 0.3
-"""Seconds between two checks of what other processes are working on."""
-
-TAIL = b"</svg>\n"
-"""End of every complete SVG."""
+"""Seconds between two checks of the jobs that other processes have claimed."""
 
 
 @dataclass(frozen=True)
-class JobReport:
-    """What became of a job."""
+class JobOutcome:
+    """The outcome of a job."""
 
-    job: Job
+    job: BatchJob
     status: Status
     figures: Mapping[str, Any] = field(default_factory=dict)
-    """See ``vectorize.Result.as_dict``; of a skipped one those that are known."""
+    """See ``Result.as_dict``; for a skipped job those that are known."""
     error: str = ""
-    """One line, of a job that failed."""
+    """Why it failed, in one line."""
     before: bool = False
     """Whether it failed in an earlier run, and was not tried again."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the values for JSON."""
         values: dict[str, Any] = {"image": str(self.job.image), "output": str(self.job.output)}
         values |= {"status": self.status, **self.figures}
         return values | ({"error": self.error, "before": self.before} if self.error else {})
@@ -66,88 +58,12 @@ class JobInputs(NamedTuple):
     mask: bytes | None
 
 
-class ResultState(NamedTuple):
-    """Whether a result exists."""
+class Claim(NamedTuple):
+    """A job in progress."""
 
-    made: bool
+    key: str
     entry: Entry | None
-    """Its entry in the manifest: how an existing result was made, or that the job failed."""
-
-
-def read_inputs(job: Job) -> JobInputs:
-    """Read a job's inputs.
-
-    Raises:
-        ImageError: they cannot be read.
-    """
-    image = read_input(job.image)
-    mask = read_input(job.importance) if job.importance else None
-    return JobInputs(job_key(job.settings, image, mask), image, mask)
-
-
-def result_state(job: Job, key: str, manifest: Manifest) -> ResultState:
-    """Find the complete result of ``key``, by the key in the file or the file's digest in the manifest."""
-    entries = [entry for entry in manifest.entries(job.output) if entry.key == key]
-    if is_remote(job.output):
-        # The manifest is trusted: fetching each result would take longer than many take to make.
-        latest = entries[-1] if entries else None
-        if latest and latest.event == "made" and exists(job.output):
-            return ResultState(True, latest)
-    data = read_result(job.output)
-    if data is not None:
-        sum_ = digest(data)
-        # A result that was about to be written and exists has been made.
-        known = [e for e in entries if e.digest == sum_ and (e.event == "made" or e.figures)]
-        if known:
-            return ResultState(True, known[-1])
-        if marked(data) == key or any(entry.digest == sum_ for entry in entries):
-            return ResultState(True, None)
-    failed = entries[-1] if entries and entries[-1].event == "failed" else None
-    return ResultState(False, failed)
-
-
-def read_result(path: Path) -> bytes | None:
-    """Return the bytes of a result, or None if there is none or it is no regular file."""
-    if is_remote(path):
-        return read_remote(path, MAX_INPUT) if listed(path) else None
-    with contextlib.suppress(OSError):
-        found = os.stat(path)
-        if (
-            stat.S_ISREG(found.st_mode) and found.st_size <= MAX_INPUT
-        ):  # a pipe would wait for whoever fills it
-            return path.read_bytes()
-    return None
-
-
-def marked(data: bytes) -> str:
-    """Return the key in a complete result; empty if it has none or is incomplete."""
-    if data[:2] == GZIP:
-        try:
-            data = svg_text(data, "").encode()
-        except ImageError:
-            return ""
-    if data.endswith(TAIL):
-        return read_metadata(data[:HEAD].decode("utf-8", "replace"))
-    return picture_key(data)
-
-
-def not_ours(jobs: Iterable[Job], manifest: Manifest) -> list[Path]:
-    """Return the existing files in place of results that warpsplat did not write."""
-    found = []
-    for job in jobs:
-        if is_remote(job.output) and (not listed(job.output) or manifest.entries(job.output)):
-            continue
-        try:
-            free = may_replace(job.output)
-        except OSError:
-            free = False
-        if not free:
-            data = read_result(job.output)
-            entries = manifest.entries(job.output) if data is not None else []
-            free = data is not None and any(entry.digest == digest(data) for entry in entries)
-        if not free:
-            found.append(job.output)
-    return found
+    """The manifest's entry of a result that exists and only lacks a report."""
 
 
 class Batch:
@@ -155,31 +71,28 @@ class Batch:
 
     def __init__(
         self,
-        jobs: list[Job],
+        jobs: list[BatchJob],
         manifest: Manifest,
         *,
-        on_report: Callable[[JobReport], None],
+        on_outcome: Callable[[JobOutcome], None],
         retry: bool = False,
         threads: int | None = None,
         reports: Reports | None = None,
     ) -> None:
         """Args:
-        jobs: what to do.
-        manifest: open.
-        on_report: called with what became of each job, as soon as that is known.
-        retry: whether what failed is tried again.
-        threads: of each task, on a CPU.
+        jobs: the jobs.
+        manifest: an open manifest.
+        on_outcome: called with the outcome of each job as soon as it is known.
+        retry: whether jobs that failed are tried again.
+        threads: number of threads for each task on a CPU.
         reports: where pages on results are kept; None: none are made.
         """
         self.jobs, self.manifest = jobs, manifest
-        self._on_report, self._retry, self._threads = on_report, retry, threads
+        self._on_outcome, self._retry, self._threads = on_outcome, retry, threads
         self._reports = reports
-        self._made_before: dict[int, Entry] = {}
-        """Manifest entries of results that exist and only lack a report."""
-        self._keys: dict[int, str] = {}
-        """Keys of the tasks in progress."""
+        self._claims: dict[int, Claim] = {}
 
-    def run(self, executor: Executor, stop: Stop, advance: Advance) -> None:
+    def run(self, executor: Executor, stop: Stop, on_progress: OnProgress) -> None:
         """Do the jobs. Wait for those claimed by another process, and do them if it dies.
 
         Raises:
@@ -189,8 +102,8 @@ class Batch:
         todo, waiting = list(range(len(self.jobs))), False
         while todo and not stop():
             later: list[int] = []
-            for outcome in executor.run(self._tasks(todo, later, stop), stop, advance):
-                advance(outcome.number, 1.0)
+            for outcome in executor.run(self._tasks(todo, later, stop), stop, on_progress):
+                on_progress(outcome.number, 1.0)
                 self._settle(outcome)
             if later and not waiting:
                 waiting = True
@@ -201,11 +114,11 @@ class Batch:
 
     def dry_run(self, stop: Stop) -> None:
         """Report what a run would do, and do nothing."""
-        for number, job in enumerate(self.jobs):
+        for job in self.jobs:
             if stop():
                 return
-            if self._inputs(number) is not None:
-                self._on_report(JobReport(job, "planned"))
+            if self._inputs(job):
+                self._on_outcome(JobOutcome(job, "planned"))
 
     def _tasks(self, todo: list[int], later: list[int], stop: Stop) -> Iterator[Task]:
         """Claim the jobs ``todo`` and yield their tasks; append those claimed by others to ``later``."""
@@ -213,84 +126,74 @@ class Batch:
             if stop():
                 return
             job = self.jobs[number]
-            found = self._inputs(number)
-            if stop():
-                self._on_report(JobReport(job, "stopped"))
-                return
-            if found is None:
+            inputs = self._inputs(job)
+            if inputs is None:
                 continue
-            if not self.manifest.claim(job.output, found.key):
+            if stop():
+                self._on_outcome(JobOutcome(job, "stopped"))
+                return
+            if not self.manifest.claim(job.output, inputs.key):
                 later.append(number)
                 continue
-            # The previous holder of the claim may have made it.
-            self.manifest.refresh()
-            state = self._known(job, found.key)
+            self.manifest.refresh()  # the previous holder of the claim may have made it
+            state = self._state(job, inputs.key)
             if state is None:
-                self.manifest.release(job.output, found.key)
+                self.manifest.release(job.output, inputs.key)
                 continue
-            self._keys[number] = found.key
-            if state.made and state.entry:
-                self._made_before[number] = state.entry
-            yield self._task(number, found, measure=state.made)
+            self._claims[number] = Claim(inputs.key, state.entry if state.made else None)
+            yield self._task(number, inputs, measure=state.made)
 
-    def _inputs(self, number: int) -> JobInputs | None:
-        """Return a job's inputs; None, after a report, if nothing is to be done."""
-        job = self.jobs[number]
+    def _inputs(self, job: BatchJob) -> JobInputs | None:
+        """Return a job's inputs; None, after its outcome, if nothing is to be done."""
         try:
-            found = read_inputs(job)
+            image = read_input(job.image)
+            mask = read_input(job.importance) if job.importance else None
+            key = job_key(job.settings, image, mask)
         except Exception as error:
-            self._on_report(JobReport(job, "failed", error=failure(error, str(job.image), str(job.output))))
+            message = failure(error, str(job.image), str(job.output))
+            self._on_outcome(JobOutcome(job, "failed", error=message))
             return None
-        return found if self._known(job, found.key) else None
+        return JobInputs(key, image, mask) if self._state(job, key) else None
 
-    def _known(self, job: Job, key: str) -> ResultState | None:
-        """Return the state of a result; None, after a report, if nothing is to be done."""
+    def _state(self, job: BatchJob, key: str) -> ResultState | None:
+        """Return the state of a result; None, after the job's outcome, if nothing is to be done."""
         state = result_state(job, key, self.manifest)
-        reported = not (self._reports and self._reports.lacks(job.output))
-        if state.made and (is_picture(job.output) or (state.entry and reported)):  # pictures are not measured
-            self._on_report(JobReport(job, "skipped", state.entry.figures if state.entry else {}))
+        made, entry = state
+        reported = not (self._reports and self._reports.outdated(job.output))
+        if made and (is_picture(job.output) or (entry and reported)):  # pictures are not measured
+            self._on_outcome(JobOutcome(job, "skipped", entry.figures if entry else {}))
             return None
-        if not state.made and state.entry and not self._retry:
-            self._on_report(JobReport(job, "failed", error=state.entry.error, before=True))
+        if not made and entry and not self._retry:
+            self._on_outcome(JobOutcome(job, "failed", error=entry.error, before=True))
             return None
         return state
 
-    def _task(self, number: int, found: JobInputs, *, measure: bool) -> Task:
-        job = self.jobs[number]
-        away = is_remote(job.output)
+    def _task(self, number: int, inputs: JobInputs, *, measure: bool) -> Task:
+        job, entry = self.jobs[number], self._claims[number].entry
+        report = None
+        if self._reports:
+            report = ReportRequest(self._reports.link_back(job.output), entry.figures if entry else {})
         return Task(
             number,
-            found.image if is_remote(job.image) else str(job.image),
+            inputs.key,
+            inputs.image,
             str(job.image),
             str(job.output),
             job.settings,
             job.device,
             self._threads,
-            self._mask(job, found),
+            inputs.mask,
+            str(job.importance),
             # A result without a key in it is known by its digest, which is noted before it is written; a
             # picture is drawn once, for both.
-            bring=away or job.settings.minify or is_picture(job.output),
-            measure=measure,
-            result=read_result(job.output) if measure and away else None,
-            report=self._report_request(number),
+            bring=is_remote(job.output) or job.settings.minify or is_picture(job.output),
+            result=read_result(job.output) if measure else None,
+            report=report,
         )
 
-    def _report_request(self, number: int) -> ReportRequest | None:
-        if self._reports is None:
-            return None
-        before = self._made_before.get(number)
-        back = self._reports.link_to_index(self.jobs[number].output)
-        return ReportRequest(back, before.figures if before else {})
-
-    def _mask(self, job: Job, found: JobInputs) -> Source | None:
-        if job.importance is None:
-            return None
-        return found.mask if is_remote(job.importance) else str(job.importance)
-
     def _settle(self, outcome: Outcome) -> None:
-        """Write a result if the worker did not, and note and report the outcome."""
-        job, key = self.jobs[outcome.number], self._keys.pop(outcome.number)
-        before = self._made_before.pop(outcome.number, None)
+        """Write a result if the worker did not; add the outcome to the manifest and report it."""
+        job, (key, before) = self.jobs[outcome.number], self._claims.pop(outcome.number)
         status: Status = "skipped" if outcome.status == "measured" else outcome.status
         error = outcome.error
         try:
@@ -303,24 +206,15 @@ class Batch:
         except OutputError as failed:
             status, error = "failed", failure(failed, str(job.image), str(job.output))
         if status == "failed" and outcome.key:
-            with contextlib.suppress(OutputError):  # reported once is enough
-                self.manifest.append(
-                    Entry(
-                        self.manifest.name(job.output),
-                        outcome.key,
-                        "failed",
-                        image=str(job.image),
-                        error=error,
-                    )
-                )
+            with contextlib.suppress(OutputError):  # the outcome tells it
+                self._note(job, Outcome(outcome.number, "failed", outcome.key), "failed", error)
         if self._reports and status != "failed":
             self._reports.keep(job.output, outcome)
         self.manifest.release(job.output, key)
-        self._on_report(JobReport(job, status, before.figures if before else outcome.figures, error))
+        self._on_outcome(JobOutcome(job, status, before.figures if before else outcome.figures, error))
 
-    def _note(self, job: Job, outcome: Outcome, event: Literal["made", "writing"]) -> None:
+    def _note(self, job: BatchJob, outcome: Outcome, event: Event, error: str = "") -> None:
+        """Append an entry to the manifest; a stopped result is ours, but not the job's."""
+        key = STOPPED if outcome.status == "stopped" else outcome.key
         name, image = self.manifest.name(job.output), str(job.image)
-        key = (
-            STOPPED if outcome.status == "stopped" else outcome.key
-        )  # written by us, but not the job's result
-        self.manifest.append(Entry(name, key, event, outcome.digest, image, figures=outcome.figures))
+        self.manifest.append(Entry(name, key, event, outcome.digest, image, error, outcome.figures))

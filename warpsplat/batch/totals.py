@@ -2,45 +2,45 @@
 
 from __future__ import annotations
 
-import statistics
 from dataclasses import dataclass, field
+from statistics import fmean, median
 from typing import Any
 
-from warpsplat.batch.run import JobReport
+from warpsplat.batch.run import JobOutcome
 
 COUNTED = ("made", "skipped", "failed")
-"""Always in a summary."""
+"""Counts that are always in a summary."""
 
 RARE = ("stopped", "planned")
-"""In a summary if there are some."""
+"""Counts that are in a summary if they are not 0."""
 
 
 @dataclass
 class Totals:
-    """Sums over the reports so far."""
+    """Sums over the outcomes so far."""
 
-    asked: int
-    """Images of the batch."""
+    requested: int
+    """Number of images of the batch."""
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*COUNTED, *RARE), 0))
     psnr: list[float] = field(default_factory=list)
-    """Of each image that has one [dB]; of one that is shown exactly there is none."""
+    """PSNR of each image [dB], except those that are reproduced exactly."""
     bytes: list[int] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
-    """That each took that was made now."""
+    """Time of each image that was made now."""
     failures: list[str] = field(default_factory=list)
     missed: bool = False
     """Whether an image that was made now misses a goal."""
 
-    def add(self, report: JobReport) -> None:
-        """Count a report."""
-        self.counts[report.status] += 1
-        if report.error:
-            self.failures.append(report.error)
-        figures = report.figures
+    def add(self, outcome: JobOutcome) -> None:
+        """Count an outcome."""
+        self.counts[outcome.status] += 1
+        if outcome.error:
+            self.failures.append(outcome.error)
+        figures = outcome.figures
         for name, values in (("psnr", self.psnr), ("bytes", self.bytes)):
             if figures.get(name) is not None:
                 values.append(figures[name])
-        if report.status == "made":
+        if outcome.status == "made":
             self.seconds.append(figures.get("seconds", 0.0))
             self.missed |= bool(figures.get("missed"))
 
@@ -50,33 +50,33 @@ class Totals:
         return {name: n for name, n in counts.items() if n or name in COUNTED}
 
     @property
+    def seen(self) -> int:
+        """Number of images that have an outcome."""
+        return sum(self.counts.values())
+
+    @property
     def not_started(self) -> int:
         """Images that an interrupted batch did not get to."""
-        return self.asked - sum(self.counts.values())
+        return self.requested - self.seen
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the values for JSON."""
         return {
-            "images": self.asked,
+            "images": self.requested,
             **{name.replace(" ", "_"): n for name, n in self.shown_counts().items()},
-            "psnr_mean": _rounded(statistics.fmean(self.psnr)) if self.psnr else None,
-            "psnr_median": _rounded(statistics.median(self.psnr)) if self.psnr else None,
+            "psnr_mean": round(fmean(self.psnr), 3) if self.psnr else None,
+            "psnr_median": round(median(self.psnr), 3) if self.psnr else None,
             "bytes": sum(self.bytes),
-            "seconds": _rounded(sum(self.seconds)),
+            "seconds": round(sum(self.seconds), 3),
         }
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a table: name, mean, median, sum."""
         rows: list[tuple[str, ...]] = [("", "mean", "median", "sum")]
         if self.psnr:
-            mean, median = statistics.fmean(self.psnr), statistics.median(self.psnr)
-            rows.append(("PSNR [dB]", f"{mean:.2f}", f"{median:.2f}", ""))
+            rows.append(("PSNR [dB]", f"{fmean(self.psnr):.2f}", f"{median(self.psnr):.2f}", ""))
         for name, values, scale in (("size [kB]", self.bytes, 1000), ("time [s]", self.seconds, 1)):
             if values:
-                mean, median, total = statistics.fmean(values), statistics.median(values), sum(values)
-                rows.append((name, *(f"{value / scale:.1f}" for value in (mean, median, total))))
+                row = (function(values) / scale for function in (fmean, median, sum))
+                rows.append((name, *(f"{value:.1f}" for value in row)))
         return rows if len(rows) > 1 else []
-
-
-def _rounded(value: float) -> float:
-    return round(value, 3)

@@ -19,35 +19,34 @@ from warpsplat.run.formats import ENDINGS, check_format
 from warpsplat.run.options import KINDS
 
 FIELD = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
-"""Braces in the name of a result: doubled, a field, or unbalanced."""
+"""Braces in the name of a result: doubled, around a field, or unbalanced."""
 
-LIKELY = "out/{stem}-{curves}.svg"
-"""An example for messages."""
+EXAMPLE = "out/{stem}-{curves}.svg"
+"""Example for messages."""
+
+ErrorAt = Callable[[str], UsageError]
+"""Returns an error whose message names where something was given: a line of a file, or the command line."""
 
 
-Place = Callable[[str], UsageError]
-"""Makes the error that names where something was given: a line of a file, or the command line."""
-
-
-class Found(NamedTuple):
-    """An image, and the folder under which it was looked for."""
+class FoundImage(NamedTuple):
+    """An image, and the folder in which it was searched."""
 
     path: Path
     root: Path
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ResultRequest:
     """An image, its settings, and the requested name of its result."""
 
-    image: Found
+    image: FoundImage
     output: Path | None
     """A folder, a name or a pattern of names (``is_pattern``); None: beside the image."""
     settings: Settings
     fields: Mapping[str, Any]
     """Fields that names may contain, besides the image's."""
-    place: Place
-    """Makes errors that say where the name was given."""
+    error: ErrorAt
+    """Returns errors that name where the output was given."""
 
 
 def is_pattern(output: str) -> bool:
@@ -72,7 +71,7 @@ def fields_of(settings: Settings, given: Mapping[str, Any]) -> dict[str, Any]:
     return {**own, "quality": DEFAULT_QUALITY, **given}
 
 
-def name_results(wanted: Sequence[Wanted], masks: Iterable[Path] = ()) -> list[Path]:
+def name_results(wanted: Sequence[ResultRequest], masks: Iterable[Path] = ()) -> list[Path]:
     """Return the path of each result; all are different, and none is an image or one of the ``masks``.
 
     In a folder, a result has the image's name, including its ending if there are both a.png and a.jpg.
@@ -80,35 +79,34 @@ def name_results(wanted: Sequence[Wanted], masks: Iterable[Path] = ()) -> list[P
     Raises:
         UsageError: an unknown field, or several results with one path.
     """
-    folders = [item.output if item.output else item.image.path.parent for item in wanted]
-    patterns = [item.output is not None and is_pattern(str(item.output)) for item in wanted]
-    distinct = {
-        (folder, item.image.path)
-        for item, folder, pattern in zip(wanted, folders, patterns, strict=True)
-        if not pattern
+    folders = {
+        (item.output or item.image.path.parent, item.image.path)
+        for item in wanted
+        if not item.output or not is_pattern(str(item.output))
     }
-    stems = Counter((folder, path.stem) for folder, path in distinct)
+    stems = Counter((folder, path.stem) for folder, path in folders)
     outputs: list[Path] = []
-    for item, folder, pattern in zip(wanted, folders, patterns, strict=True):
+    for item in wanted:
         path = item.image.path
-        if pattern:
-            outputs.append(filled_in(item))
-        else:
+        folder = item.output or path.parent
+        if (folder, path) in folders:
             outputs.append(folder / f"{path.stem if stems[folder, path.stem] == 1 else path.name}.svg")
+        else:
+            outputs.append(filled_in(item))
     inputs = {_real(path) for path in (*(item.image.path for item in wanted), *masks)}
     counts = Counter(outputs)
     for item, output in zip(wanted, outputs, strict=True):
         if (real := _real(output)) in inputs:
             path = item.image.path
             by = "its own result" if real == _real(path) else f"the result of {path}"
-            raise item.place(f"output: {output} would be overwritten by {by}; give another one")
+            raise item.error(f"output: {output} would be overwritten by {by}; give another one")
         if counts[output] > 1:
-            cause = f"{counts[output]} results would be {output}; give other outputs, as {LIKELY}"
-            raise item.place(f"output: {cause}")
+            cause = f"{counts[output]} results would be {output}; give other outputs, as {EXAMPLE}"
+            raise item.error(f"output: {cause}")
     return outputs
 
 
-def filled_in(item: Wanted) -> Path:
+def filled_in(item: ResultRequest) -> Path:
     """Return the name of a result by its pattern.
 
     Raises:
@@ -124,14 +122,14 @@ def filled_in(item: Wanted) -> Path:
             return found[0][0]
         if found[1] not in fields:
             named = shown(found[0])
-            raise item.place(f"output: {named} is no field; they are stem, name, folder, and all keys")
+            raise item.error(f"output: {named} is no field; they are stem, name, folder, and all keys")
         text = _text(fields[found[1]])
         return text if found[1] == "folder" else text.replace("/", "_").replace(os.sep, "_")
 
     name = FIELD.sub(value, str(item.output))
     if not name.lower().endswith(ENDINGS):
         known = f"{', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"
-        raise item.place(f"output: {name}: names of results end with {known}")
+        raise item.error(f"output: {name}: names of results end with {known}")
     return remote(name.replace("/./", "/")) if is_url(name) else Path(os.path.normpath(name))
 
 
@@ -146,7 +144,7 @@ def _text(value: Any) -> str:
     return "-".join(map(_text, value)) if isinstance(value, (tuple, list)) else str(value)
 
 
-def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
+def check_outputs(errors: Sequence[ErrorAt], outputs: Sequence[Path]) -> None:
     """Check before the run that every result can be written.
 
     Raises:
@@ -154,7 +152,7 @@ def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
             result that is a folder, a pipe, a device or a loop of links, or that needs a missing package.
     """
     usable: set[Path] = set()
-    for place, output in zip(places, outputs, strict=True):
+    for error_at, output in zip(errors, outputs, strict=True):
         folder = output.parent
         try:
             check_format(output)
@@ -169,9 +167,9 @@ def check_outputs(places: Sequence[Place], outputs: Sequence[Path]) -> None:
             else:
                 _check_names(folder, output.name)
         except OSError as error:
-            raise place(f"output: {output} cannot be written: {error.strerror or error}") from error
+            raise error_at(f"output: {output} cannot be written: {error.strerror or error}") from error
         except UsageError as error:
-            raise place(f"output: {error}") from error
+            raise error_at(f"output: {error}") from error
 
 
 def _check_folder(folder: Path) -> None:

@@ -17,10 +17,10 @@ from PIL import Image
 
 from tests.batch.executors.fake_ray import FakeRay
 from warpsplat.batch.executors import ray as module
-from warpsplat.batch.executors import ray_actor, ray_connection, work
+from warpsplat.batch.executors import ray_connection, ray_worker, work
+from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.ray import TRIES, RayCluster
-from warpsplat.batch.executors.ray_worker import Need
-from warpsplat.batch.executors.serial import Serial
+from warpsplat.batch.executors.ray_worker import TaskResources
 from warpsplat.batch.executors.tasks import Outcome, Stop, Task
 from warpsplat.errors import ResourceError, UsageError
 from warpsplat.fit.settings import make_settings
@@ -41,7 +41,7 @@ def ray(monkeypatch: pytest.MonkeyPatch) -> FakeRay:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tasks are done without doing anything."""
 
-    def do(task: Task, stop: Stop, report: Callable[[Any], None]) -> Outcome:
+    def do(task: Task, stop: Stop, report: Callable[[int, float], None]) -> Outcome:
         return Outcome(task.number, "stopped" if stop() else "made", data=b"<svg/>")
 
     monkeypatch.setattr(work, "do", do)
@@ -54,7 +54,9 @@ def tasks(tmp_path: Path) -> list[Task]:
     for i in range(6):
         path = tmp_path / f"{i}.png"
         Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
-        found.append(Task(i, str(path), path.name, str(tmp_path / f"{i}.svg"), SETTINGS, "cpu"))
+        found.append(
+            Task(i, "key", path.read_bytes(), path.name, str(tmp_path / f"{i}.svg"), SETTINGS, "cpu")
+        )
     return found
 
 
@@ -112,10 +114,10 @@ def test_two_kinds_of_tasks_get_round_a_full_cluster(ray: FakeRay, tasks: list[T
 
 
 def test_room_of_nodes() -> None:
-    assert Need(2, 0.0).fit({"CPU": 5.0}) == 2
-    assert Need(1, 0.4).fit({"CPU": 8.0, "GPU": 2.0}) == 4, "no task has parts of two GPUs"
-    assert Need(1, 2.0).fit({"CPU": 8.0, "GPU": 5.0}) == 2
-    assert Need(1, 1.0).fit({"CPU": 8.0}) == 0
+    assert TaskResources(2, 0.0).capacity({"CPU": 5.0}) == 2
+    assert TaskResources(1, 0.4).capacity({"CPU": 8.0, "GPU": 2.0}) == 4, "no task has parts of two GPUs"
+    assert TaskResources(1, 2.0).capacity({"CPU": 8.0, "GPU": 5.0}) == 2
+    assert TaskResources(1, 1.0).capacity({"CPU": 8.0}) == 0
 
 
 @pytest.mark.usefixtures("quick")
@@ -226,54 +228,10 @@ def test_a_node_without_the_package(ray: FakeRay, tasks: list[Task]) -> None:
 
 
 def test_a_node_of_another_version(ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_actor, "__version__", "0.0.1")
+    monkeypatch.setattr(ray_worker, "__version__", "0.0.1")
     with pytest.raises(UsageError, match=r"has warpsplat 0\.0\.1, here it is "):
         run(RayCluster(), tasks)
     assert not ray.sent
-
-
-# Paths and bytes.
-
-
-@pytest.mark.usefixtures("quick")
-def test_paths_where_the_file_is_seen(
-    ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = Path(str(tasks[0].image)).parent
-    monkeypatch.chdir(folder)
-    mask = replace(tasks[0], image="0.png", mask="1.png", result=None, measure=True, output="2.png")
-    run(RayCluster(), [mask])
-    (sent,) = ray.sent
-    assert [sent.given[0].image, sent.given[0].mask, sent.given[0].result] == [
-        str(folder / name) for name in ("0.png", "1.png", "2.png")
-    ]
-
-
-def blind(do: Callable[..., Any]) -> Callable[..., Any]:
-    """``Actor.do`` on a machine that has other files of the same names."""
-
-    def seen(actor: ray_actor.Actor, task: Task, sights: tuple[ray_actor.Sight, ...]) -> Any:
-        return do(actor, task, tuple(sight._replace(size=sight.size + 1) for sight in sights))
-
-    return seen
-
-
-@pytest.mark.usefixtures("quick")
-def test_bytes_where_it_is_not(ray: FakeRay, tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
-    images = {task.number: Path(str(task.image)).read_bytes() for task in tasks}
-    monkeypatch.setattr(ray_actor.Actor, "do", blind(ray_actor.Actor.do))
-    assert statuses(run(RayCluster(), tasks)) == dict.fromkeys(range(6), "made")
-    done = {sent.given[0].number: sent.given[0].image for sent in ray.sent}
-    assert done == images
-    assert len(ray.sent) <= len(tasks) + 2, "asked once by each worker"
-
-
-@pytest.mark.usefixtures("quick")
-def test_an_image_that_is_gone_fails_alone(ray: FakeRay, tasks: list[Task]) -> None:
-    Path(str(tasks[2].image)).unlink()
-    found = run(RayCluster(), tasks)
-    assert statuses(found) == {**dict.fromkeys(range(6), "made"), 2: "failed"}
-    assert [o.error for o in found if o.error] == [f"{tasks[2].image!s}: no such file"]
 
 
 # Stopping.
@@ -313,19 +271,18 @@ def test_what_does_not_end_is_ended(ray: FakeRay, tasks: list[Task], monkeypatch
 
 
 def test_an_actor_hears_while_it_works(tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
-    actor = ray_actor.Actor()
+    actor = ray_worker.Actor()
     actor.stop()  # of a task before
 
-    def do(task: Task, stop: Stop, report: Callable[[Any], None]) -> Outcome:
+    def do(task: Task, stop: Stop, report: Callable[[int, float], None]) -> Outcome:
         assert not stop()
-        report(type("Progress", (), {"work": 0.25}))
+        report(task.number, 0.25)
         assert actor.done() == 0.25
         actor.stop()
         return Outcome(task.number, "stopped" if stop() else "made")
 
     monkeypatch.setattr(work, "do", do)
-    found = actor.do(tasks[0], ())
-    assert isinstance(found, Outcome)
+    found = actor.do(tasks[0])
     assert found.status == "stopped"
 
 

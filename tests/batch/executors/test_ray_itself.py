@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.ray import RayCluster
-from warpsplat.batch.executors.serial import Serial
 from warpsplat.batch.executors.tasks import Executor, Outcome, Task
 from warpsplat.fit.settings import make_settings
 
@@ -29,7 +29,7 @@ def tasks(folder: Path) -> Iterator[Task]:
     for i in range(4):
         path = folder / f"{i}.png"
         Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
-        yield Task(i, str(path), path.name, f"{i}.svg", settings, "cpu", 1, bring=True)
+        yield Task(i, "key", path.read_bytes(), path.name, f"{i}.svg", settings, "cpu", 1, bring=True)
 
 
 def results(executor: Executor, folder: Path) -> dict[int, bytes | None]:

@@ -1,6 +1,5 @@
-"""Executors, which do the images of a batch: in this process, in others, or on a cluster.
+"""Where the images of a batch are made: in this process, in others of this machine, or on a Ray cluster.
 
-An executor takes tasks (``tasks.Task``) and yields outcomes (``tasks.Outcome``); both are small and can be
-pickled. ``work.do`` does one task, in any process.  serial.py: in this process, one after the other;
-pool.py: in several processes, which run worker.py;  ray.py: on a Ray cluster, which runs ray_actor.py.
+An ``Executor`` (tasks.py) takes tasks and yields their outcomes, which can be pickled.  work.py: do one task;
+local.py: one after the other, here;  pool.py: in processes of this machine;  ray.py: on a cluster.
 """

@@ -1,4 +1,4 @@
-"""Connect to a Ray cluster, or start one on this machine for the time of the connection."""
+"""The connection to a Ray cluster, or to one of this machine alone that lasts as long as the connection."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from typing import Any
 
 from warpsplat.errors import UsageError, printable
 
-STORE = 200_000_000
-"""Memory for data between processes, in a cluster on this machine [bytes]."""
+OBJECT_STORE = 200_000_000
+"""Memory for objects sent between processes, in a cluster of this machine alone [bytes]."""
 
-WAIT = 5.0
+TIMEOUT = 5.0
 """Seconds for a cluster to answer."""
 
 
 @contextlib.contextmanager
 def connected(ray: ModuleType, address: str) -> Iterator[None]:
-    """Connect to a cluster for a block; an existing connection of this process is used and kept.
+    """Connect to a cluster for a block, or use the connection that this process has already, and keep it.
 
     Args:
-        ray: the package.
+        ray: the package Ray.
         address: as ``RayCluster`` has it.
 
     Raises:
@@ -36,30 +36,30 @@ def connected(ray: ModuleType, address: str) -> Iterator[None]:
         yield
         return
     with _quiet():
-        with _handlers_kept():
+        with _signal_handlers_kept():
             _connect(ray, address)
         try:
             yield
         finally:
-            with _handlers_kept():
+            with _signal_handlers_kept():
                 ray.shutdown()
 
 
 def _connect(ray: ModuleType, address: str) -> None:
     named = address or os.environ.get("RAY_ADDRESS", "")
-    place = _here() if named in ("", "auto") else named
+    found = _own_address() if named in ("", "auto") else named
     try:
-        if not _answers(place):  # Ray itself would try for minutes
+        if not _answers(found):  # Ray itself would try for minutes
             raise ConnectionError
-        _init(ray, place)
+        _init(ray, found)
     except ConnectionError as error:
         if named:
             raise UsageError(f"--executor ray: no Ray cluster answers at {printable(named)}") from error
         _init(ray, "local")
 
 
-def _here() -> str:
-    """Return the address of the cluster that this machine belongs to, or ``auto``: Ray searches."""
+def _own_address() -> str:
+    """Return the address of the cluster that this machine belongs to, or did; ``auto``: Ray looks for one."""
     try:
         services: Any = importlib.import_module("ray._private.services")
         found: str = services.get_ray_address_from_environment("auto", None)
@@ -69,12 +69,12 @@ def _here() -> str:
 
 
 def _answers(address: str) -> bool:
-    """Return whether a server listens at ``host:port``; True for other forms of addresses."""
+    """Return whether a server listens at ``host:port``; True for an address of another form."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host or not port.isdigit():
         return True
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=WAIT).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=TIMEOUT).close()
     except (OSError, OverflowError):
         return False
     return True
@@ -83,22 +83,25 @@ def _answers(address: str) -> bool:
 def _init(ray: ModuleType, address: str) -> None:
     options: dict[str, Any] = {"configure_logging": False, "log_to_driver": False}
     if address == "local":
-        options |= {"include_dashboard": False, "object_store_memory": STORE}
+        options |= {"include_dashboard": False, "object_store_memory": OBJECT_STORE}
     try:
         ray.init(address=address, **options)
     except (RuntimeError, ValueError, ImportError) as error:
-        raise UsageError(f"--executor ray: {printable(address)}: {cause_of(error)}") from error
+        raise UsageError(f"--executor ray: {printable(address)}: {ray_cause(error)}") from error
 
 
-def cause_of(error: BaseException) -> str:
-    """Return the last error in the text of Ray's exception, or its first line."""
+def ray_cause(error: BaseException) -> str:
+    """Return the cause of an error of Ray in one line: the last error in its text, or the first line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
     return printable(next((line for line in reversed(lines) if "Error: " in line), lines[0]))
 
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Ray from printing about lost workers to stdout, for which it has no option."""
+    """Keep Ray from printing messages about lost workers to the standard output, where results may go.
+
+    It has no option for that.
+    """
     log = logging.getLogger("ray")
     with contextlib.ExitStack() as stack:
         stack.callback(log.setLevel, log.level)
@@ -111,12 +114,12 @@ def _quiet() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _handlers_kept() -> Iterator[None]:
-    """Restore the signal handlers after the block: Ray replaces SIGTERM's."""
+def _signal_handlers_kept() -> Iterator[None]:
+    """Restore signal handlers after the block: Ray replaces the one of SIGTERM."""
     kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        with contextlib.suppress(ValueError):  # not the main thread, which has none
+        with contextlib.suppress(ValueError):  # not the main thread
             for number, handler in kept.items():
                 signal.signal(number, handler)

@@ -1,102 +1,113 @@
-"""A worker of a Ray cluster, as seen by its parent."""
+"""Workers of a Ray cluster: the actor that does tasks, and the worker as its parent sees it.
+
+Ray itself is not imported here.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import os
+import platform
+import threading
 from collections.abc import Mapping
 from dataclasses import replace
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from warpsplat.batch.executors.ray_actor import Actor, Sight
-from warpsplat.batch.executors.tasks import Source, Task
-from warpsplat.batch.executors.work import read
+from warpsplat._version import __version__
+from warpsplat.batch.executors.tasks import Outcome, Task
 
 
-class Need(NamedTuple):
-    """Resources of a node that a task uses."""
+class Actor:
+    """A process of the cluster: does a task in one thread, and answers in another one meanwhile."""
+
+    def __init__(self) -> None:
+        self._stop = threading.Event()
+        self._done = 0.0
+
+    def hello(self) -> tuple[str, str]:
+        """Return the version of the package, and the node; plain types, which other versions understand."""
+        return __version__, platform.node()
+
+    def do(self, task: Task) -> Outcome:
+        """Do a task."""
+        from warpsplat.batch.executors.work import do  # heavy, and hello is to be quick
+
+        self._stop.clear()
+        self._done = 0.0
+
+        def on_progress(number: int, fraction: float) -> None:
+            self._done = fraction
+
+        return do(task, self._stop.is_set, on_progress)
+
+    def stop(self) -> None:
+        """End the task in progress with the best so far."""
+        self._stop.set()
+
+    def done(self) -> float:
+        """Return the fraction of the task in progress that is done."""
+        return self._done
+
+
+class TaskResources(NamedTuple):
+    """CPUs and GPUs of a node that a task takes."""
 
     cpus: int
     gpus: float
 
     def __str__(self) -> str:
-        """Return the flags that give it, for messages."""
+        """Return the options that request them."""
         return f"--threads {self.cpus}" + (f" and --gpus {self.gpus:g}" if self.gpus else "")
 
-    def fit(self, resources: Mapping[str, float]) -> int:
-        """Return how many such tasks fit on a node with ``resources``."""
-        count = resources.get("CPU", 0.0) // self.cpus
+    def capacity(self, node: Mapping[str, float]) -> int:
+        """Return how many such tasks fit into a node with these resources."""
+        count = node.get("CPU", 0.0) // self.cpus
         if self.gpus:
-            # Ray never cuts a task's part out of two GPUs.
-            whole = resources.get("GPU", 0.0)
+            # Ray never takes a task's share from two GPUs.
+            whole = node.get("GPU", 0.0)
             count = min(count, whole // self.gpus if self.gpus >= 1 else whole * (1 // self.gpus))
         return int(count)
 
 
-class Worker:
-    """An actor, its current task, and pending queries."""
+class RayWorker:
+    """An actor, the task that it has, and the calls to it that are not answered yet."""
 
-    def __init__(self, ray: ModuleType, need: Need) -> None:
+    def __init__(self, ray: ModuleType, resources: TaskResources) -> None:
         self._ray = ray
-        self.need = need
+        self.resources = resources
         self.node = ""
-        """Its node; empty until it answered."""
+        """Name of its node; empty until it has answered."""
         self.task: Task | None = None
-        options = {"num_cpus": need.cpus, "num_gpus": need.gpus, "max_concurrency": 2, "max_restarts": 0}
+        cpus, gpus = resources
+        options = {"num_cpus": cpus, "num_gpus": gpus, "max_concurrency": 2, "max_restarts": 0}
         self._actor = ray.remote(Actor).options(**options).remote()
         self.answer: Any = self._actor.hello.remote()
-        """Answer to hello or to the task; None: it is idle."""
-        self.part: Any = None
-        """Answer to the query of progress."""
+        """The answer to ``hello`` or the task; None: it waits for a task."""
+        self.progress: Any = None
+        """The answer to the last question about its progress."""
 
     @property
     def idle(self) -> bool:
-        """Return whether it can take a task."""
+        """Whether it can be given a task."""
         return self.answer is None
 
-    def give(self, task: Task, unseen: set[tuple[str, str]]) -> None:
-        """Send it a task, with the paths of files that its node sees, and the bytes of others.
-
-        Args:
-            task: what to do.
-            unseen: pairs of a node and a folder that it does not see.
-
-        Raises:
-            ImageError: a file that it does not see cannot be read here either.
-        """
-        sights: list[Sight] = []
-
-        def sent(source: Source) -> Source:
-            if isinstance(source, bytes):
-                return source
-            sight = Sight.of(os.path.abspath(source))
-            if not sight or (self.node, os.path.dirname(sight.path)) in unseen:
-                return read(source)
-            sights.append(sight)
-            return sight.path
-
-        whole = replace(
-            task,
-            image=sent(task.image),
-            mask=None if task.mask is None else sent(task.mask),
-            device="cuda:0" if self.need.gpus else "cpu",  # Ray shows a process only its own GPUs
-            threads=self.need.cpus,
-            result=sent(task.output) if task.measure else None,
-            bring=True,
-        )
-        self.answer = self._actor.do.remote(whole, tuple(sights))
+    def give(self, task: Task) -> None:
+        """Hand it a task."""
         self.task = task
+        # Ray shows a process only the GPUs that it may use.
+        device = "cuda:0" if self.resources.gpus else "cpu"
+        task = replace(task, device=device, threads=self.resources.cpus, bring=True)
+        self.answer = self._actor.do.remote(task)
 
-    def ask(self) -> None:
-        """Query its progress."""
-        self.part = self.part or self._actor.done.remote()
+    def ask_progress(self) -> None:
+        """Ask for its progress, unless it has not answered that yet."""
+        self.progress = self.progress or self._actor.done.remote()
 
     def stop(self) -> None:
-        """End its task, with the best so far."""
+        """Have its task end with the best so far."""
         self._actor.stop.remote()
 
     def end(self) -> None:
-        """Kill its process."""
-        with contextlib.suppress(Exception):  # of a cluster that is gone
+        """End its process at once."""
+        with contextlib.suppress(Exception):  # the cluster may be gone
             self._ray.kill(self._actor)

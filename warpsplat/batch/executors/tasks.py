@@ -1,115 +1,108 @@
-"""Tasks and outcomes of executors."""
+"""The interface of executors: tasks, outcomes, and the base class."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from warpsplat.fit.settings import Settings
 
-Source = str | bytes
-"""Path of a file, or its bytes."""
-
 Stop = Callable[[], bool]
-"""Returns whether to stop; called often, from the thread that runs the executor."""
+"""Returns whether work should end; called often, from the thread that runs the executor."""
 
-Advance = Callable[[int, float], None]
+OnProgress = Callable[[int, float], None]
 """Called with the number of a task and the fraction of it that is done."""
 
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """Contents of a report that are not in its task."""
+    """Contents of a report besides what its task says."""
 
     back: str
-    """Relative path of its link to the index."""
+    """Relative path of the page that the report links back to."""
     figures: Mapping[str, Any] = field(default_factory=dict)
-    """Known figures of an earlier result."""
+    """Figures of a result that was made earlier."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """An image to vectorize, or a result to measure.
-
-    It has all a worker needs: paths of files that it sees, bytes of others.
-    """
+    """An image to vectorize, or a result to measure."""
 
     number: int
-    """Identifies the task; its outcome has the same number."""
-    image: Source
+    """Identifies the task: its outcome has the same number."""
+    key: str
+    """Key of the result, see ``run.keys.job_key``."""
+    image: bytes = field(repr=False)
     name: str
     """Name of the image in messages."""
     output: str
-    """Path of the result, whose ending gives its format even if the worker does not write it."""
+    """Path of the result. Its ending decides the format, also if the worker does not write it."""
     settings: Settings
     device: str = "auto"
     threads: int | None = None
-    """CPU threads; None: all cores."""
-    mask: Source | None = None
-    """Importance of pixels."""
+    """Threads on a CPU; None: all cores."""
+    mask: bytes | None = field(default=None, repr=False)
+    """Importance mask."""
+    mask_name: str = ""
+    """Name of the mask in messages."""
     bring: bool = False
     """Whether the worker returns the result's bytes (``Outcome.data``) instead of writing ``output``."""
-    measure: bool = False
-    """Whether ``output`` exists, and only its figures are wanted."""
-    result: Source | None = None
-    """The result to measure, if the worker does not see ``output``."""
+    result: bytes | None = field(default=None, repr=False)
+    """The result if it exists already, and only its figures are wanted."""
     report: ReportRequest | None = None
-    """The report to make as well, if any."""
+    """The report to return as well; None: none."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a task."""
+    """The outcome of a task."""
 
     number: int
-    """Number of the task."""
     status: Literal["made", "measured", "stopped", "failed"]
-    """``stopped``: ended by ``stop``, with a file of the best so far, or none, where ``digest`` is empty."""
+    """``stopped``: by ``stop``, with a file of the best so far, or with none and an empty ``digest``."""
     key: str = ""
-    """Key of the result, see ``keys.job_key``; empty if the image could not be read."""
+    """Key of the task; empty if its worker was lost or ended before the task."""
     digest: str = ""
     """SHA-256 of the result's bytes, hexadecimal."""
     data: bytes | None = field(default=None, repr=False)
-    """The result's bytes, if they were requested."""
+    """The result's bytes, if the task has ``bring``."""
     figures: dict[str, Any] = field(default_factory=dict)
-    """See ``vectorize.Result.as_dict``; of a task that measured, what was measured of those."""
+    """See ``Result.as_dict``; for a task with a ``result``, those that can be measured."""
     error: str = ""
-    """One line that names the image, of a task that failed."""
+    """Why the task failed, in one line that names the image."""
     report: str = field(default="", repr=False)
-    """The page, if requested and made."""
+    """The page, if it was requested and could be made."""
     report_error: str = ""
-    """Why it could not be made."""
+    """Why the page could not be made, in one line."""
 
 
-class Executor(Protocol):
-    """Does tasks. A context manager: its processes, connections and current tasks end with the block."""
+class Executor:
+    """Base of executors: does tasks. At the end of its ``with`` block, all its workers have ended."""
 
-    @property
-    def workers(self) -> int:
-        """Number of tasks at the same time, for messages."""
+    workers: int = 1
+    """How many tasks it does at the same time; for messages."""
 
     def __enter__(self) -> Executor:
-        """Return self; nothing starts before there is a task."""
+        """Begin; nothing is started before there is a task."""
+        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """End all workers at once; return when none is left."""
+        self.close()
 
-    def run(self, tasks: Iterable[Task], stop: Stop, advance: Advance) -> Iterator[Outcome]:
+    def close(self) -> None:
+        """End all workers; by default there are none."""
+
+    def run(self, tasks: Iterable[Task], stop: Stop, on_progress: OnProgress) -> Iterator[Outcome]:
         """Do ``tasks``, and yield an outcome for each that was taken, in any order, as it ends.
 
-        May be called again, one run after the other; workers are kept for that.
+        May be called several times, one run after the other; workers are kept.
 
-        * ``tasks`` is taken from only when a worker is free, or soon will be: taking a task claims it, and
-          reads its image, so that no more are claimed than are in work (back-pressure).
-        * An error of an image is its outcome, ``failed``. The task of a lost worker is tried again, and fails
-          after a few attempts; the batch goes on.
-        * Once ``stop`` returns true, no further task is taken; current ones end soon, as ``stopped`` or done.
-        * ``advance`` is called now and then with the progress of tasks, if it is known.
+        * A task is taken only when a worker is free, or soon will be: that claims it and reads its image.
+        * Errors of an image are in its outcome, ``failed``. A worker that is lost costs its task a try; after
+          a few tries its outcome is ``failed``, and the batch goes on.
+        * Once ``stop`` returns true, no further task is taken; those in progress end soon.
+        * ``on_progress`` is called now and then, if the progress of tasks is known.
         """
+        raise NotImplementedError

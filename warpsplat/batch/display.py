@@ -1,4 +1,4 @@
-"""Show a batch: a line for each image when it is done, a progress bar, and a table at the end."""
+"""Print the progress of a batch: a line for each image that is done, a bar, and a table at the end."""
 
 from __future__ import annotations
 
@@ -10,15 +10,13 @@ from pathlib import Path
 
 import click
 
-from warpsplat.batch.run import JobReport
+from warpsplat.batch.results import MOST_NAMES
+from warpsplat.batch.run import JobOutcome
 from warpsplat.batch.totals import Totals
 from warpsplat.cli.echo import echo
 from warpsplat.cli.run import SUBJECTS, summary
 from warpsplat.errors import printable
 from warpsplat.run.formats import is_picture
-
-NAMED = 20
-"""Maximum number of files that one message names."""
 
 CLEAR = "\r\x1b[2K"
 """Clears the line of a terminal."""
@@ -27,64 +25,65 @@ WIDTH = 30
 """Width of the bar [characters]."""
 
 
-class Show:
-    """Prints the progress of a batch."""
+class BatchDisplay:
+    """Prints the progress and summary of a batch."""
 
     def __init__(self, total: int, *, quiet: bool, as_json: bool) -> None:
         self.totals = Totals(total)
         self._total, self._quiet, self._as_json = total, quiet, as_json
         self._bar = sys.stderr.isatty() and not quiet
-        self._parts: dict[int, float] = {}
+        self._progress: dict[int, float] = {}
+        """Fraction of each job that is done."""
         self._begun: float | None = None
-        self._seen = 0
 
-    def add(self, report: JobReport) -> None:
-        """Show what became of a job."""
-        self.totals.add(report)
-        self._seen += 1
+    def add(self, outcome: JobOutcome) -> None:
+        """Show the outcome of a job."""
+        self.totals.add(outcome)
         if self._bar:
             click.echo(CLEAR, nl=False, err=True)
         if self._as_json:
-            echo(json.dumps(report.as_dict()))
-        count = f"[{self._seen}/{self._total}]"
-        if report.error:
-            again = " (in an earlier run; --retry-failed tries again)" if report.before else ""
-            echo(f"{count} failed: {report.error}{again}", err=True)
+            echo(json.dumps(outcome.as_dict()))
+        count = f"[{self.totals.seen}/{self._total}]"
+        if outcome.error:
+            again = " (in an earlier run; --retry-failed tries again)" if outcome.before else ""
+            echo(f"{count} failed: {outcome.error}{again}", err=True)
         elif not self._quiet and not self._as_json:
-            echo(f"{count} {line(report)}")
-        for goal in report.figures.get("missed", ()) if report.status == "made" else ():
+            echo(f"{count} {line(outcome)}")
+        for goal in outcome.figures.get("missed", ()) if outcome.status == "made" else ():
             echo(f"{count} goal missed: {goal}", err=True)
-        self._draw()
+        self._draw_bar()
 
-    def advance(self, number: int, part: float) -> None:
+    def on_progress(self, number: int, fraction: float) -> None:
         """Update the fraction of a job that is done."""
         self._begun = self._begun or time.monotonic()
-        self._parts[number] = part
-        self._draw()
+        self._progress[number] = fraction
+        self._draw_bar()
 
-    def _draw(self) -> None:
+    def _draw_bar(self) -> None:
         if not self._bar:
             return
         counts = self.totals.counts
         width = min(WIDTH, max(0, shutil.get_terminal_size().columns - 50))
-        full = round(width * self._seen / self._total)
+        full = round(width * self.totals.seen / self._total)
         failed = f", {counts['failed']} failed" if counts["failed"] else ""
         left = self._seconds_left()
         time_left = "" if left is None else f", {left // 60}:{left % 60:02} left"
-        bar = f"{CLEAR}[{'#' * full}{'-' * (width - full)}] {self._seen}/{self._total}{failed}{time_left}"
+        bar = (
+            f"{CLEAR}[{'#' * full}{'-' * (width - full)}] {self.totals.seen}/{self._total}{failed}{time_left}"
+        )
         click.echo(bar, nl=False, err=True)
 
     def _seconds_left(self) -> int | None:
         """Estimate the remaining time from the rate so far; None before any work."""
-        done = sum(self._parts.values())
+        done = sum(self._progress.values())
         if self._begun is None or not done:
             return None
-        in_work = sum(part for part in self._parts.values() if part < 1)
+        begun = sum(fraction for fraction in self._progress.values() if fraction < 1)
         rate = done / (time.monotonic() - self._begun)
-        return round(max(0.0, self._total - self._seen - in_work) / rate)
+        return round(max(0.0, self._total - self.totals.seen - begun) / rate)
 
     def finish(self, elapsed: float, workers: int, manifest: Path) -> None:
-        """Sum up a batch that took ``elapsed`` seconds."""
+        """Print the summary of a batch that took ``elapsed`` seconds."""
         if self._bar:
             click.echo(CLEAR, nl=False, err=True)
         if self._as_json:
@@ -102,23 +101,23 @@ class Show:
         failures = self.totals.failures
         if failures and not self._quiet:
             echo("failed:", err=True)
-            for error in failures[:NAMED]:
+            for error in failures[:MOST_NAMES]:
                 echo(f"  {error}", err=True)
-            if len(failures) > NAMED:
-                echo(f"  and {len(failures) - NAMED} more", err=True)
+            if len(failures) > MOST_NAMES:
+                echo(f"  and {len(failures) - MOST_NAMES} more", err=True)
 
 
-def line(report: JobReport) -> str:
+def line(outcome: JobOutcome) -> str:
     """Return one line about a job that did not fail."""
-    output, figures = report.job.output, report.figures
+    output, figures = outcome.job.output, outcome.figures
     name = printable(str(output))
-    if report.status == "skipped":
+    if outcome.status == "skipped":
         psnr = f", {figures['psnr']:.2f} dB" if figures.get("psnr") is not None else ""
         size = f", {figures['bytes'] / 1000:.1f} kB" if figures.get("bytes") is not None else ""
         size += " as an SVG" if size and is_picture(output) else ""
         return f"{name}: already made with these settings{psnr}{size}"
-    if report.status == "planned":
-        return f"{name}: would be made of {printable(str(report.job.image))}"
+    if outcome.status == "planned":
+        return f"{name}: would be made of {printable(str(outcome.job.image))}"
     if not figures:
         return f"{name}: stopped, not made"
     subject = figures["subject"]

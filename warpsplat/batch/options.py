@@ -1,0 +1,131 @@
+"""The options of ``warpsplat batch``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from warpsplat.cli.options import (
+    FILE,
+    importance_option,
+    overwrite_option,
+    quality_options,
+    threads_option,
+    verbosity_options,
+)
+from warpsplat.errors import shown
+from warpsplat.extensions import extensions
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """Options of a batch that do not change its results."""
+
+    overwrite: bool = False
+    retry_failed: bool = False
+    dry_run: bool = False
+    workers: int | None = None
+    threads: int | None = None
+    executor: str | None = None
+    """``ray`` or ``ray=ADDRESS``; None: this machine."""
+    gpus: float | None = None
+    """GPUs of a cluster that each image takes."""
+    shard: tuple[int, int] = (1, 1)
+    manifest: Path | None = None
+    report: Path | None = None
+    """Folder of pages on the results, or the page that lists them."""
+    quiet: bool = False
+    as_json: bool = False
+
+
+class Shard(click.ParamType):
+    """``i/n``."""
+
+    name = "I/N"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Parse two numbers, the first from 1 to the second."""
+        if isinstance(value, tuple):
+            return value
+        found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", value)
+        if not found or not 1 <= int(found[1]) <= int(found[2]):
+            self.fail(f"{shown(value)} is no I/N, as 1/4 for the first of four parts", param, ctx)
+        return int(found[1]), int(found[2])
+
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+OPTIONS: tuple[Decorator, ...] = (
+    click.option(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="Folder for the results, or their names: out/{stem}-{curves}.svg.  [default: beside each image]",
+    ),
+    overwrite_option,
+    click.option(
+        "--set",
+        "sets",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Any key of batch files, as curves=64; may be there several times.",
+    ),
+    click.option("-n", "--dry-run", is_flag=True, help="Say what would be done, and do nothing."),
+    click.option("--retry-failed", is_flag=True, help="Try again what failed in an earlier run."),
+    click.option(
+        "--workers",
+        type=click.IntRange(min=1, max=1024),
+        metavar="N",
+        help="Images at the same time, each in a process.  [default: one a core, if that pays]",
+    ),
+    click.option(
+        "--executor",
+        metavar="WHO",
+        help='ray, or ray=ADDRESS, has a Ray cluster do the images (the extra "ray").  '
+        "[default: processes of this machine]",
+    ),
+    click.option(
+        "--gpus",
+        type=click.FloatRange(min=0, min_open=True, max=64),
+        metavar="G",
+        help="What an image takes of a cluster's GPUs: 0.25 for four that share one.  [default: 1]",
+    ),
+    click.option("--shard", type=Shard(), default=(1, 1), help="Do part I of N of the images: 1/4."),
+    click.option(
+        "--manifest",
+        type=FILE,
+        metavar="FILE",
+        help="Notes of what was made, as JSON lines.  [default: warpsplat-manifest.jsonl, with the results]",
+    ),
+    click.option(
+        "--report",
+        type=FILE,
+        metavar="DIR",
+        help="Pages on the results, and DIR/index.html, which lists them; or a name that ends with .html.",
+    )
+    if "pages" in extensions()
+    else lambda function: function,
+    quality_options,
+    importance_option,
+    click.option("--device", help="auto (a GPU if there is one), cpu, or cuda:N."),
+    threads_option,
+    verbosity_options,
+    click.option(
+        "--json", "as_json", is_flag=True, help="Print a JSON object for each image, and one at the end."
+    ),
+)
+"""Decorators of the command, in the order of its help."""
+
+
+def batch_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add all options of the command."""
+    for option in reversed(OPTIONS):
+        function = option(function)
+    return function
