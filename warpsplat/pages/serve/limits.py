@@ -1,4 +1,4 @@
-"""What a server takes and holds at the most, and how it says that something is too much."""
+"""Limits of the server, and the error of a request that exceeds one."""
 
 from __future__ import annotations
 
@@ -7,33 +7,32 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Of a server."""
+    """What a server accepts and holds at most."""
 
     upload: int = 50_000_000
-    """Of an image's file [bytes]."""
+    """Size of an image's file [bytes]."""
     waiting: int = 20
-    """Runs that wait for their turn."""
+    """Runs in the queue."""
     runs: int = 100
     """Runs that are held, finished ones included."""
     images: int = 256 << 20
-    """Of all images that are held or on their way [bytes]; two of the largest fit in any case."""
+    """All images that are held or being uploaded [bytes]; two of the largest fit in any case."""
     results: int = 128 << 20
-    """Of all SVGs that are held [bytes]."""
+    """All SVGs that are held [bytes]."""
     sessions: int = 100
     """Pages whose images and results are held."""
     grace: float = 120.0
-    """Time after which a page that was closed is forgotten, with its runs [s]: it may only be loaded anew."""
+    """Time until a closed page is forgotten, with its runs [s]: it may just be being reloaded."""
 
     @property
-    def room(self) -> int:
-        """For images [bytes]."""
+    def image_capacity(self) -> int:
+        """Capacity for images [bytes]."""
         return max(self.images, 2 * self.upload)
 
 
-class Refused(Exception):  # noqa: N818 - an answer, no fault
-    """A request that is answered with an error: its status, and one line."""
+class Refused(Exception):  # noqa: N818 - an answer, not a fault
+    """A request that is answered with an error: its HTTP status, and one line."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
         self.status = status
-        """Of HTTP."""
