@@ -136,7 +136,7 @@ def _with_report(
         )
     except (WarpsplatError, OSError, MemoryError) as error:
         return replace(outcome, report_error=failure(error, task.name, task.output))
-    return replace(outcome, report=made.text)
+    return replace(outcome, report=made)
 
 
 def digest(data: bytes) -> str:

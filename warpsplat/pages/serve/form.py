@@ -24,7 +24,7 @@ def serve_page(limits: Limits) -> str:
         assets=("viewer.css", "serve.css", "viewer.js", "serve.js"),
         connects=True,
         options=options,
-        facts={"upload": limits.upload, "defaults": defaults},
+        data={"upload": limits.upload, "defaults": defaults},
     )
 
 
