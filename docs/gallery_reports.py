@@ -23,7 +23,7 @@ def reports() -> dict[str, str]:
 def report(entry: Entry, backend: Backend) -> str:
     """The page on an entry."""
     figures = entry.figures()
-    made = report_page(
+    return report_page(
         entry.svg.read_text("utf-8"),
         entry.image.read_bytes(),
         backend,
@@ -32,7 +32,6 @@ def report(entry: Entry, backend: Backend) -> str:
         svg_name=entry.svg.name,
         back=f"../{entry.subject}/",
     )
-    return made.text
 
 
 def history(entry: Entry) -> list[Progress]:

@@ -1,4 +1,4 @@
-"""Pages as tests look at them, and texts that want to be more than texts."""
+"""Parsed pages, and texts that would be harmful as markup."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NASTY = [
 
 
 class Tags(HTMLParser):
-    """The elements of a page, their attributes, and where its links lead."""
+    """The elements of a page, their attributes, and the targets of its links."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -35,7 +35,7 @@ class Tags(HTMLParser):
 
 
 def data_of(text: str) -> dict[str, Any]:
-    """What a page's script reads."""
+    """Return the data of a page's script."""
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     assert found
     values: dict[str, Any] = json.loads(found[1])

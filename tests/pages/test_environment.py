@@ -1,4 +1,4 @@
-"""Pages hold whatever texts they are given as texts."""
+"""Whatever texts a page gets stay texts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from jinja2 import ChoiceLoader, DictLoader, UndefinedError
 from tests.pages.helpers import NASTY, Tags
 from warpsplat.files.marks import PAGE_MARK
 from warpsplat.pages import MARK, environment, page
-from warpsplat.pages.embed import image_uri
 
 SOURCE = """{% extends "base.html.j2" %}{% block title %}{{ name }}{% endblock %}
 {% block main %}<p id="it" title="{{ name }}">{{ name }}</p><a href="{{ name|address }}">x</a>
@@ -47,7 +46,7 @@ def test_no_text_adds_an_element(name: str) -> None:
 
 
 def test_what_a_page_loads() -> None:
-    """Scripts run by their hashes only, nothing comes from elsewhere, the mark is where it is looked for."""
+    """Only our scripts run, nothing is loaded from elsewhere, and the mark is near the start."""
     text = page("test.html.j2", assets=("viewer.css", "viewer.js"), name="x")
     assert "default-src &#39;none&#39;" in text and "script-src &#39;sha256-" in text
     assert "connect-src" not in text
@@ -59,7 +58,3 @@ def test_what_a_page_loads() -> None:
 def test_a_missing_value_is_an_error() -> None:
     with pytest.raises(UndefinedError):
         page("test.html.j2")
-
-
-def test_pictures() -> None:
-    assert image_uri(b"\x89PNG...").startswith("data:image/png;base64,")

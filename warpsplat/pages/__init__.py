@@ -1,6 +1,6 @@
-"""Pages that people look at: templates, style and scripts, put together to one file that needs nothing else.
+"""Pages: templates, styles and scripts are rendered into one self-contained file.
 
-Nothing here computes: what a page shows comes as texts, numbers and data URIs.
+Nothing here computes results: pages get texts, numbers and data URIs.
 """
 
 from warpsplat.pages.environment import MARK, page

@@ -1,4 +1,4 @@
-"""Templates -> one self-contained file."""
+"""Rendering of templates into self-contained files."""
 
 from __future__ import annotations
 
@@ -13,53 +13,47 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpsplat._version import __version__
-from warpsplat.errors import printable
 
 MARK = "<!--warpsplat page-->"
-"""In the head of every page, by which ``files.output`` knows that it may be replaced."""
-
-BASE_ASSETS = ("base.css",)
-"""What every page has."""
+"""Marks our pages in their heads: ``files.output`` may replace them."""
 
 
 def page(template: str, *, assets: tuple[str, ...] = (), connects: bool = False, **values: Any) -> str:
-    """A page as one file: style and scripts are inlined, and nothing is loaded from anywhere.
+    """Render a page as one file that loads nothing: styles and scripts are inlined.
 
     Args:
-        template: name of a template, which extends ``base.html.j2``.
-        assets: style sheets and scripts by name, in order, besides the base's.
-        connects: whether its scripts may ask the server that it came from.
-        values: of the template. Texts are escaped wherever they stand; ``|tojson`` makes data for scripts.
+        template: name of a template that extends ``base.html.j2``.
+        assets: names of styles and scripts, in order, besides ``base.css`` and ``base.js``.
+        connects: whether scripts may send requests to the page's own server.
+        values: variables of the template. Texts are escaped; ``|tojson`` makes data for scripts.
     """
-    names = (*BASE_ASSETS, *assets)
-    scripts = [asset(name) for name in names if name.endswith(".js")]
-    styles = [asset(name) for name in names if name.endswith(".css")]
+    texts = {name: asset(name) for name in ("base.css", "base.js", *assets)}
+    scripts = [text for name, text in texts.items() if name.endswith(".js")]
     text = (
         environment()
         .get_template(template)
         .render(
             policy=policy(scripts, connects=connects),
-            styles=[Markup(style) for style in styles],
+            styles=[Markup(text) for name, text in texts.items() if name.endswith(".css")],
             scripts=[Markup(script) for script in scripts],
             version=__version__,
             **values,
         )
     )
-    # A name that the system could not decode has surrogates, which no file can hold.
+    # Names that the system could not decode have surrogates, which no file can hold.
     return text.encode("utf-8", "backslashreplace").decode()
 
 
 def policy(scripts: list[str], *, connects: bool = False) -> str:
-    """A content security policy that lets run these scripts and no other, and loads nothing from elsewhere.
+    """Return a content security policy that runs these scripts only, and loads nothing from elsewhere.
 
-    A text that got into a page as markup, against all escaping, would still do nothing.
+    Even if a text got into a page as markup, despite the escaping, it could do nothing.
     """
-    hashes = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in scripts
-    )
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts]
+    sources = [f"'sha256-{digest}'" for digest in digests] or ["'none'"]
     rules = [
         "default-src 'none'",
-        f"script-src {hashes or chr(39) + 'none' + chr(39)}",
+        f"script-src {' '.join(sources)}",
         "style-src 'unsafe-inline'",
         "img-src 'self' file: data: blob:",
         *(["connect-src 'self'"] if connects else []),
@@ -71,7 +65,7 @@ def policy(scripts: list[str], *, connects: bool = False) -> str:
 
 @functools.cache
 def asset(name: str) -> str:
-    """The text of a style sheet or script; it stands in an element that only its own end tag ends."""
+    """Return the text of a style or script, which must not contain the end tag of its element."""
     text = resources.files("warpsplat.pages").joinpath("assets", name).read_text("utf-8")
     assert "</script" not in text.lower() and "</style" not in text.lower(), name
     return text
@@ -79,7 +73,7 @@ def asset(name: str) -> str:
 
 @functools.cache
 def environment() -> Environment:
-    """The templates, where every text is escaped and every missing value is an error."""
+    """Return the templates: every text is escaped, and a missing value is an error."""
     made = Environment(
         loader=PackageLoader("warpsplat.pages"),
         autoescape=True,
@@ -88,11 +82,15 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     made.globals["mark"] = Markup(MARK)
-    made.filters["printable"] = printable
     made.filters["address"] = address
     return made
 
 
 def address(path: str) -> str:
-    """A relative path as a link: whatever is in a file's name, it names that file."""
+    """Return a relative path, with any characters, as a link."""
     return quote(path.encode("utf-8", "surrogateescape"), safe="/")
+
+
+def webp_uri(data: bytes) -> str:
+    """Return a WebP file as a data URI: an ``img`` can neither run scripts nor load anything."""
+    return f"data:image/webp;base64,{base64.b64encode(data).decode()}"

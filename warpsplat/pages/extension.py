@@ -1,4 +1,4 @@
-"""What pages add to the core: reports, and a page to vectorize images on."""
+"""Reports on results, and the command ``serve``."""
 
 from warpsplat.extensions import Command, Extension
 

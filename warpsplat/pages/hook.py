@@ -1,4 +1,4 @@
-"""``--report``: a page on what ``vectorize``, ``refine`` or ``eval`` made or measured."""
+"""The option ``--report`` of ``vectorize``, ``refine`` and ``eval``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output
 
 ENDINGS = (".html", ".htm")
-"""File name endings of pages."""
 
 
 class ReportHook(RunHook):
@@ -29,12 +28,12 @@ class ReportHook(RunHook):
             "--report",
             type=FILE,
             metavar="FILE.html",
-            help="Page on the result, to look at: image and SVG under a slider, errors, shapes, figures.",
+            help="Page on the result: image and SVG under a slider, error map, shapes, figures.",
         )
     }
 
     def __init__(self, report: Path | None) -> None:
-        """``report``: the page; None: none is made."""
+        """``report``: path of the page; None: none is written."""
         self._page = report
 
     def flag(self) -> str | None:
@@ -42,7 +41,7 @@ class ReportHook(RunHook):
         return "--report" if self._page else None
 
     def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
-        """Check that the page can be written, and is none of the run's other files."""
+        """Check that the page can be written, and is not another file of the run."""
         if self._page is None:
             return
         if self._page == STANDARD:

@@ -1,68 +1,50 @@
-"""Plots of numbers over time: where lines and ticks lie; ``templates/plot.html.j2`` draws them."""
+"""Layout of plots, which ``templates/plot.html.j2`` draws."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 WIDTH, HEIGHT = 420, 190
-"""Of a plot [units of its view box]."""
+"""Size of a plot [units of its view box]."""
 
-LEFT, RIGHT, TOP, BOTTOM = 42, 10, 10, 34
-"""What is kept free for the axes."""
+LEFT, TOP, RIGHT, BOTTOM = 42, 10, 410, 156
+"""Box of the curve, inside the space for the axes."""
 
 MOST_POINTS = 400
-"""Of a line: more cannot be told apart."""
+"""Most points of a curve: more cannot be told apart."""
 
 
-@dataclass(frozen=True)
-class Tick:
-    """A number at an axis."""
-
-    at: float
-    """Where, across or down."""
-    text: str
-
-
-@dataclass(frozen=True)
-class Line:
-    """Part of a curve in one style."""
-
-    points: str
-    """As ``polyline`` takes them."""
-    faint: bool
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A point of a curve that is drawn as a dot, with a text; to be placed, in the curve's own units."""
+class Mark(NamedTuple):
+    """A labelled dot on a curve."""
 
     x: float
     y: float
     text: str
     strong: bool = False
-    """Whether it stands out."""
 
 
 @dataclass(frozen=True)
 class Plot:
-    """What is drawn, in units of its view box."""
+    """A plot, in units of its view box."""
 
     title: str
-    lines: tuple[Line, ...]
-    across: tuple[Tick, ...]
-    up: tuple[Tick, ...]
-    across_label: str
-    up_label: str
-    marks: tuple[Mark, ...] = ()
-    """In units of the view box."""
-    area: str = ""
-    """What lies below the lines, as ``polygon`` takes it; empty: nothing is filled."""
-    width: int = WIDTH
-    height: int = HEIGHT
-    box: tuple[int, int, int, int] = (LEFT, TOP, WIDTH - RIGHT, HEIGHT - BOTTOM)
-    """Left, top, right, bottom of where lines are."""
+    labels: tuple[str, str]
+    """Labels of the horizontal and the vertical axis."""
+    lines: list[tuple[str, bool]]
+    """Parts of the curve, as the points of a ``polyline``, and whether they are faint."""
+    across: list[tuple[float, str]]
+    """Ticks of the horizontal axis: place and text."""
+    up: list[tuple[float, str]]
+    """Ticks of the vertical axis."""
+    marks: list[Mark]
+    area: str
+    """The filled area, as the points of a ``polygon``; empty if there is none."""
+    size: tuple[int, int] = (WIDTH, HEIGHT)
+    box: tuple[int, int, int, int] = (LEFT, TOP, RIGHT, BOTTOM)
 
 
 def plot(
@@ -72,78 +54,54 @@ def plot(
     labels: tuple[str, str],
     *,
     faint: Sequence[bool] = (),
-    from_zero: bool = False,
     filled: bool = False,
     marks: Sequence[Mark] = (),
 ) -> Plot | None:
-    """A curve; None where there are fewer than two points that are numbers.
+    """Lay out a curve.
 
     Args:
-        title: what it shows.
-        xs: ascending.
-        ys: as many.
-        labels: of the axes, the one that goes across first.
-        faint: which points are of another kind, drawn weaker.
-        from_zero: whether the axis that goes up begins at 0.
-        filled: whether the area below is.
-        marks: points of it to be marked.
+        title: title of the plot.
+        xs: coordinates, ascending.
+        ys: values, as many.
+        labels: of the horizontal and the vertical axis.
+        faint: which points are drawn faint, as they cannot be compared with the others.
+        filled: whether the vertical axis begins at 0, and the area below the curve is filled.
+        marks: points of the curve to be marked.
+
+    Returns:
+        The plot; None if fewer than two points are finite.
     """
     flags = list(faint) or [False] * len(xs)
-    found = [
-        (x, y, flag)
-        for x, y, flag in zip(xs, ys, flags, strict=True)
-        if math.isfinite(x) and math.isfinite(y)
-    ]
+    found = [p for p in zip(xs, ys, flags, strict=True) if math.isfinite(p[0]) and math.isfinite(p[1])]
     if len(found) < 2 or found[-1][0] <= found[0][0]:
         return None
-    found = _thinned(found)
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
-    low, high = min(y for _, y, _ in found), max(y for _, y, _ in found)
-    up = ticks(0.0 if from_zero else low, high, 5)
-    across = ticks(0.0, found[-1][0], 6)
+    step = max(1.0, (len(found) - 1) / (MOST_POINTS - 1))
+    found = [found[round(i * step)] for i in range(min(len(found), MOST_POINTS))]
+    low, high, end = min(p[1] for p in found), max(p[1] for p in found), found[-1][0]
+    up, across = ticks(0.0 if filled else low, high, 5), ticks(0.0, end, 6)
     low, high = min(low, up[0]), max(high, up[-1])
-    end = found[-1][0]
 
     def x_of(value: float) -> float:
-        return LEFT + (right - LEFT) * value / end
+        return LEFT + (RIGHT - LEFT) * value / end
 
     def y_of(value: float) -> float:
-        return bottom - (bottom - TOP) * (value - low) / ((high - low) or 1.0)
+        return BOTTOM - (BOTTOM - TOP) * (value - low) / (high - low)
 
-    placed = [(x_of(x), y_of(y), flag) for x, y, flag in found]
-    area = ""
-    if filled:
-        area = _points([(placed[0][0], bottom), *((x, y) for x, y, _ in placed), (placed[-1][0], bottom)])
+    placed = [(x_of(x), y_of(y)) for x, y, _ in found]
+    lines = []
+    for flag, group in itertools.groupby(zip(found, placed, strict=True), key=lambda pair: pair[0][2]):
+        run = [place for _, place in group]
+        lines.append((_points(run * 2 if len(run) == 1 else run), flag))  # a single point becomes a dot
+    area = [(placed[0][0], BOTTOM), *placed, (placed[-1][0], BOTTOM)] if filled else []
     return Plot(
         title,
-        tuple(_lines(placed)),
-        tuple(Tick(x_of(value), number(value)) for value in across if value <= end * 1.0001),
-        tuple(Tick(y_of(value), number(value)) for value in up),
-        *labels,
-        marks=tuple(replace(mark, x=x_of(mark.x), y=y_of(mark.y)) for mark in marks),
-        area=area,
+        labels,
+        lines,
+        [(x_of(value), number(value)) for value in across if value <= end * 1.0001],
+        [(y_of(value), number(value)) for value in up],
+        [mark._replace(x=x_of(mark.x), y=y_of(mark.y)) for mark in marks],
+        _points(area),
     )
-
-
-def _thinned(points: list[tuple[float, float, bool]]) -> list[tuple[float, float, bool]]:
-    if len(points) <= MOST_POINTS:
-        return points
-    step = (len(points) - 1) / (MOST_POINTS - 1)
-    return [points[round(i * step)] for i in range(MOST_POINTS)]
-
-
-def _lines(points: list[tuple[float, float, bool]]) -> list[Line]:
-    """Runs of one style. Between two of them is a gap: what they say cannot be compared."""
-    runs: list[list[tuple[float, float, bool]]] = []
-    for point in points:
-        if runs and runs[-1][-1][2] == point[2]:
-            runs[-1].append(point)
-        else:
-            runs.append([point])
-    # A point alone is a line of no length, whose caps are a dot.
-    return [
-        Line(_points([(x, y) for x, y, _ in (run * 2 if len(run) == 1 else run)]), run[0][2]) for run in runs
-    ]
 
 
 def _points(points: Sequence[tuple[float, float]]) -> str:
@@ -151,7 +109,7 @@ def _points(points: Sequence[tuple[float, float]]) -> str:
 
 
 def ticks(low: float, high: float, count: int) -> list[float]:
-    """About ``count`` round numbers that enclose ``low`` and ``high``."""
+    """Return about ``count`` round numbers that enclose ``low`` and ``high``."""
     span = (high - low) or abs(high) or 1.0
     rough = span / max(1, count - 1)
     unit = 10.0 ** math.floor(math.log10(rough))
@@ -161,5 +119,5 @@ def ticks(low: float, high: float, count: int) -> list[float]:
 
 
 def number(value: float) -> str:
-    """As it stands at an axis."""
+    """Return a number as an axis shows it."""
     return f"{value:,.0f}".replace(",", "\N{THIN SPACE}") if abs(value) >= 1000 else f"{value:g}"

@@ -1,4 +1,4 @@
-"""``warpsplat.report``."""
+"""The API function ``warpsplat.report``."""
 
 from __future__ import annotations
 
@@ -25,25 +25,22 @@ def report(
     device: str = "auto",
     threads: int | None = None,
 ) -> str:
-    """A page on a result, to look at in a browser: one file that needs nothing else and no network.
+    """Return a page on a result for a browser: one self-contained file that needs no network.
 
-    It shows image and SVG under a slider, where they differ, the shapes with the decibels that each is worth,
-    the figures and the course of the run. Of several results it compares these.
+    It shows image and SVG under a slider, an error map, the shapes with their contributions in decibels, the
+    figures and the course of the run. Several results are compared.
 
     Args:
-        result: what ``vectorize`` or ``refine`` made; or any SVG, as for ``refine``, which is measured; or
-            several results of one image, as ``vectorize_several`` makes them.
-        image: that it shows, as for ``vectorize``.
+        result: result of ``vectorize`` or ``refine``; or any SVG, as for ``refine``, which is measured; or
+            several results of one image, as from ``vectorize_several``.
+        image: the image that it shows, as for ``vectorize``.
         output: file to write the page to; an existing one is replaced in one step.
-        command: what makes the result again, for people.
-        name: of the image, for people; default: its file's name.
-        svg_name: that the SVG is downloaded as; default: the image's name with ``.svg``. Those of several
-            results have their numbers of shapes in their names.
+        command: command that makes the result again, for people.
+        name: name of the image, for people; default: its file's name.
+        svg_name: file name of the download; default: the image's name with ``.svg``. With several results the
+            numbers of shapes are added.
         device: where to compute, see ``vectorize``.
-        threads: see there.
-
-    Returns:
-        the page.
+        threads: see ``vectorize``.
 
     Raises:
         ImageError: the image or the SVG cannot be read, or their proportions differ.
@@ -60,7 +57,7 @@ def report(
             text, image = text_of(result, svg_name_of(result)), held(image)
             facts, own = Facts(score(text, image).as_dict(), command=command), False
         with backend_on(device, threads) as backend:
-            made = report_page(text, image, backend, facts, name=name, svg_name=svg_name, own=own).text
+            made = report_page(text, image, backend, facts, name=name, svg_name=svg_name, own=own)
     if output is not None:
         write_result(Path(output), made.encode())
     return made

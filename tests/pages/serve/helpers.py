@@ -1,4 +1,4 @@
-"""A page's requests to a server, and pictures to send."""
+"""A client of the server, and images to upload."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from warpsplat.pages.serve.worker import Machine
 
 CPU = Machine("cpu", 1)
 LONGEST = 60.0
-"""For anything that is waited for [s]."""
+"""Longest wait for anything [s]."""
 
 
 def picture(width: int = 40, height: int = 32, kind: str = "PNG") -> bytes:
-    """With grain, so that it is taken for a photograph."""
+    """Return an image file with grain, so that it is detected as a photograph."""
     y, x = np.mgrid[:height, :width]
     smooth = np.stack([4 * x, 5 * y, 0 * x + 90], axis=2)
     grain = np.random.default_rng(0).normal(0, 4, smooth.shape)
@@ -32,7 +32,7 @@ def picture(width: int = 40, height: int = 32, kind: str = "PNG") -> bytes:
 
 
 def until(condition: Any) -> Any:
-    """What ``condition`` returns, once it is true."""
+    """Wait until ``condition()`` is true, and return its value."""
     ends = time.monotonic() + LONGEST
     while not (found := condition()):
         assert time.monotonic() < ends
@@ -41,7 +41,7 @@ def until(condition: Any) -> Any:
 
 
 class Visitor:
-    """What a page does; ``with`` it there is a server."""
+    """A page's requests to a server, which it starts; a context manager."""
 
     def __init__(self, limits: Limits | None = None, max_memory: str | None = None) -> None:
         self.server = WarpsplatServer("127.0.0.1", 0, machine=CPU, limits=limits, max_memory=max_memory)
@@ -87,6 +87,6 @@ class Visitor:
         return next(each for each in self.state()["runs"] if each["id"] == run)
 
     def over(self, run: str) -> dict[str, Any]:
-        """What is told of a run once it is over."""
+        """Wait for the end of a run, and return its state."""
         until(lambda: self.run(run)["state"] not in {"waiting", "running"})
         return self.run(run)

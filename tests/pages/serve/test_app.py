@@ -1,4 +1,4 @@
-"""The requests of a page, and what others may ask for."""
+"""The requests of a page, and which requests are refused."""
 
 from __future__ import annotations
 
@@ -43,9 +43,11 @@ def test_an_image_becomes_the_file_of_the_command_line(visitor: Visitor) -> None
     assert run["command"] == "warpsplat vectorize 'my photo.png' --curves 4 --subject photo -o 'my photo.svg'"
 
 
-def test_the_command_says_what_the_form_says() -> None:
+def test_the_command_has_the_settings_of_the_form() -> None:
     with Visitor(max_memory="2GB") as visitor:
-        run = visitor.begin(visitor.upload(picture(), "-a b.png"), colors=6, mixed=True, quality="high")
+        run = visitor.begin(
+            visitor.upload(picture(), "-a b.png"), colors=6, open=False, mixed=True, quality="high"
+        )
         assert visitor.run(run)["command"] == (
             "warpsplat vectorize './-a b.png' --quality high --mixed --colors 6 --max-memory 2000000000"
             " -o './-a b.svg'"
@@ -64,7 +66,7 @@ def test_a_run_that_is_stopped_has_a_file(visitor: Visitor) -> None:
     assert warpsplat.score(svg, picture()).psnr == pytest.approx(told["figures"]["psnr"], abs=0.01)
 
 
-def test_runs_wait_for_their_turn() -> None:
+def test_runs_are_queued() -> None:
     with Visitor(Limits(waiting=2)) as visitor:
         image = visitor.upload(picture())
         first = visitor.begin(image, quality="high", **SHORT)
@@ -73,15 +75,15 @@ def test_runs_wait_for_their_turn() -> None:
         assert [visitor.run(run)["place"] for run in (second, third)] == [1, 2]
         answer = visitor.start(image, **SHORT)
         assert (answer.status_code, answer.headers["retry-after"]) == (429, "5")
-        assert one_line(answer.text) == "2 runs wait already: try again when one is done"
+        assert one_line(answer.text) == "2 runs are waiting: try again when one is done"
         visitor.client.post(visitor.at("runs", second, "stop"))  # leaves the queue
         assert [run["id"] for run in visitor.state()["runs"]] == [first, third]
         visitor.client.post(visitor.at("runs", first, "stop"))
         assert visitor.over(third)["state"] == "done" and visitor.run(first)["state"] == "stopped"
 
 
-def test_nothing_of_a_run_is_left_but_its_file(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Arrays go when it is over, the image when it is removed; at once, without the collector of cycles."""
+def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays are freed when it is over, the image when it is removed, without collecting cycles."""
     arrays: list[weakref.ref[object]] = []
     create = Parameters.__init__
 
@@ -95,7 +97,7 @@ def test_nothing_of_a_run_is_left_but_its_file(visitor: Visitor, monkeypatch: py
     try:
         image = visitor.upload(picture())
         run = visitor.over(visitor.begin(image, **SHORT))
-        held = [weakref.ref(visitor.store.picture(visitor.session, image))]
+        held = [weakref.ref(visitor.store.upload(visitor.session, image))]
         held.append(weakref.ref(visitor.store.run(visitor.session, run["id"])))
         assert arrays
         until(lambda: not [each for each in arrays if each()])
@@ -114,7 +116,7 @@ def test_nothing_of_a_run_is_left_but_its_file(visitor: Visitor, monkeypatch: py
         ({"palette": "/etc/passwd"}, "unknown setting 'palette'; there are "),
     ],
 )
-def test_settings_that_cannot_be_used(visitor: Visitor, settings: dict[str, object], said: str) -> None:
+def test_invalid_settings(visitor: Visitor, settings: dict[str, object], said: str) -> None:
     answer = visitor.start(visitor.upload(picture()), **settings)
     assert answer.status_code == 400 and one_line(answer.text).startswith(said)
 
@@ -123,19 +125,19 @@ def test_settings_that_cannot_be_used(visitor: Visitor, settings: dict[str, obje
     ("data", "status", "said"),
     [
         (b"no image at all\n", 415, "photo.png: not an image of a format that is read: AVIF, "),
-        (b"", 415, "photo.png: nothing came"),
+        (b"", 415, "photo.png: the file is empty"),
         (picture()[:90], 415, "photo.png: damaged or unsupported image: "),
-        (bytes(2_000_001), 413, "photo.png: has 2.0 MB; at most 2 MB are taken"),
+        (bytes(2_000_001), 413, "photo.png: has 2.0 MB; the limit is 2 MB"),
     ],
 )
-def test_what_is_no_image(data: bytes, status: int, said: str) -> None:
+def test_an_invalid_upload(data: bytes, status: int, said: str) -> None:
     with Visitor(Limits(upload=2_000_000)) as visitor:
         answer = visitor.client.post(visitor.at("images?name=photo.png"), content=data)
         assert answer.status_code == status and one_line(answer.text).startswith(said)
-        assert visitor.store.held()["coming"] == visitor.store.held()["images"] == 0
+        assert visitor.store.held()["uploading"] == visitor.store.held()["images"] == 0
 
 
-def test_an_upload_without_a_size_and_one_that_lies(visitor: Visitor) -> None:
+def test_requests_of_unknown_or_excessive_size(visitor: Visitor) -> None:
     def parts() -> Iterator[bytes]:
         yield bytes(10)
 
@@ -157,13 +159,13 @@ def test_an_upload_without_a_size_and_one_that_lies(visitor: Visitor) -> None:
         "/sessions/none/runs/none/result.svg",
     ],
 )
-def test_a_path_outside(visitor: Visitor, path: str) -> None:
+def test_paths_outside(visitor: Visitor, path: str) -> None:
     answer = visitor.client.get(path)
     assert answer.status_code == 404 and "root:" not in one_line(answer.text)
 
 
-def test_the_picture_of_an_image_was_made_here(visitor: Visitor) -> None:
-    """Not the file itself, whatever may be in it; upright, and with its opacity."""
+def test_the_picture_of_an_image_is_encoded_here(visitor: Visitor) -> None:
+    """It is upright and keeps its opacity, but nothing else of the file."""
     pixels = Image.new("RGBA", (30, 20), (200, 10, 10, 128))
     exif = Image.Exif()
     exif[0x0112] = 6
@@ -179,7 +181,7 @@ def test_the_picture_of_an_image_was_made_here(visitor: Visitor) -> None:
 
 
 def test_an_image_that_is_longer_than_a_webp_can_be(visitor: Visitor) -> None:
-    """It is shown smaller; with more than a million pixels it is a WebP."""
+    """It is shown smaller."""
     buffer = io.BytesIO()
     Image.effect_noise((20_000, 60), 90).save(buffer, "JPEG")
     image = visitor.upload(buffer.getvalue())
@@ -188,45 +190,42 @@ def test_an_image_that_is_longer_than_a_webp_can_be(visitor: Visitor) -> None:
         assert shown.size == (10_000, 30)
 
 
-def test_answers_have_safe_headers(visitor: Visitor) -> None:
+def test_headers(visitor: Visitor) -> None:
     run = visitor.over(visitor.begin(visitor.upload(picture()), **SHORT))
     for path in ("/", visitor.at("runs", run["id"], "result.svg"), "/nothing"):
         headers = visitor.client.get(path).headers
         assert headers["x-content-type-options"] == "nosniff" and headers["x-frame-options"] == "DENY"
         assert "frame-ancestors 'none'" in headers["content-security-policy"]
         assert "access-control-allow-origin" not in headers
-    policy = visitor.client.get(visitor.at("runs", run["id"], "result.svg")).headers[
-        "content-security-policy"
-    ]
+    headers = visitor.client.get(visitor.at("runs", run["id"], "result.svg")).headers
+    policy = headers["content-security-policy"]
     assert "sandbox" in policy and "default-src 'none'" in policy
 
 
-def test_who_may_ask(visitor: Visitor) -> None:
+def test_requests_that_are_not_authorised(visitor: Visitor) -> None:
     client = visitor.client
     for host in ("evil.example:8765", "evil.example", "[bad", ""):
         answer = client.get("/", headers={"host": host})
-        assert answer.status_code == 403 and one_line(answer.text).startswith("this server is asked by")
-    for host in ("localhost:9000", "127.0.0.1", "[::1]:8765"):  # as through a tunnel; without its cookie
+        assert answer.status_code == 403 and one_line(answer.text).startswith(
+            "this server does not answer to the name"
+        )
+    for host in ("localhost:9000", "127.0.0.1", "[::1]:8765"):  # as through a tunnel, without the cookie
         answer = client.get("/", headers={"host": host})
-        assert one_line(answer.text) == "open the address that warpsplat serve printed: it has a token"
+        assert one_line(answer.text) == "open the address that warpsplat serve printed: it contains a token"
     for headers in ({"origin": "http://evil.example"}, {"origin": "null"}, {"sec-fetch-site": "cross-site"}):
         answer = client.post("/sessions", headers=headers)
-        assert answer.status_code == 403 and one_line(answer.text) == "another page may not ask for this"
-    assert (
-        client.post("/sessions", headers={"origin": visitor.server.address().partition("/?")[0]}).status_code
-        == 201
-    )
+        assert (
+            answer.status_code == 403 and one_line(answer.text) == "requests from other pages are not allowed"
+        )
+    origin = visitor.server.address().partition("/?")[0]
+    assert client.post("/sessions", headers={"origin": origin}).status_code == 201
     client.cookies.clear()
-    for path in (
-        "/",
-        "/?token=wrong",
-        visitor.at("events"),
-        visitor.server.address().replace("/?", "/sessions?"),
-    ):
+    elsewhere = visitor.server.address().replace("/?", "/sessions?")
+    for path in ("/", "/?token=wrong", visitor.at("events"), elsewhere):
         assert client.get(path).status_code == 403
 
 
-def test_a_token_becomes_a_cookie_and_a_ticket_is_good_once(visitor: Visitor) -> None:
+def test_a_token_becomes_a_cookie_and_a_ticket_can_be_used_once(visitor: Visitor) -> None:
     client, address = visitor.client, visitor.server.ticket()
     client.cookies.clear()
     answer = client.get(address)
@@ -238,19 +237,17 @@ def test_a_token_becomes_a_cookie_and_a_ticket_is_good_once(visitor: Visitor) ->
     assert client.get(address).status_code == 403
 
 
-def test_a_fault_is_one_line(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_internal_error_is_one_line(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise RuntimeError("oh\nno")
 
-    monkeypatch.setattr("warpsplat.pages.serve.app.read_picture", broken)
+    monkeypatch.setattr("warpsplat.pages.serve.app.read_upload", broken)
     answer = visitor.client.post(visitor.at("images"), content=picture())
     assert answer.status_code == 500
     assert one_line(answer.text).startswith("internal error: RuntimeError: oh (set")
 
 
-def test_a_run_that_fails_says_why_and_the_next_one_goes_on(
-    visitor: Visitor, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_next_run_goes_on_after_one_that_fails(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
     image = visitor.upload(picture())
     with monkeypatch.context() as patch:
         patch.setattr("warpsplat.pages.serve.worker.warpsplat.vectorize", lambda *_, **__: 1 / 0)

@@ -1,4 +1,4 @@
-"""Connections that are only held: they take no more files than there are, and not for long."""
+"""Idle connections are closed, and there are never more than the process may open files."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
 
-from tests.pages.serve.helpers import LONGEST, Visitor, picture, until
+from tests.pages.serve.helpers import LONGEST, Visitor, picture
 from warpsplat.pages.serve import connections
-from warpsplat.pages.serve.connections import Protocol
 
 resource = pytest.importorskip("resource")
 
@@ -32,109 +29,86 @@ main(["serve", "--port", "0", "--device", "cpu"])
 """
 
 
-@contextlib.contextmanager
-def served() -> Iterator[tuple[str, subprocess.Popen[str], list[str]]]:
-    """The address of a server that may open few files, its process, and what it says on stderr."""
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout and process.stderr
-        said: list[str] = []
-        listening = threading.Thread(target=lambda: said.extend(process.stderr or ()))
-        listening.start()
-        try:
-            yield process.stdout.readline().split()[1], process, said
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait(LONGEST)
-            listening.join()
+def is_closed(client: socket.socket, seconds: float) -> bool:
+    """Return whether the server closes a connection within some time; without a request it says nothing."""
+    with selectors.DefaultSelector() as selector:
+        selector.register(client, selectors.EVENT_READ)
+        if not selector.select(seconds):
+            return False
+    with contextlib.suppress(ConnectionError):
+        assert client.recv(1) == b""
+    return True
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="has no limit of open files")
 def test_more_connections_than_files() -> None:
-    with served() as (address, process, said), contextlib.ExitStack() as held:
+    program = [sys.executable, "-c", PROGRAM]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        address = process.stdout.readline().split()[1]
         parts = urlsplit(address)
         assert parts.hostname and parts.port
-        idle = [
-            held.enter_context(socket.create_connection((parts.hostname, parts.port))) for _ in range(HELD)
-        ]
-        with selectors.DefaultSelector() as selector:  # those that were let in are sent away
-            selector.register(idle[0], selectors.EVENT_READ)
-            assert selector.select(LONGEST)
-            with contextlib.suppress(ConnectionError):
-                assert idle[0].recv(1) == b""
-        held.close()
+        with contextlib.ExitStack() as held:
+            server = (parts.hostname, parts.port)
+            idle = [held.enter_context(socket.create_connection(server)) for _ in range(HELD)]
+            assert is_closed(idle[0], LONGEST)
         answer = httpx.get(address, follow_redirects=True, timeout=LONGEST)
         assert answer.text.startswith("<!doctype html>")
-        assert process.poll() is None
-    assert len("".join(said)) < 500 and "Traceback" not in "".join(said)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=LONGEST)
+    assert len(errors) < 500 and "Traceback" not in errors
 
 
-def test_no_more_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What comes then waits in the system, and is let in when another one goes."""
-    counts = [0]
-    made, lost = Protocol.connection_made, Protocol.connection_lost
-
-    def coming(self: Protocol, transport: object) -> None:
-        counts.append(counts[-1] + 1)
-        made(self, transport)
-
-    def going(self: Protocol, error: Exception | None) -> None:
-        counts.append(counts[-1] - 1)
-        lost(self, error)
-
+def test_connections_wait_until_others_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connections, "most_connections", lambda: 2)
-    monkeypatch.setattr(Protocol, "connection_made", coming)
-    monkeypatch.setattr(Protocol, "connection_lost", going)
     with Visitor() as visitor:
         visitor.client.close()
-        until(lambda: counts[-1] == 0)
         server = ("127.0.0.1", visitor.server.port)
-        held = [socket.create_connection(server) for _ in range(5)]
-        until(lambda: counts[-1] == 2)
+        request = f"GET / HTTP/1.1\r\nHost: {server[0]}\r\n\r\n".encode()
+        held = [socket.create_connection(server) for _ in range(3)]
+        for each in held[:2]:
+            each.sendall(request)
+            assert each.recv(1)
+        held[2].sendall(request)
+        held[2].settimeout(0.3)
+        with pytest.raises(TimeoutError):
+            held[2].recv(1)
+        held[0].close()
+        held[2].settimeout(LONGEST)
+        assert held[2].recv(1)
         for each in held:
             each.close()
-        answer = httpx.get(visitor.server.address(), follow_redirects=True, timeout=LONGEST)
-        assert answer.status_code == 200
-    assert max(counts) == 2
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HT", b"POST /sessions HTTP/1.1\r\nContent-Length: 9\r\n\r\nx"])
-def test_what_does_not_go_on_is_ended(sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_idle_connection_is_closed(sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connections, "HEAD_TIME", 0.2)
     monkeypatch.setattr(connections, "BODY_TIME", 0.2)
     with Visitor() as visitor, socket.create_connection(("127.0.0.1", visitor.server.port)) as idle:
         idle.settimeout(LONGEST)
         idle.sendall(sent)
         with contextlib.suppress(ConnectionError):
-            while idle.recv(1000):  # an answer to a stranger, perhaps
+            while idle.recv(1000):  # perhaps the refusal of an unknown client
                 pass
 
 
 def test_a_stream_of_events_is_not_idle(monkeypatch: pytest.MonkeyPatch) -> None:
-    looks: list[float] = []
-    close = Protocol.close_if_idle
-
-    def looked(self: Protocol) -> None:
-        looks.append(self.loop.time())
-        close(self)
-
     monkeypatch.setattr(connections, "HEAD_TIME", 0.1)
     monkeypatch.setattr(connections, "BODY_TIME", 0.1)
-    monkeypatch.setattr(Protocol, "close_if_idle", looked)
     with Visitor() as visitor, visitor.client.stream("GET", visitor.at("events")) as answer:
         lines = answer.iter_lines()
         next(lines)
-        until(lambda: looks and looks[-1] > looks[0] + 1)
+        with socket.create_connection(("127.0.0.1", visitor.server.port)) as idle:
+            assert is_closed(idle, LONGEST)
         visitor.upload(picture())
         assert any('"photo.png"' in line for line in lines)
 
 
-def test_a_limit_says_how_many(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_limit_follows_that_of_open_files(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = len(os.listdir("/dev/fd"))
     for limit, most in ((10_000, connections.MOST), (taken, connections.LEAST)):
         monkeypatch.setattr(resource, "getrlimit", lambda _, limit=limit: (limit, limit))
         assert connections.most_connections() == most
     monkeypatch.setattr(resource, "getrlimit", lambda _: (taken + 100, 0))
-    assert abs(connections.most_connections() - 100 + connections.OTHERS) < 5
+    assert abs(connections.most_connections() - 100 + connections.RESERVE) < 5

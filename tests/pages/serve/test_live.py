@@ -1,4 +1,4 @@
-"""What there is to see of a run, and what it costs."""
+"""The live view of a run, and its cost."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ import pytest
 import warpsplat
 from tests.pages.serve.helpers import picture
 from warpsplat.fit.progress import Progress, Snapshot
-from warpsplat.pages.serve.form import settings_of
 from warpsplat.pages.serve.live import LEAST_PAUSE, SHARE, Live
 
 
 @dataclass
 class Slow:
-    """A clock, and shapes that take half a second to be had."""
+    """A clock, and shapes that take half a second to read."""
 
     now: float = 0.0
     cost: float = 0.5
@@ -48,21 +47,21 @@ def test_pictures_take_a_small_share_of_the_time() -> None:
     assert spent > 0.8 * SHARE * slow.now
 
 
-def test_quick_pictures_do_not_come_too_often() -> None:
+def test_cheap_pictures_are_not_too_frequent() -> None:
     slow = Slow(cost=0.0)
     live = Live(clock=slow)
     reports(live, slow, count=100)
     assert live.number == pytest.approx(10 / (LEAST_PAUSE + 0.1), rel=0.2)
 
 
-def test_nobody_looks() -> None:
+def test_no_pictures_without_a_reader() -> None:
     slow, changes = Slow(), []
     live = Live(lambda: False, lambda: changes.append(1), slow)
     reports(live, slow, count=10)
     assert live.number == 0 and len(changes) == 10
 
 
-def test_the_time_that_is_left() -> None:
+def test_the_time_left() -> None:
     slow = Slow(cost=0.0)
     live = Live(clock=slow)
     slow.now = 30.0  # kernels were compiled
@@ -82,10 +81,3 @@ def test_a_real_run_has_pictures_of_its_shapes() -> None:
     live = Live()
     warpsplat.vectorize(picture(), 4, subject="photo", iterations=10, device="cpu", threads=1, callback=live)
     assert live.number >= 1 and 1 <= len(warpsplat.load_svg(live.picture)) <= 6
-
-
-def test_settings_of_the_form() -> None:
-    given = {"colors": 6, "open": False, "curves": 64, "mixed": True, "quality": "high"}
-    values, settings = settings_of(given, "2GB")
-    assert list(values) == ["curves", "mixed", "quality", "colors"]
-    assert (settings.curves, settings.mixed, settings.colors, settings.max_memory) == (64, True, 6, 2 * 10**9)

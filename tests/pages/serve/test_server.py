@@ -1,4 +1,4 @@
-"""The server as a program: its events, its address, its end, and what can go wrong at its beginning."""
+"""The server as a program: its events, its address, its end, and errors at its start."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from warpsplat.pages.serve.server import WarpsplatServer, is_loopback
 
 
 def states(visitor: Visitor) -> Any:
-    """The states that a page is told, one after the other."""
+    """Yield the states that a page receives."""
     with visitor.client.stream("GET", visitor.at("events")) as answer:
         assert answer.headers["content-type"].startswith("text/event-stream")
         for line in answer.iter_lines():
@@ -28,7 +28,7 @@ def states(visitor: Visitor) -> Any:
                 yield json.loads(line.removeprefix("data: "))
 
 
-def test_a_page_is_told_what_happens(visitor: Visitor) -> None:
+def test_a_page_receives_the_progress(visitor: Visitor) -> None:
     image = visitor.upload(picture())
     visitor.begin(image, curves=4, subject="photo", quality="high")
     seen: list[dict[str, Any]] = []
@@ -53,34 +53,23 @@ def test_streams_end_with_the_server(visitor: Visitor) -> None:
     assert list(page) == []
 
 
-def test_ctrl_c_ends_it_and_its_runs(
+def test_ctrl_c_ends_it_and_its_worker(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", opened.append)
-    made: list[WarpsplatServer] = []
-    begin = WarpsplatServer.__init__
 
-    def noted(self: WarpsplatServer, *given: Any, **named: Any) -> None:
-        made.append(self)
-        begin(self, *given, **named)
-
-    monkeypatch.setattr(WarpsplatServer, "__init__", noted)
-
-    def visit() -> None:
-        until(lambda: opened)
+    def visit(address: str) -> None:
+        opened.append(address)
         os.kill(os.getpid(), signal.SIGINT)
 
-    visiting = threading.Thread(target=visit)
-    visiting.start()
+    monkeypatch.setattr(webbrowser, "open", visit)
     assert run("serve", "--port", 0, "--device", "cpu", "--open") == 128 + signal.SIGINT
-    visiting.join()
     shown = capsys.readouterr()
     address = shown.out.split()[1]
-    assert shown.out == f"warpsplat: {made[0].address()} (Ctrl-C ends it)\n" and shown.err == ""
+    assert shown.out == f"warpsplat: {address} (Ctrl-C ends it)\n" and shown.err == ""
     assert address.startswith("http://127.0.0.1:")
     assert opened[0].partition("=")[0] == address.partition("=")[0] and opened[0] != address
-    assert made[0].store.closed and not [t for t in threading.enumerate() if t.name == "runs"]
+    assert not [thread for thread in threading.enumerate() if thread.name == "runs"]
 
 
 def test_a_port_that_is_in_use(capsys: pytest.CaptureFixture[str]) -> None:
@@ -100,7 +89,7 @@ def test_a_port_that_is_in_use(capsys: pytest.CaptureFixture[str]) -> None:
         (["--device", "cuda:77"], "unknown device 'cuda:77'"),
     ],
 )
-def test_what_cannot_be_used(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_options(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("serve", "--port", 0, *arguments) == 2
     assert one_line(capsys.readouterr().err).startswith(f"warpsplat: {said}")
 
@@ -112,7 +101,7 @@ def test_without_its_packages(capsys: pytest.CaptureFixture[str], monkeypatch: p
     assert one_line(capsys.readouterr().err).endswith('; pip install "warpsplat[serve]" installs it')
 
 
-def test_other_machines_are_let_in_with_a_warning_only(
+def test_a_host_that_other_machines_reach_prints_a_warning(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(server_module.WarpsplatServer, "run", lambda *_: None)

@@ -1,4 +1,4 @@
-"""What is held, for how long, and what gives way to what."""
+"""What the server holds, for how long, and what is dropped first."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
+from tests.files.test_formats import ENDLESS
+from warpsplat.errors import ImageError
 from warpsplat.fit.settings import Settings
 from warpsplat.pages.serve.limits import Limits, Refused
-from warpsplat.pages.serve.pictures import Picture, plain_name
-from warpsplat.pages.serve.runs import Run
+from warpsplat.pages.serve.sessions import QueuedRun
 from warpsplat.pages.serve.store import Store
+from warpsplat.pages.serve.uploads import Upload, plain_name, read_upload
 
 
 @dataclass
@@ -24,7 +26,7 @@ class Clock:
 
 @dataclass
 class Made:
-    """What a store takes of a result."""
+    """The parts of a result that a store uses."""
 
     svg: str = "<svg/>"
     stopped: bool = False
@@ -34,86 +36,93 @@ class Made:
         return self.figures
 
 
-def picture(size: int = 100) -> Picture:
-    return Picture("photo.png", bytes(size), 8, 8, b"", "image/png", transparent=False)
+def upload(size: int = 100) -> Upload:
+    return Upload("photo.png", bytes(size), 8, 8, b"", "image/png", transparent=False)
 
 
 def add(store: Store, session: str, image: str) -> str:
     return store.add_run(session, image, {}, Settings(), "warpsplat")
 
 
-def do(store: Store, svg: str = "<svg/>") -> Run:
-    """The run whose turn it is, done."""
+def begin(store: Store) -> QueuedRun:
     run = store.next()
     assert run
+    return run
+
+
+def do(store: Store, svg: str = "<svg/>") -> QueuedRun:
+    """Do the next run."""
+    run = begin(store)
     store.finish(run, Made(svg))
     return run
 
 
-def test_a_page_that_is_closed_is_forgotten_after_a_while() -> None:
+def test_a_closed_page_is_forgotten_after_a_while() -> None:
     clock = Clock()
     store = Store(Limits(grace=10), clock)
     read, unread = store.open(), store.open()
-    image = store.add_picture(unread, picture())
+    image = store.add_upload(unread, upload())
     add(store, unread, image)
-    running = store.next()
+    running = begin(store)
     add(store, unread, image)
-    store.attend(read)
-    clock.now = 9
-    assert not store.expire() and store.is_attended(read) and not store.is_attended(unread)
-    clock.now = 10
-    assert store.expire() and not store.expire()
-    assert running and running.stopping.is_set()
-    store.finish(running, Made())  # it ends later, and nobody wants it
-    assert store.held() == {"sessions": 1, "runs": 0, "waiting": 0, "images": 0, "results": 0, "coming": 0}
-    with pytest.raises(Refused, match="load it anew") as refused:
-        store.state_of(unread)
-    assert refused.value.status == 404
-    store.leave(read)
+    with store.attended(read):
+        clock.now = 9
+        assert not store.expire() and store.is_attended(read) and not store.is_attended(unread)
+        clock.now = 10
+        assert store.expire() and not store.expire()
+        assert running.stopping.is_set()
+        store.finish(running, Made())  # it ends later, and nobody wants it
+        held = {"sessions": 1, "runs": 0, "waiting": 0, "images": 0, "results": 0, "uploading": 0}
+        assert store.held() == held
+        with pytest.raises(Refused, match="reload it") as refused:
+            store.state_of(unread)
+        assert refused.value.status == 404
     clock.now = 19
     assert not store.expire()
     clock.now = 20
     assert store.expire() and not store.held()["sessions"]
-    store.leave(read)  # whose stream ends last
 
 
 def test_images_give_way_to_new_ones_but_not_while_they_are_needed() -> None:
     store = Store(Limits(upload=100, images=250))
     session = store.open()
-    first, second = (store.add_picture(session, picture()) for _ in range(2))
+    first, second = (store.add_upload(session, upload()) for _ in range(2))
     add(store, session, first)
-    store.reserve(100)
-    assert [image["id"] for image in store.state_of(session)["images"]] == [first]
-    add(store, session, store.add_picture(session, picture(50)))
-    with pytest.raises(Refused, match="try again when a run is done") as refused:
-        store.reserve(100)
-    assert refused.value.status == 503
-    store.unreserve(100)
-    store.reserve(100)
+    with store.reserved(100):
+        assert [image["id"] for image in store.state_of(session)["images"]] == [first]
+        add(store, session, store.add_upload(session, upload(50)))
+        with pytest.raises(Refused, match="try again when a run is done") as refused, store.reserved(100):
+            pass
+        assert refused.value.status == 503
+    with store.reserved(100):
+        assert store.held()["images"] == 150 and store.held()["uploading"] == 100
     with pytest.raises(Refused):
-        store.picture(session, second)
-    assert store.held()["images"] == 150 and store.held()["coming"] == 100
+        store.upload(session, second)
 
 
 def test_two_of_the_largest_images_fit() -> None:
-    assert Limits(upload=10**9).room == 2 * 10**9
+    assert Limits(upload=10**9).image_capacity == 2 * 10**9
 
 
 def test_the_oldest_results_go_first() -> None:
     store = Store(Limits(results=25, runs=3))
     session = store.open()
-    image = store.add_picture(session, picture())
+
+    def held() -> list[str]:
+        return [run["id"] for run in store.state_of(session)["runs"]]
+
+    image = store.add_upload(session, upload())
     for _ in range(3):
         add(store, session, image)
     runs = [do(store, "x" * 10) for _ in range(3)]
-    assert list(store._sessions[session].runs) == [runs[1].id, runs[2].id]
+    assert held() == [runs[1].id, runs[2].id]
     assert store.held()["results"] == 20
     large = add(store, session, image)
-    do(store, "x" * 40)  # what is larger than all that may be held is held alone
-    assert [run["id"] for run in store.state_of(session)["runs"]] == [large]
+    do(store, "x" * 40)  # a result above the limit is held alone
+    assert held() == [large]
     for _ in range(4):
         add(store, session, image)
-    assert store.held()["runs"] == 4 and large not in store._sessions[session].runs
+    assert store.held()["runs"] == 4 and large not in held()
 
 
 def test_sessions_are_limited() -> None:
@@ -126,18 +135,18 @@ def test_sessions_are_limited() -> None:
 def test_an_image_goes_with_its_runs() -> None:
     store = Store()
     session = store.open()
-    one, other = (store.add_picture(session, picture()) for _ in range(2))
+    one, other = (store.add_upload(session, upload()) for _ in range(2))
     add(store, session, one)
-    running = store.next()
+    running = begin(store)
     add(store, session, one)
     kept = add(store, session, other)
-    store.remove_picture(session, one)
-    assert running and running.stopping.is_set()
-    assert [run["id"] for run in store.state_of(session)["runs"]] == [kept]
-    assert store.state_of(session)["runs"][0]["place"] == 0
+    store.remove_upload(session, one)
+    assert running.stopping.is_set()
+    (run,) = store.state_of(session)["runs"]
+    assert (run["id"], run["place"]) == (kept, 0)
     store.remove_run(session, kept)
     assert store.held()["waiting"] == store.held()["runs"] == 0
-    for missing in (lambda: store.run(session, kept), lambda: store.remove_picture(session, one)):
+    for missing in (lambda: store.run(session, kept), lambda: store.remove_upload(session, one)):
         with pytest.raises(Refused):
             missing()
 
@@ -145,13 +154,13 @@ def test_an_image_goes_with_its_runs() -> None:
 def test_the_end() -> None:
     store = Store()
     session = store.open()
-    image = store.add_picture(session, picture())
+    image = store.add_upload(session, upload())
     add(store, session, image)
-    running = store.next()
+    running = begin(store)
     add(store, session, image)
     version = store.version
     store.close()
-    assert store.next() is None and running and running.stopping.is_set() and store.version > version
+    assert store.next() is None and running.stopping.is_set() and store.version > version
     assert not any(store.held().values())
 
 
@@ -170,3 +179,9 @@ def test_the_end() -> None:
 )
 def test_names_of_images(given: str, name: str) -> None:
     assert plain_name(given) == name
+
+
+def test_postscript_is_run_by_nothing(programs: list[str]) -> None:
+    with pytest.raises(ImageError, match="not an image of a format that is read"):
+        read_upload(ENDLESS, "x.png")
+    assert programs == []

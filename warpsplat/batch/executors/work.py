@@ -124,7 +124,7 @@ def _with_report(
         )
     except (WarpsplatError, OSError, MemoryError) as error:
         return replace(outcome, report_error=failure(error, task.name, task.output))
-    return replace(outcome, report=page.text)
+    return replace(outcome, report=page)
 
 
 def digest(data: bytes) -> str:

@@ -1,63 +1,40 @@
 "use strict";
-// The list of a batch: filtered and sorted here; of long ones more rows come as they are scrolled to.
+// The list of a batch: filtered and sorted here; of long lists more rows are made when they are scrolled to.
 (() => {
   const CHUNK = 100; // rows made at a time
-  const TITLES = { psnr: "PSNR [dB]", bytes: "Size [kB]", shapes: "Shapes", seconds: "Time [s]" };
-  const SHOWN = {
-    psnr: (row) => (row.exact ? "exact" : row.psnr?.toFixed(2)),
-    bytes: (row) => (row.bytes === null ? undefined : (row.bytes / 1000).toFixed(1)),
-    shapes: (row) => row.shapes?.toLocaleString("en").replaceAll(",", "\u2009"),
-    seconds: (row) => row.seconds?.toFixed(1),
+  const { byId, node } = warpsplat;
+  const COLUMNS = {
+    psnr: ["PSNR [dB]", (row) => (row.exact ? "exact" : row.psnr?.toFixed(2))],
+    bytes: ["Size [kB]", (row) => (row.bytes === null ? undefined : (row.bytes / 1000).toFixed(1))],
+    shapes: ["Shapes", (row) => row.shapes?.toLocaleString("en").replaceAll(",", "\u2009")],
+    seconds: ["Time [s]", (row) => row.seconds?.toFixed(1)],
   };
 
-  const { rows } = JSON.parse(document.getElementById("data").textContent);
+  const { rows } = warpsplat.data();
   rows.forEach((row, place) => (row.place = place));
-  const byId = (id) => document.getElementById(id);
   const body = document.querySelector("#images tbody");
+  const heads = [...document.querySelectorAll("#images th[data-key]")];
   let key = "place";
-  let rising = true;
+  let ascending = true;
   let found = [];
-  let made = 0;
+  let made = 0; // rows of `found` in the table
 
-  const node = (tag, kind, text = "") => {
-    const element = document.createElement(tag);
-    if (kind) element.className = kind;
-    element.textContent = text;
-    return element;
-  };
-
-  const linked = (text, href) => {
-    if (!href) return document.createTextNode(text);
-    const link = node("a", "", text);
-    link.setAttribute("href", href);
-    return link;
-  };
+  const linked = (text, href) => (href ? node("a", { href }, text) : text);
 
   const rowOf = (row) => {
-    const line = node("tr", row.status);
-    const pair = node("div", "pair");
+    const pair = node("td");
     if (row.thumbnail) {
-      const image = node("img", "");
-      image.src = row.thumbnail;
-      image.alt = "";
-      image.loading = "lazy";
-      pair.append(image);
+      pair.append(node("div", { className: "pair" }, node("img", { src: row.thumbnail, alt: "", loading: "lazy" })));
     }
-    const named = node("td", "");
-    const called = node("div", "called");
-    called.append(linked(row.name, row.report || row.svg));
-    const rest = node("div", "small quiet");
-    if (row.svg) rest.append(linked(row.output, row.svg));
-    else if (!row.error) rest.append(row.status === "stopped" ? "stopped" : "not made yet");
-    named.append(called, rest);
-    if (row.error) named.append(node("div", "message", row.error));
-    const first = node("td", "");
-    if (row.thumbnail) first.append(pair);
-    line.append(first, named);
-    for (const name of Object.keys(TITLES)) {
-      const cell = node("td", "number", SHOWN[name](row) ?? "");
-      cell.dataset.title = TITLES[name];
-      line.append(cell);
+    const output = row.svg ? linked(row.output, row.svg) : row.error ? "" : row.status === "stopped" ? "stopped" : "not made yet";
+    const named = node(
+      "td", {}, node("div", { className: "called" }, linked(row.name, row.report || row.svg)), node("div", { className: "small quiet" }, output),
+    );
+    if (row.error) named.append(node("div", { className: "message" }, row.error));
+    const line = node("tr", { className: row.status }, pair, named);
+    for (const [title, text] of Object.values(COLUMNS)) {
+      const cell = line.appendChild(node("td", { className: "number" }, text(row) ?? ""));
+      cell.dataset.title = title;
     }
     return line;
   };
@@ -68,56 +45,48 @@
   };
 
   const names = new Intl.Collator(undefined, { numeric: true });
-  const compared = (a, b) => {
+  const value = (row) => (key === "psnr" && row.exact ? Infinity : row[key]);
+  const compare = (a, b) => {
     if (key === "name") return names.compare(a.name, b.name) || a.place - b.place;
-    const value = (row) => (key === "psnr" && row.exact ? Infinity : row[key]);
     return value(a) === value(b) ? a.place - b.place : value(a) - value(b);
   };
 
   const show = () => {
     const words = byId("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
     const status = byId("status").value;
-    found = rows.filter((row) => {
+    const matches = rows.filter((row) => {
       const text = `${row.folder}/${row.name} ${row.output} ${row.error}`.toLowerCase();
       const is = !status || row.status === status || (status === "open" && row.status === "stopped");
       return is && words.every((word) => text.includes(word));
     });
-    const isMissing = (row) => key !== "name" && row[key] === null && !(key === "psnr" && row.exact);
-    const known = found.filter((row) => !isMissing(row)).sort(compared);
-    if (!rising) known.reverse();
-    found = [...known, ...found.filter(isMissing)]; // what has no figure comes last, either way
+    const known = matches.filter((row) => value(row) !== null).sort(compare);
+    if (!ascending) known.reverse();
+    found = [...known, ...matches.filter((row) => value(row) === null)]; // rows without the figure come last
     body.replaceChildren();
     made = 0;
     more();
     byId("found").value = found.length === rows.length ? "" : `${found.length} of ${rows.length}`;
     byId("nothing").hidden = found.length > 0;
     byId("sort").value = key;
-    byId("direction").textContent = rising ? "↑" : "↓";
-    byId("direction").ariaLabel = rising ? "Ascending; press for descending" : "Descending; press for ascending";
-    for (const head of document.querySelectorAll("#images th[data-key]")) {
-      if (head.dataset.key === key) head.setAttribute("aria-sort", rising ? "ascending" : "descending");
-      else head.removeAttribute("aria-sort");
-    }
+    byId("direction").textContent = ascending ? "↑" : "↓";
+    byId("direction").ariaLabel = ascending ? "Ascending; press for descending" : "Descending; press for ascending";
+    for (const head of heads) head.ariaSort = head.dataset.key !== key ? null : ascending ? "ascending" : "descending";
   };
 
   const sortBy = (name) => {
-    rising = name === key ? !rising : name !== "psnr";
+    ascending = name === key ? !ascending : name !== "psnr";
     key = name;
     show();
   };
 
-  for (const head of document.querySelectorAll("#images th[data-key]")) {
-    head.querySelector("button").addEventListener("click", () => sortBy(head.dataset.key));
-  }
+  for (const head of heads) head.querySelector("button").addEventListener("click", () => sortBy(head.dataset.key));
   byId("sort").addEventListener("change", () => sortBy(byId("sort").value));
   byId("direction").addEventListener("click", () => sortBy(key));
   byId("filter").addEventListener("input", show);
   byId("status").addEventListener("change", show);
-  const end = byId("nothing");
-  const edge = document.createElement("div");
-  end.after(edge);
-  new IntersectionObserver((seen) => seen.some((one) => one.isIntersecting) && made < found.length && more(), {
-    rootMargin: "800px",
-  }).observe(edge);
+  const edge = node("div");
+  byId("nothing").after(edge);
+  const observer = new IntersectionObserver((seen) => seen.some((one) => one.isIntersecting) && more(), { rootMargin: "800px" });
+  observer.observe(edge);
   show();
 })();

@@ -1,19 +1,20 @@
 "use strict";
-// The report of one file: its shapes are found in its text, which is never a part of the page: it is shown as an
-// image, and only outlines are copied, attribute by attribute, to be pointed at.
+// The report on one file. The text of the file never becomes part of the page: it is shown as an image, and only the
+// outlines of its shapes are copied, attribute by attribute, so that they can be pointed at.
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const ROW = 32; // px, as .option says
+  const ROW = 32; // px, as in .option
   const OUTLINES = ["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"];
   const GEOMETRY = ["d", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "x1", "y1", "x2", "y2", "points"];
 
-  const { svg, view, listing, name } = JSON.parse(document.getElementById("data").textContent);
-  const byId = (id) => document.getElementById(id);
-  const viewer = byId("viewer").viewer;
+  const { byId, node } = warpsplat;
+  const { svg, view, listing, name } = warpsplat.data();
+  const { viewer } = byId("viewer");
   const file = new DOMParser().parseFromString(svg, "image/svg+xml");
   const elements = file.getElementsByTagName("*");
+  const root = file.documentElement;
 
-  // The picture, without what is switched off.
+  // The picture, without the layers that are switched off.
 
   let shownUrl = "";
   const showFile = () => {
@@ -23,96 +24,81 @@
     viewer.set("svg", shownUrl);
     if (before) setTimeout(() => URL.revokeObjectURL(before), 5000);
   };
-  if (view) file.documentElement.setAttribute("viewBox", view);
-  file.documentElement.setAttribute("width", viewer.width);
-  file.documentElement.setAttribute("height", viewer.height);
+  if (view) root.setAttribute("viewBox", view);
+  root.setAttribute("width", viewer.width);
+  root.setAttribute("height", viewer.height);
   showFile();
 
-  const setShown = (index, is) => {
-    if (index === null || !elements[index]?.style) return;
-    if (is) elements[index].style.removeProperty("display");
-    else elements[index].style.setProperty("display", "none", "important");
-    if (!elements[index].getAttribute("style")) elements[index].removeAttribute("style");
+  const setVisible = (index, visible) => {
+    const element = index === null ? null : elements[index];
+    if (!element?.style) return;
+    if (visible) element.style.removeProperty("display");
+    else element.style.setProperty("display", "none", "important");
+    if (!element.getAttribute("style")) element.removeAttribute("style");
   };
 
-  const download = byId("download");
-  download.href = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
-  download.download = name;
-
+  byId("download").href = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  byId("download").download = name;
   viewer.addEventListener("show", () => {
     byId("legend").hidden = viewer.shown("left") !== "error" && viewer.shown("right") !== "error";
   });
-
   if (!listing) return;
 
   const count = listing.kinds.length;
   const off = new Set(); // numbers of layers, and "background"
   const isOff = (shape) => off.has(listing.layers[shape]);
 
-  // Outlines, to be pointed at in the picture.
+  // Outlines, which can be pointed at in the picture.
 
-  const made = (tag, attributes) => {
+  const svgNode = (tag, attributes = {}) => {
     const element = document.createElementNS(SVG, tag);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    for (const [key, value] of Object.entries(attributes)) if (value) element.setAttribute(key, value);
     return element;
   };
 
-  const root = file.documentElement;
-  const box = root.getAttribute("viewBox") ?? `0 0 ${viewer.width} ${viewer.height}`;
-  const overlay = made("svg", { viewBox: box, "aria-hidden": "true" });
-  const fit = root.getAttribute("preserveAspectRatio");
-  if (fit) overlay.setAttribute("preserveAspectRatio", fit);
-  const hits = overlay.appendChild(made("g", {}));
-  const hot = overlay.appendChild(made("g", { class: "hot" }));
+  const overlay = svgNode("svg", {
+    viewBox: root.getAttribute("viewBox") ?? `0 0 ${viewer.width} ${viewer.height}`,
+    preserveAspectRatio: root.getAttribute("preserveAspectRatio"),
+    "aria-hidden": "true",
+  });
+  const hits = overlay.appendChild(svgNode("g"));
+  const hot = overlay.appendChild(svgNode("g", { class: "hot" }));
   viewer.overlay.append(overlay);
 
-  const inherited = (element, attribute) => element?.closest?.(`[${attribute}]`)?.getAttribute(attribute);
+  const inherited = (element, attribute) => element.closest(`[${attribute}]`)?.getAttribute(attribute);
 
-  // The outline of a shape alone, where the root's units are; null where something else than attributes places it.
+  // The outline of a shape in the root's units; null if more than attributes determine its place.
   const outlineOf = (shape) => {
-    const source = elements[listing.elements[shape]];
-    if (!source || listing.elements[shape] === null || !OUTLINES.includes(source.localName)) return null;
+    const source = listing.elements[shape] === null ? null : elements[listing.elements[shape]];
+    if (!source || !OUTLINES.includes(source.localName)) return null;
     const transforms = [];
     for (let at = source; at && at !== root; at = at.parentElement) {
       if (at.localName === "svg" || at.localName === "symbol") return null;
       if (at.hasAttribute("transform")) transforms.unshift(at.getAttribute("transform"));
     }
-    const outline = made(source.localName, {});
+    const isStroke = listing.kinds[shape] === "stroke";
+    const outline = svgNode(source.localName, {
+      transform: transforms.join(" "),
+      "fill-rule": inherited(source, "fill-rule"),
+      class: isStroke ? "hit stroke" : "hit",
+      "stroke-width": isStroke ? (inherited(source, "stroke-width") ?? "1") : "",
+    });
     for (const key of GEOMETRY) if (source.hasAttribute(key)) outline.setAttribute(key, source.getAttribute(key));
-    if (transforms.length) outline.setAttribute("transform", transforms.join(" "));
-    const rule = inherited(source, "fill-rule");
-    if (rule) outline.setAttribute("fill-rule", rule);
+    outline.dataset.shape = shape;
     return outline;
   };
 
-  const widthOf = (shape) => inherited(elements[listing.elements[shape]], "stroke-width") ?? "1";
-
-  const outlines = new Array(count).fill(null);
-  let isTraced = false;
+  let outlines = null; // made when the browser is idle, or when they are needed
+  const hideOutlines = () => outlines?.forEach((outline, shape) => outline && (outline.style.display = isOff(shape) ? "none" : ""));
   const trace = () => {
-    if (isTraced) return;
-    isTraced = true;
-    const all = document.createDocumentFragment();
-    for (let shape = 0; shape < count; shape++) {
-      const outline = outlineOf(shape);
-      if (!outline) continue;
-      const isStroke = listing.kinds[shape] === "stroke";
-      outline.setAttribute("class", isStroke ? "hit stroke" : "hit");
-      if (isStroke) outline.setAttribute("stroke-width", widthOf(shape));
-      outline.dataset.shape = shape;
-      outlines[shape] = outline;
-      all.append(outline);
-    }
-    hits.append(all);
+    if (outlines) return;
+    outlines = listing.kinds.map((_, shape) => outlineOf(shape));
+    hits.append(...outlines.filter(Boolean));
     hideOutlines();
-  };
-  const hideOutlines = () => {
-    outlines.forEach((outline, shape) => outline?.toggleAttribute("hidden", isOff(shape)));
-    outlines.forEach((outline, shape) => outline && (outline.style.display = isOff(shape) ? "none" : ""));
   };
   (globalThis.requestIdleCallback ?? setTimeout)(trace);
 
-  // One shape is marked, in the picture and in the list.
+  // The marked shape, in the picture and in the list.
 
   let selected = null;
   let marked = null;
@@ -120,105 +106,94 @@
     if (shape === marked) return;
     marked = shape;
     hot.replaceChildren();
-    for (const node of list.querySelectorAll(".option.hot")) node.classList.remove("hot");
-    tell(shape ?? selected);
-    const outline = shape === null ? null : (trace(), outlines[shape]);
-    if (outline) {
-      const copies = listing.kinds[shape] === "stroke" ? ["band wide", "band"] : ["halo", "edge"];
-      for (const kind of copies) {
-        const copy = outline.cloneNode();
-        copy.setAttribute("class", kind);
-        copy.style.display = "";
-        hot.append(copy);
-      }
+    for (const row of list.querySelectorAll(".option.hot")) row.classList.remove("hot");
+    describe(shape ?? selected);
+    if (shape === null) return;
+    trace();
+    for (const kind of listing.kinds[shape] === "stroke" ? ["band wide", "band"] : ["halo", "edge"]) {
+      const copy = outlines[shape]?.cloneNode();
+      if (!copy) break;
+      copy.setAttribute("class", kind);
+      copy.style.display = "";
+      hot.append(copy);
     }
     byId(`shape-${shape}`)?.classList.add("hot");
   };
 
-  const worthText = (worth) => {
-    if (worth === null) return "";
-    const size = Math.abs(worth);
+  const decibels = (value) => {
+    const size = Math.abs(value);
     const text = size >= 10 ? size.toFixed(1) : size >= 0.1 ? size.toFixed(2) : size.toFixed(3);
-    return (worth < 0 && Number(text) !== 0 ? "−" : "") + text;
+    return (value < 0 && Number(text) !== 0 ? "−" : "") + text;
   };
 
-  const told = byId("detail").textContent;
-  const tell = (shape) => {
-    if (shape === null) {
-      byId("detail").textContent = told;
-      return;
-    }
-    const colors = listing.colors[shape].join(" to ");
-    const worth = listing.worth[shape];
-    const parts = [
+  const explanation = byId("detail").textContent;
+  const describe = (shape) => {
+    const contribution = listing.contributions[shape];
+    const parts = shape === null ? [explanation] : [
       `${shape + 1} of ${count} from the back`,
-      listing.kinds[shape] === "kept" ? "kept as it is" : `${listing.kinds[shape]} ${colors}`,
+      listing.kinds[shape] === "kept" ? "kept unchanged" : `${listing.kinds[shape]} ${listing.colors[shape].join(" to ")}`,
       listing.opacities[shape] < 1 ? `${Math.round(100 * listing.opacities[shape])} % opaque` : "opaque",
-      worth === null ? "" : `without it ${worthText(Math.abs(worth))} dB ${worth < 0 ? "more" : "less"}`,
+      contribution === null ? "" : `without it ${decibels(Math.abs(contribution))} dB ${contribution < 0 ? "more" : "less"}`,
     ];
     byId("detail").textContent = parts.filter(Boolean).join(" · ");
   };
 
-  // The list: of long ones only the rows that are seen are there.
+  // The list, which has only the rows that are visible.
 
   const list = byId("list");
   const space = list.querySelector(".list-space");
-  const most = Math.max(1e-9, ...listing.worth.map((worth) => worth ?? 0));
+  const most = Math.max(1e-9, ...listing.contributions.map((value) => value ?? 0));
+  const places = new Int32Array(count);
   let order = [];
-  let places = new Int32Array(count);
 
-  const cell = (text, kind) => {
-    const node = document.createElement("span");
-    node.className = kind;
-    node.textContent = text;
-    return node;
-  };
+  const cell = (className, text = "") => node("span", { className }, text);
 
   const rowOf = (shape) => {
-    const row = document.createElement("div");
-    const worth = listing.worth[shape];
-    row.id = `shape-${shape}`;
-    row.className = `option${shape === marked ? " hot" : ""}${isOff(shape) ? " off" : ""}`;
-    row.dataset.shape = shape;
-    row.setAttribute("role", "option");
-    row.setAttribute("aria-selected", String(shape === selected));
-    row.setAttribute("aria-posinset", places[shape] + 1);
-    row.setAttribute("aria-setsize", count);
-    row.style.transform = `translateY(${places[shape] * ROW}px)`;
-    const swatch = cell("", `swatch ${listing.kinds[shape]}`);
+    const contribution = listing.contributions[shape];
+    const text = contribution === null ? "" : `${decibels(contribution)} dB`;
+    const swatch = cell(`swatch ${listing.kinds[shape]}`);
     const [first, last] = listing.colors[shape];
     if (first) swatch.style.background = last ? `linear-gradient(90deg, ${first}, ${last})` : first;
-    const bar = cell("", "worth-bar");
-    bar.style.width = `${100 * Math.sqrt(Math.max(0, worth ?? 0) / most)}%`;
-    if (worth === null) bar.style.visibility = "hidden";
-    const text = worth === null ? "" : `${worthText(worth)} dB`;
-    row.append(
-      swatch, cell(`${shape + 1}`, "number quiet"), cell(listing.kinds[shape], "quiet"), bar,
-      cell(text, `number${worth < 0 && worthText(worth).startsWith("−") ? " bad" : ""}`),
+    const bar = cell("contribution-bar");
+    bar.style.width = `${100 * Math.sqrt(Math.max(0, contribution ?? 0) / most)}%`;
+    if (contribution === null) bar.style.visibility = "hidden";
+    const row = node(
+      "div",
+      {
+        id: `shape-${shape}`,
+        className: `option${shape === marked ? " hot" : ""}${isOff(shape) ? " off" : ""}`,
+        role: "option",
+        ariaSelected: String(shape === selected),
+        ariaPosInSet: places[shape] + 1,
+        ariaSetSize: count,
+      },
+      swatch, cell("number quiet", `${shape + 1}`), cell("quiet", listing.kinds[shape]), bar,
+      cell(`number${text.startsWith("−") ? " bad" : ""}`, text),
     );
+    row.dataset.shape = shape;
+    row.style.transform = `translateY(${places[shape] * ROW}px)`;
     return row;
   };
 
-  const draw = (anew = false) => {
-    if (anew) space.replaceChildren();
-    space.style.height = `${order.length * ROW}px`;
+  const draw = (all = false) => {
+    if (all) space.replaceChildren();
+    space.style.height = `${count * ROW}px`;
     const first = Math.max(0, Math.floor(list.scrollTop / ROW) - 6);
-    const last = Math.min(order.length, Math.ceil((list.scrollTop + list.clientHeight) / ROW) + 6);
+    const last = Math.ceil((list.scrollTop + list.clientHeight) / ROW) + 6;
     const wanted = new Set(order.slice(first, last));
     for (const row of [...space.children]) if (!wanted.delete(Number(row.dataset.shape))) row.remove();
     space.append(...[...wanted].map(rowOf));
   };
 
   const sort = (by) => {
-    const shapes = [...Array(count).keys()];
-    const worth = (shape) => listing.worth[shape] ?? -Infinity;
+    const value = (shape) => listing.contributions[shape] ?? -Infinity;
     const orders = {
-      most: (a, b) => worth(b) - worth(a) || a - b,
-      least: (a, b) => worth(a) - worth(b) || a - b,
+      most: (a, b) => value(b) - value(a) || a - b,
+      least: (a, b) => value(a) - value(b) || a - b,
       front: (a, b) => b - a,
       back: (a, b) => a - b,
     };
-    order = shapes.sort(orders[by]);
+    order = [...Array(count).keys()].sort(orders[by]);
     order.forEach((shape, place) => (places[shape] = place));
     list.scrollTop = 0;
     draw(true);
@@ -232,16 +207,16 @@
   };
 
   const select = (shape) => {
-    const before = selected;
+    byId(`shape-${selected}`)?.setAttribute("aria-selected", "false");
     selected = shape;
-    if (before !== null) byId(`shape-${before}`)?.setAttribute("aria-selected", "false");
-    if (shape !== null) {
+    if (shape === null) list.removeAttribute("aria-activedescendant");
+    else {
       reveal(shape);
       byId(`shape-${shape}`)?.setAttribute("aria-selected", "true");
       list.setAttribute("aria-activedescendant", `shape-${shape}`);
-    } else list.removeAttribute("aria-activedescendant");
+    }
     mark(shape);
-    tell(shape);
+    describe(shape);
   };
 
   const enlarge = (shape) => {
@@ -292,36 +267,29 @@
 
   // Layers.
 
-  const layers = byId("layers");
-  const sizes = listing.names.map((_, layer) => listing.layers.filter((one) => one === layer).length);
-  const toggle = (layer, is) => {
-    if (is) off.delete(layer);
+  const toggle = (layer, visible) => {
+    if (visible) off.delete(layer);
     else off.add(layer);
-    if (layer === "background") setShown(listing.background, is);
-    else listing.elements.forEach((element, shape) => listing.layers[shape] === layer && setShown(element, is));
+    if (layer === "background") setVisible(listing.background, visible);
+    else listing.elements.forEach((element, shape) => listing.layers[shape] === layer && setVisible(element, visible));
     hideOutlines();
     if (selected !== null && isOff(selected)) select(null);
     draw(true);
     showFile();
   };
-  const choice = (layer, text, title) => {
-    const label = document.createElement("label");
-    const input = document.createElement("input");
-    input.type = "checkbox";
-    input.checked = true;
-    input.dataset.layer = layer;
+  const addLayer = (layer, text, title) => {
+    const input = node("input", { type: "checkbox", checked: true });
     input.addEventListener("change", () => toggle(layer, input.checked));
-    label.title = title;
-    label.append(input, text);
-    layers.append(label);
+    byId("layers").append(node("label", { title }, input, text));
   };
-  if (listing.background !== null) choice("background", "Background", "What lies behind all shapes");
-  listing.names.forEach((text, layer) => choice(layer, text, `${sizes[layer]} shapes`));
+  if (listing.background !== null) addLayer("background", "Background", "Behind all shapes");
+  listing.names.forEach((text, layer) => {
+    addLayer(layer, text, `${listing.layers.filter((one) => one === layer).length} shapes`);
+  });
 
   byId("count").textContent = String(count);
-  const isKnown = listing.worth.some((worth) => worth !== null);
   const by = byId("order");
-  if (!isKnown) {
+  if (listing.contributions.every((value) => value === null)) {
     by.querySelectorAll('[value="most"], [value="least"]').forEach((option) => option.remove());
     byId("detail").textContent = "";
   }

@@ -1,9 +1,9 @@
 "use strict";
-// The page of `warpsplat serve`. The server tells the whole state of this page's session whenever something changes;
-// what is shown follows from it, so that a page that was loaded anew is right with the first message.
+// The page of `warpsplat serve`. With every change the server sends the whole state of this page's session, and what is
+// shown follows from it: after a reload the page is complete with the first message.
 (() => {
-  const $ = (id) => document.getElementById(id);
-  const facts = JSON.parse($("facts").textContent);
+  const { byId, node, data } = warpsplat;
+  const facts = data();
   const STATES = { waiting: "Waiting", running: "Running", done: "Done", stopped: "Stopped", failed: "Failed" };
 
   let session = new URLSearchParams(location.hash.slice(1)).get("s");
@@ -11,20 +11,17 @@
   let current = null; // image that is shown
   let viewer = null;
   let follow = null; // run that is shown on the right as soon as it has a picture
-  let arriving = null; // image that was just uploaded, to be shown once the server tells of it
-  const sources = new Map(); // run -> {key, url}: of its latest picture
+  let arriving = null; // image that was just uploaded, shown once it is part of the state
+  const sources = new Map(); // run -> {key, url} of its latest picture
   const cards = new Map(); // run -> element
 
-  // Talking to the server.
+  // Requests.
 
   async function ask(method, path, body, type) {
     const headers = type ? { "Content-Type": type } : {};
-    let answer;
-    try {
-      answer = await fetch(path, { method, body, headers });
-    } catch {
+    const answer = await fetch(path, { method, body, headers }).catch(() => {
       throw new Error("The server does not answer");
-    }
+    });
     if (!answer.ok) throw new Error((await answer.text()).trim() || `Status ${answer.status}`);
     return answer.headers.get("Content-Type")?.startsWith("application/json") ? answer.json() : null;
   }
@@ -34,39 +31,40 @@
   async function begin() {
     session = (await ask("POST", "/sessions")).session;
     history.replaceState(null, "", `#s=${session}`);
+    listen();
   }
 
-  let begun = null; // by several uploads at once only one session
-  const ready = () => (session ? Promise.resolve() : (begun ??= begin().then(listen).finally(() => (begun = null))));
+  let begun = null; // several uploads at once open one session
+  const ready = () => (session ? Promise.resolve() : (begun ??= begin().finally(() => (begun = null))));
 
   function listen() {
     const stream = new EventSource(at("events"));
     stream.onmessage = (event) => {
-      $("lost").hidden = true;
+      byId("lost").hidden = true;
       model = JSON.parse(event.data);
       show();
     };
-    stream.onerror = () => {
-      $("lost").hidden = false;
+    stream.onerror = async () => {
+      byId("lost").hidden = false;
       if (stream.readyState !== EventSource.CLOSED) return; // it tries again by itself
       const had = model.images.length;
       session = null; // forgotten, or of another server
       model = { images: [], runs: [] };
-      ready().then(() => {
-        $("lost").hidden = true;
-        if (had) complain("This page was away for a while: its images and results are gone.");
+      try {
+        await ready();
+        if (had) complain("This page was closed for a while: its images and results are gone.");
         show();
-      }, (error) => {
-        $("lost").hidden = true;
+      } catch (error) {
         complain(error.message);
-      });
+      }
+      byId("lost").hidden = true;
     };
   }
 
   function complain(text, where = "error") {
-    $(where).textContent = text;
-    $(where).hidden = !text;
-    if (text) $(where).scrollIntoView({ block: "nearest" });
+    byId(where).textContent = text;
+    byId(where).hidden = !text;
+    if (text) byId(where).scrollIntoView({ block: "nearest" });
   }
 
   const attempt = (work, where) => async (...given) => {
@@ -77,7 +75,7 @@
     }
   };
 
-  // Images come in: chosen, dropped or pasted.
+  // Images: chosen, dropped or pasted.
 
   const upload = attempt(async (files) => {
     complain("");
@@ -87,8 +85,7 @@
       const name = file.name || "pasted.png";
       try {
         if (file.size > facts.upload) {
-          const size = `has ${(file.size / 1e6).toFixed(1)} MB`;
-          throw new Error(`${name}: ${size}; at most ${facts.upload / 1e6} MB are taken`);
+          throw new Error(`${name}: has ${(file.size / 1e6).toFixed(1)} MB; the limit is ${facts.upload / 1e6} MB`);
         }
         const path = `${at("images")}?name=${encodeURIComponent(name)}`;
         arriving = (await ask("POST", path, file, "application/octet-stream")).image;
@@ -106,7 +103,7 @@
       input.value = "";
     });
   }
-  const hasFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
+  const hasFiles = (event) => event.dataTransfer?.types.includes("Files");
   addEventListener("dragover", (event) => {
     if (!hasFiles(event)) return;
     event.preventDefault();
@@ -129,7 +126,7 @@
   // Settings -> a run.
 
   function chosen() {
-    const form = new FormData($("form"));
+    const form = new FormData(byId("form"));
     const settings = {};
     for (const name of ["subject", "quality", "paint"]) {
       if (form.get(name) !== facts.defaults[name]) settings[name] = form.get(name);
@@ -143,102 +140,95 @@
     complain("", "refused");
     const request = JSON.stringify({ image: current, settings: chosen() });
     follow = (await ask("POST", at("runs"), request, "application/json")).run;
-    $("stage").scrollIntoView({ block: "nearest", behavior: "smooth" }); // on a phone the form lies below it
+    byId("stage").scrollIntoView({ block: "nearest", behavior: "smooth" }); // on a phone the form lies below it
   }, "refused");
-  $("form").addEventListener("submit", (event) => {
+  byId("form").addEventListener("submit", (event) => {
     event.preventDefault();
     start();
   });
-  $("form").addEventListener("input", () => complain("", "refused"));
+  byId("form").addEventListener("input", () => complain("", "refused"));
 
-  function title(values) {
-    const words = [];
-    if (values.subject) words.push(values.subject);
-    if (values.curves) words.push(`${values.curves} shapes`);
-    if (values.open) words.push("strokes");
-    if (values.mixed) words.push("fills and strokes");
-    if (values.quality) words.push(values.quality);
-    if (values.paint) words.push(`${values.paint} paint`);
-    if (values.colors) words.push(`${values.colors} colours`);
-    return words.join(", ") || "automatic";
+  function name({ number, values }) {
+    const words = [
+      values.subject,
+      values.curves && `${values.curves} shapes`,
+      values.open && "strokes",
+      values.mixed && "fills and strokes",
+      values.quality,
+      values.paint && `${values.paint} paint`,
+      values.colors && `${values.colors} colours`,
+    ];
+    return `${number} · ${words.filter(Boolean).join(", ") || "automatic"}`;
   }
-
-  const name = (run) => `${run.number} · ${title(run.values)}`;
 
   // Figures.
 
-  const kilo = (bytes) => (bytes < 1e6 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)}` : `${(bytes / 1e6).toFixed(1)}`);
   const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
   function liveText(run) {
-    if (run.state === "waiting") {
-      return run.place ? `Waiting: ${run.place} before it` : "Waiting";
-    }
+    if (run.state === "waiting") return run.place ? `Waiting: ${run.place} before it` : "Waiting";
     const { live } = run;
     if (run.stopping) return "Stopping, and measuring the file";
     const words = [`${Math.floor(100 * live.work)} %`];
     if (live.shapes) words.push(`${live.shapes} shapes`);
-    if (live.psnr != null) words.push(live.fine ? `${live.psnr.toFixed(1)} dB` : `${live.psnr.toFixed(1)} dB (reduced)`);
+    if (live.psnr != null) words.push(`${live.psnr.toFixed(1)} dB${live.fine ? "" : " (reduced)"}`);
     if (live.left != null && live.left >= 1) words.push(`${clock(live.left)} left`);
     return live.note || words.join(" · ");
   }
 
-  function figures(run) {
-    const { figures } = run;
+  function size(bytes) {
+    if (bytes >= 1e6) return [(bytes / 1e6).toFixed(1), "MB"];
+    return [(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0), "kB"];
+  }
+
+  function figures({ figures: { psnr, ssim, bytes, shapes, seconds } }) {
     const rows = [];
-    if (figures.psnr != null) rows.push([figures.psnr.toFixed(2), "dB", "PSNR"]);
-    else if (figures.ssim === 1) rows.push(["exact", "", "PSNR"]);
-    if (figures.bytes != null) rows.push([kilo(figures.bytes), figures.bytes < 1e6 ? "kB" : "MB", "SVG"]);
-    rows.push([figures.shapes, "", "Shapes"]);
-    rows.push([figures.seconds < 60 ? figures.seconds.toFixed(1) : clock(figures.seconds), figures.seconds < 60 ? "s" : "", "Time"]);
-    return rows.map(([value, unit, label]) => {
-      const row = document.createElement("div");
-      const [term, data, small] = ["dt", "dd", "small"].map((tag) => document.createElement(tag));
-      term.textContent = label;
-      small.textContent = unit;
-      data.append(String(value), unit ? "\u00a0" : "", small);
-      row.append(term, data);
-      return row;
+    if (psnr != null) rows.push(["PSNR", psnr.toFixed(2), "dB"]);
+    else if (ssim === 1) rows.push(["PSNR", "exact", ""]);
+    if (bytes != null) rows.push(["SVG", ...size(bytes)]);
+    rows.push(["Shapes", shapes, ""]);
+    rows.push(seconds < 60 ? ["Time", seconds.toFixed(1), "s"] : ["Time", clock(seconds), ""]);
+    return rows.map(([label, value, unit]) => {
+      const text = node("dd", {}, String(value), unit ? "\u00a0" : "", node("small", {}, unit));
+      return node("div", {}, node("dt", {}, label), text);
     });
   }
 
-  // Pictures of runs: those of one that goes on are fetched one at a time, as fast as they come.
+  // Pictures of runs; live ones are fetched one at a time, as fast as they come.
 
   const isOver = (run) => !["waiting", "running"].includes(run.state);
   const hasFile = (run) => run.state === "done" || run.state === "stopped";
   const fetching = new Set();
 
-  function picture(run) {
+  async function fetchPicture(run) {
     const old = sources.get(run.id);
     if (hasFile(run)) {
       const url = at("runs", run.id, "result.svg");
-      if (old?.url !== url) source(run.id, "result", url);
+      if (old?.url !== url) setSource(run.id, "result", url);
       return;
     }
     const number = run.live?.pictures;
     if (!number || old?.key === number || fetching.has(run.id)) return;
     fetching.add(run.id);
-    fetch(at("runs", run.id, "live.svg"))
-      .then((answer) => (answer.ok ? answer.blob() : null))
-      .then((blob) => {
-        if (blob && sources.get(run.id)?.key !== "result") source(run.id, number, URL.createObjectURL(blob));
-      })
-      .catch(() => {})
-      .finally(() => {
-        fetching.delete(run.id);
-        show();
-      });
+    try {
+      const answer = await fetch(at("runs", run.id, "live.svg"));
+      const blob = answer.ok ? await answer.blob() : null;
+      if (blob && sources.get(run.id)?.key !== "result") setSource(run.id, number, URL.createObjectURL(blob));
+    } catch {
+      // the next state brings another one
+    }
+    fetching.delete(run.id);
+    show();
   }
 
-  function source(id, key, url) {
+  function setSource(id, key, url) {
     const old = sources.get(id)?.url;
     sources.set(id, { key, url });
-    if (old?.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(old), 2000); // it may be shown still
+    if (old?.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(old), 2000); // it may still be shown
   }
 
   function forget(id) {
-    const old = sources.get(id)?.url;
-    if (old?.startsWith("blob:")) URL.revokeObjectURL(old);
+    setSource(id, null, null);
     sources.delete(id);
     cards.get(id)?.remove();
     cards.delete(id);
@@ -248,34 +238,28 @@
 
   function open(image) {
     current = image.id;
-    const root = $("viewer-template").content.firstElementChild.cloneNode(true);
+    const root = byId("viewer-template").content.firstElementChild.cloneNode(true);
     root.dataset.width = image.width;
     root.dataset.height = image.height;
     root.classList.toggle("transparent", image.transparent);
     root.querySelector(".viewer-stage").style.aspectRatio = `${image.width} / ${image.height}`;
-    $("stage").replaceChildren(root);
+    byId("stage").replaceChildren(root);
     viewer = new warpsplat.Viewer(root);
     viewer.set("image", at("images", image.id));
     viewer.addEventListener("show", show);
-    const latest = model.runs.filter((run) => run.image === image.id).at(-1);
-    follow = latest?.id ?? null;
+    follow = model.runs.findLast((run) => run.image === image.id)?.id ?? null;
   }
 
   function offer(run) {
-    const { url } = sources.get(run.id);
     if (!viewer.images(run.id).length) {
       for (const plane of viewer.root.querySelectorAll(".viewer-side .viewer-plane")) {
-        const image = new Image();
+        const image = node("img", { alt: name(run), draggable: false, decoding: "sync", hidden: true });
         image.dataset.name = run.id;
-        image.alt = name(run);
-        image.draggable = false;
-        image.decoding = "sync";
-        image.hidden = true;
         plane.append(image);
       }
       for (const choice of viewer.root.querySelectorAll("select[data-side]")) choice.add(new Option(name(run), run.id));
     }
-    for (const image of viewer.images(run.id)) if (image.src !== new URL(url, location.href).href) image.src = url;
+    viewer.set(run.id, new URL(sources.get(run.id).url, location.href).href);
   }
 
   function withdraw(id) {
@@ -291,89 +275,83 @@
     if (arriving && images.has(arriving)) {
       open(images.get(arriving));
       arriving = null;
-      $("form").querySelector(".go").focus({ preventScroll: true });
+      byId("form").querySelector(".go").focus({ preventScroll: true });
     } else if (!images.has(current)) {
-      current = null;
-      viewer = null;
+      current = viewer = null;
       if (model.images.length && !arriving) open(model.images.at(-1));
     }
-    $("drop").hidden = Boolean(current);
-    $("another").hidden = !current;
-    $("work").hidden = !current;
+    byId("drop").hidden = Boolean(current);
+    byId("another").hidden = byId("work").hidden = !current;
     showImages();
     const runs = model.runs.filter((run) => run.image === current);
-    for (const run of runs) picture(run);
+    for (const run of runs) fetchPicture(run);
     const ids = new Set(model.runs.map((run) => run.id));
     for (const id of [...sources.keys(), ...cards.keys()]) if (!ids.has(id)) forget(id);
     if (viewer) showRuns(runs);
-    $("results").hidden = !runs.length;
+    byId("results").hidden = !runs.length;
     const running = model.runs.find((run) => run.state === "running");
     document.title = running ? `${Math.floor(100 * running.live.work)} % · warpsplat` : "warpsplat";
   }
 
+  const items = new Map(); // image -> element of the list
+
+  function imageItem(image) {
+    const thumb = node("img", { src: at("images", image.id), alt: image.name });
+    const pick = node("button", { className: "pick", title: image.name }, thumb);
+    pick.addEventListener("click", () => {
+      open(image);
+      show();
+    });
+    const title = `Remove ${image.name} and its results`;
+    const remove = node("button", { className: "drop-one", title, ariaLabel: title }, "×");
+    remove.addEventListener("click", attempt(() => ask("DELETE", at("images", image.id))));
+    return node("li", {}, pick, remove);
+  }
+
   function showImages() {
-    const list = $("images");
+    const list = byId("images");
     list.hidden = model.images.length < 2;
-    const ids = model.images.map((image) => image.id);
-    for (const item of [...list.children]) if (!ids.includes(item.dataset.id)) item.remove();
+    for (const id of [...items.keys()]) {
+      if (model.images.some((image) => image.id === id)) continue;
+      items.get(id).remove();
+      items.delete(id);
+    }
     for (const image of model.images) {
-      let item = [...list.children].find((each) => each.dataset.id === image.id);
-      if (!item) {
-        item = document.createElement("li");
-        item.dataset.id = image.id;
-        const pick = document.createElement("button");
-        pick.className = "pick";
-        pick.title = image.name;
-        const thumb = new Image();
-        thumb.src = at("images", image.id);
-        thumb.alt = image.name;
-        pick.append(thumb);
-        pick.addEventListener("click", () => {
-          open(image);
-          show();
-        });
-        const remove = document.createElement("button");
-        remove.className = "drop-one";
-        remove.textContent = "×";
-        remove.title = `Remove ${image.name} and its results`;
-        remove.setAttribute("aria-label", remove.title);
-        remove.addEventListener("click", attempt(() => ask("DELETE", at("images", image.id))));
-        item.append(pick, remove);
-        list.append(item);
-      }
-      item.firstChild.setAttribute("aria-current", String(image.id === current));
+      if (!items.has(image.id)) items.set(image.id, list.appendChild(imageItem(image)));
+      items.get(image.id).firstChild.setAttribute("aria-current", String(image.id === current));
     }
   }
 
   function showRuns(runs) {
     const names = new Set(["image", ...runs.map((run) => run.id)]);
-    for (const shown of new Set([...viewer.root.querySelectorAll("img")].map((image) => image.dataset.name))) {
-      if (!names.has(shown)) withdraw(shown);
-    }
+    for (const image of viewer.root.querySelectorAll("img")) if (!names.has(image.dataset.name)) withdraw(image.dataset.name);
     for (const run of runs) if (sources.has(run.id)) offer(run);
-    if (follow && sources.has(follow) && viewer.images(follow).length) {
+    if (follow && viewer.images(follow).length) {
       const wanted = follow;
       follow = null;
       viewer.show("right", wanted);
-      return; // which shows everything
+      return; // the event shows everything
     }
-    const shown = runs.map((run) => card(run));
-    const wanted = shown.toReversed?.() ?? [...shown].reverse(); // the latest first
-    if (wanted.some((element, place) => $("results").children[place] !== element) || $("results").children.length !== wanted.length) {
-      $("results").replaceChildren(...wanted);
+    const wanted = runs.map(card).reverse(); // the latest first
+    const there = byId("results").children;
+    if (there.length !== wanted.length || wanted.some((element, place) => there[place] !== element)) {
+      byId("results").replaceChildren(...wanted);
     }
   }
 
+  function newCard(run) {
+    const element = byId("run-template").content.firstElementChild.cloneNode(true);
+    element.addEventListener("click", (event) => act(run.id, event.target.closest("[data-do]")?.dataset.do));
+    element.querySelector("h3").textContent = name(run);
+    element.ariaLabel = name(run);
+    element.querySelector('[data-do="show"]').ariaLabel = `Show ${name(run)} under the slider`;
+    element.querySelector("progress").ariaLabel = `Progress of ${name(run)}`;
+    cards.set(run.id, element);
+    return element;
+  }
+
   function card(run) {
-    let element = cards.get(run.id);
-    if (!element) {
-      element = $("run-template").content.firstElementChild.cloneNode(true);
-      element.addEventListener("click", (event) => act(run.id, event.target.closest("[data-do]")?.dataset.do));
-      element.querySelector("h3").textContent = name(run);
-      element.setAttribute("aria-label", name(run));
-      element.querySelector('[data-do="show"]').setAttribute("aria-label", `Show ${name(run)} under the slider`);
-      cards.set(run.id, element);
-    }
+    const element = cards.get(run.id) ?? newCard(run);
     const part = (selector) => element.querySelector(selector);
     const url = sources.get(run.id)?.url;
     const thumb = part(".thumb img");
@@ -384,20 +362,17 @@
     part(".run-error").hidden = !run.error;
     part(".run-error").textContent = run.error;
     part(".state").textContent = isOver(run) ? "" : liveText(run);
-    const stop = part('[data-do="stop"]');
-    stop.textContent = run.state === "waiting" ? "Leave the queue" : "Stop here";
-    stop.disabled = Boolean(run.stopping);
-    const bar = part("progress");
-    if (run.state === "running" && run.live.work) bar.value = run.live.work;
-    else if (run.state === "waiting") bar.value = 0;
-    else bar.removeAttribute("value");
-    bar.setAttribute("aria-label", `Progress of ${name(run)}`);
+    part('[data-do="stop"]').textContent = run.state === "waiting" ? "Leave the queue" : "Stop here";
+    part('[data-do="stop"]').disabled = Boolean(run.stopping);
+    if (run.state === "running" && run.live.work) part("progress").value = run.live.work;
+    else if (run.state === "waiting") part("progress").value = 0;
+    else part("progress").removeAttribute("value");
     for (const side of ["left", "right"]) {
       part(`[data-do="${side}"]`).hidden = !url;
-      part(`[data-do="${side}"]`).setAttribute("aria-pressed", String(viewer.shown(side) === run.id));
+      part(`[data-do="${side}"]`).ariaPressed = String(viewer.shown(side) === run.id);
     }
     if (element.dataset.state !== run.state) {
-      if (element.dataset.state && isOver(run)) $("said").textContent = `${name(run)}: ${STATES[run.state]}`;
+      if (element.dataset.state && isOver(run)) byId("said").textContent = `${name(run)}: ${STATES[run.state]}`;
       element.dataset.state = run.state;
       if (hasFile(run)) finish(run, part);
     }
@@ -406,42 +381,34 @@
 
   function finish(run, part) {
     part(".figures").replaceChildren(...figures(run));
+    const { subject, why, reduced } = run.figures;
     const notes = [];
     if (run.state === "stopped") notes.push("Stopped: the best so far.");
-    if (run.figures.why && run.figures.subject !== "photo") notes.push(`Taken for a ${run.figures.subject}: ${run.figures.why}.`);
-    if (run.figures.reduced) notes.push(`${run.figures.reduced}.`);
+    if (why && subject !== "photo") notes.push(`Detected as ${subject}: ${why}.`);
+    if (reduced) notes.push(`${reduced}.`);
     part(".why").textContent = notes.join(" ");
     part(".why").hidden = !notes.length;
     const image = model.images.find((each) => each.id === run.image);
-    const link = part('[data-do="download"]');
-    link.href = `${at("runs", run.id, "result.svg")}?download`;
-    link.download = `${image.name.replace(/\.[^.]*$/, "")}.svg`;
+    part('[data-do="download"]').href = `${at("runs", run.id, "result.svg")}?download`;
+    part('[data-do="download"]').download = `${image.name.replace(/\.[^.]*$/, "")}.svg`;
     part('[data-do="copy"]').title = run.command;
   }
 
-  const act = attempt(async (id, what) => {
+  const act = attempt(async (id, action) => {
     const run = model.runs.find((each) => each.id === id);
-    if (!run || !what) return;
-    if (what === "stop") await ask("POST", at("runs", id, "stop"));
-    if (what === "remove") await ask("DELETE", at("runs", id));
-    if (what === "left" || what === "right") viewer.show(what, viewer.shown(what) === id ? "image" : id);
-    if (what === "show") {
+    if (!run || !action) return;
+    if (action === "stop") await ask("POST", at("runs", id, "stop"));
+    if (action === "remove") await ask("DELETE", at("runs", id));
+    if (action === "left" || action === "right") viewer.show(action, viewer.shown(action) === id ? "image" : id);
+    if (action === "show") {
       if (sources.has(id)) viewer.show("right", id);
-      $("stage").scrollIntoView({ block: "nearest", behavior: "smooth" });
+      byId("stage").scrollIntoView({ block: "nearest", behavior: "smooth" });
     }
-    if (what === "copy") await copy(run);
+    // Browsers allow it for pages of this machine, and for few others.
+    if (action === "copy") {
+      await warpsplat.copy(run.command, cards.get(id).querySelector('[data-do="copy"]'), () => complain(run.command));
+    }
   });
-
-  async function copy(run) {
-    const button = cards.get(run.id).querySelector('[data-do="copy"]');
-    try {
-      await navigator.clipboard.writeText(run.command);
-      button.textContent = "Copied";
-    } catch {
-      complain(run.command); // browsers let pages of this machine copy, and few others
-    }
-    setTimeout(() => (button.textContent = "Copy command"), 1500);
-  }
 
   if (session) listen();
   else ready().catch((error) => complain(error.message));

@@ -1,24 +1,24 @@
 "use strict";
-// Several versions of one image: each file is held once, as text, and shown and downloaded as a blob.
+// Versions of one image: each file is contained once, as text, and shown and downloaded as a blob.
 (() => {
-  const files = JSON.parse(document.getElementById("data").textContent);
-  const viewer = document.getElementById("viewer").viewer;
-  for (const [name, svg] of Object.entries(files)) {
+  const { viewer } = warpsplat.byId("viewer");
+  for (const [name, svg] of Object.entries(warpsplat.data())) {
     const url = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
     viewer.set(name, url);
-    for (const image of document.querySelectorAll(".version img")) if (image.dataset.name === name) image.src = url;
-    for (const link of document.querySelectorAll("a[download]")) if (link.dataset.name === name) link.href = url;
+    const card = document.querySelector(`.version[data-key="${name}"]`);
+    card.querySelector("img").src = url;
+    card.querySelector("a[download]").href = url;
   }
 
   const buttons = [...document.querySelectorAll(".version button[data-side]")];
+  const keyOf = (button) => button.closest(".version").dataset.key;
   const mark = () => {
     for (const button of buttons) {
-      const key = button.closest(".version").dataset.key;
-      button.setAttribute("aria-pressed", String(viewer.shown(button.dataset.side) === key));
+      button.setAttribute("aria-pressed", String(viewer.shown(button.dataset.side) === keyOf(button)));
     }
   };
   for (const button of buttons) {
-    button.addEventListener("click", () => viewer.show(button.dataset.side, button.closest(".version").dataset.key));
+    button.addEventListener("click", () => viewer.show(button.dataset.side, keyOf(button)));
   }
   viewer.addEventListener("show", mark);
   mark();

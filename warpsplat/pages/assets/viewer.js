@@ -1,13 +1,13 @@
 "use strict";
-// Two pictures of one size under a slider, zoomed and panned together; see templates/viewer.html.j2.
+// Two pictures of one size under a slider, zoomed and panned together (templates/viewer.html.j2).
 (() => {
-  const MOST = 64; // times 1:1
-  const STEP = 1.25; // of a key or a button
-  const MAGNIFIED = 3; // from here on pixels are shown as squares
+  const MOST = 64; // largest magnification
+  const STEP = 1.25; // factor of a key or a button
+  const MAGNIFIED = 3; // from this magnification on pixels are shown as squares
 
   class Viewer extends EventTarget {
-    // Sends "view" when zoom or place change, "point" ({detail: {x, y, target}}) when the pointer moves without a
-    // button, "tap" (the same) when it is pressed and let go in one place.
+    // Events: "view" when zoom or position change; "point" (detail: {x, y, target}) when the pointer moves without a
+    // button; "tap" (the same) when it is pressed and released in one place; "leave"; "show" (detail: {side, name}).
 
     constructor(root) {
       super();
@@ -20,13 +20,13 @@
       this.split = 50; // percent of the stage
       this.fitted = true;
       this.k = 1;
-      this.x = this.y = 0; // of the picture's corner in the stage [px]
+      this.x = this.y = 0; // corner of the picture in the stage [px]
       this.pointers = new Map();
       for (const plane of root.querySelectorAll(".viewer-plane")) {
         plane.style.width = `${this.width}px`;
         plane.style.height = `${this.height}px`;
       }
-      // Each picture is in the file once.
+      // The template gives only the left side its pictures, to have each in the file once.
       for (const image of root.querySelectorAll('.viewer-side[data-side="left"] img[src]')) {
         this.set(image.dataset.name, image.src);
       }
@@ -121,7 +121,7 @@
       this.place();
     }
 
-    // Magnify to k, the point (x, y) of the stage staying where it is; without one, its middle.
+    // Magnify to k around the point (x, y) of the stage, by default its middle.
     zoomTo(k, x = this.box.width / 2, y = this.box.height / 2) {
       const least = Math.min(this.least, 1);
       const to = Math.min(Math.max(MOST, this.least), Math.max(least, k));
@@ -132,7 +132,7 @@
       this.place();
     }
 
-    // Bring a rectangle of the picture [px] into view, magnified where it is small.
+    // Bring a rectangle of the picture [px] into view, magnified if it is small.
     focus(x, y, width, height) {
       const box = this.box;
       const room = Math.min((0.5 * box.width) / width, (0.5 * box.height) / height);
@@ -198,7 +198,7 @@
     listenToPointers() {
       const { stage, pointers } = this;
       let begun = null;
-      const told = (name, event) => {
+      const send = (name, event) => {
         const box = stage.getBoundingClientRect();
         const x = (event.clientX - box.left - this.x) / this.k;
         const y = (event.clientY - box.top - this.y) / this.k;
@@ -213,7 +213,7 @@
       stage.addEventListener("pointermove", (event) => {
         const before = pointers.get(event.pointerId);
         if (!before) {
-          if (event.pointerType !== "touch") told("point", event);
+          if (event.pointerType !== "touch") send("point", event);
           return;
         }
         const far = begun ? Math.hypot(event.clientX - begun.x, event.clientY - begun.y) > 4 : true;
@@ -229,7 +229,7 @@
       });
       const end = (event) => {
         if (!pointers.delete(event.pointerId)) return;
-        if (begun && event.type === "pointerup") told("tap", event);
+        if (begun && event.type === "pointerup") send("tap", event);
         begun = null;
         if (!pointers.size) stage.classList.remove("moving");
       };

@@ -1,4 +1,4 @@
-"""A page that compares several versions of one image: those of ``--curves 50,200,1000``."""
+"""A page that compares several versions of one image, made by ``--curves 50,200,1000``."""
 
 from __future__ import annotations
 
@@ -9,156 +9,171 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.errors import printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.pages import page
 from warpsplat.pages.plot import Mark, Plot, plot
-from warpsplat.pages.reports.knee import knee
-from warpsplat.pages.reports.pictures import ROOM, ROOM_SHARE, encoded, shown_image
+from warpsplat.pages.reports.pictures import capacity_of, encoded, shown_image
 from warpsplat.pages.reports.single import Facts, headline, notes
 from warpsplat.run.result import Result
 from warpsplat.svg.page import picture_view, with_view
 
-ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "copy.js", "several.js")
+ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "several.js")
 
-FIGURES = ("PSNR", "SSIM", "SSIMULACRA2", "Size", "Shapes", "Time")
-"""Of a version, that its card shows."""
+Floats = npt.NDArray[np.float64]
+
+LEAST_HEIGHT = 1e-6
+"""Least height of a knee above the chord, as a share of the whole gain: less is rounding."""
 
 
 @dataclass(frozen=True)
 class Version:
-    """A result and the name that its file is downloaded as."""
+    """A result and the file name of its download."""
 
     result: Result
     file: str
 
     @property
     def shapes(self) -> int:
-        """That it has."""
+        """Number of shapes."""
         return int(self.result.as_dict()["shapes"])
 
     @property
-    def is_measured(self) -> bool:
-        """Whether it has decibels: neither those of an exact file nor none."""
-        return self.result.score is not None and math.isfinite(self.result.score.psnr)
+    def bytes(self) -> int:
+        """Size of the file."""
+        return len(self.result.svg.encode())
+
+    @property
+    def psnr(self) -> float:
+        """Its PSNR [dB]; infinite if the file is exact, NaN if it was not measured."""
+        return self.result.score.psnr if self.result.score else math.nan
 
 
-def several_page(results: Sequence[Version], image: ImageSource, *, name: str, command: str = "") -> str:
-    """The page.
+def versions_of(results: Sequence[Result], svg_name: str) -> list[Version]:
+    """Return results, ascending by their shapes, with the number of shapes inserted into ``svg_name``."""
+    stem = Path(svg_name).stem
+    versions = [Version(result, f"{stem}-{result.as_dict()['shapes']}.svg") for result in results]
+    return sorted(versions, key=lambda version: version.shapes)
+
+
+def several_page(versions: Sequence[Version], image: ImageSource, *, name: str, command: str = "") -> str:
+    """Return the page.
 
     Args:
-        results: of the image, ascending by their shapes.
-        image: what they show.
-        name: of the image, for people.
-        command: that makes them again.
+        versions: versions of the image, ascending by their shapes.
+        image: the image that they show.
+        name: name of the image, for people.
+        command: command that makes them again.
 
     Raises:
         ImageError: the image cannot be read.
-        TypeError: an image of no known form.
+        TypeError: the image has an unknown form.
     """
     image = held(image)
     shown = shown_image(image, name)
-    height, width = shown.pixels.shape[:2]
-    room = ROOM + ROOM_SHARE * len(image) if isinstance(image, bytes) else math.inf
-    at = knee_of(results)
-    versions = [_card(version, number, is_knee=number == at) for number, version in enumerate(results)]
+    at = knee_of(versions)
+    cards = [
+        {
+            "key": f"version-{number}",
+            "label": f"{version.shapes:,} shapes".replace(",", "\N{THIN SPACE}"),
+            "file": printable(version.file),
+            "knee": number == at,
+            "figures": [one for one in headline(version.result.as_dict()) if one[0] != "Shapes"],
+        }
+        for number, version in enumerate(versions)
+    ]
+    original = encoded(shown.pixels, capacity_of(image))
     pictures: list[dict[str, Any]] = [
-        {"name": "image", "label": "Original", "url": encoded(shown.pixels, room), "pixels": True}
+        {"name": "image", "label": "Original", "url": original, "pixels": True},
+        *({"name": card["key"], "label": card["label"], "url": "", "pixels": False} for card in cards),
     ]
-    pictures += [
-        {"name": card["key"], "label": card["label"], "url": "", "pixels": False} for card in versions
-    ]
-    sentences = [note for version in results for note in notes(Facts.of(version.result))]
+    sentences = [note for version in versions for note in notes(Facts.of(version.result))]
     return page(
         "several.html.j2",
         assets=ASSETS,
         name=printable(name),
-        versions=versions,
+        versions=cards,
         pictures=pictures,
         width=shown.width,
         height=shown.height,
-        reduced=f"{width}×{height}" if shown.is_reduced else "",
-        transparent=shown.pixels.shape[2] == 4,
+        reduced=shown.reduced_size,
+        transparent=shown.is_transparent,
         notes=list(dict.fromkeys(sentences)),
-        plots=[one for one in plots(results, at) if one],
-        knee=_words(results, at),
+        plots=plots(versions, at),
+        knee=_explanation(versions, at),
         command=command,
         data={
-            card["key"]: _shown(version.result.svg, shown.width, shown.height)
-            for card, version in zip(versions, results, strict=True)
+            f"version-{number}": _shown(version.result.svg, shown.width, shown.height)
+            for number, version in enumerate(versions)
         },
     )
 
 
-def knee_of(results: Sequence[Version]) -> int | None:
-    """The version at the knee of quality against bytes; None where there is none."""
-    if not all(version.is_measured for version in results):
-        return None
-    sizes = np.array([len(version.result.svg.encode()) for version in results], np.float64)
-    if (np.diff(sizes) <= 0).any():
-        return None
-    return knee(sizes, np.array([_psnr(version) for version in results]))
-
-
-def _psnr(version: Version) -> float:
-    assert version.result.score
-    return version.result.score.psnr
-
-
-def _card(version: Version, number: int, *, is_knee: bool) -> dict[str, Any]:
-    return {
-        "key": f"version-{number}",
-        "label": f"{version.shapes:,} shapes".replace(",", "\N{THIN SPACE}"),
-        "file": printable(version.file),
-        "knee": is_knee,
-        "figures": [one for one in headline(version.result.as_dict()) if one[0] != "Shapes"],
-    }
-
-
 def _shown(svg: str, width: int, height: int) -> str:
-    """A file as it is shown and downloaded; one on a sheet as its picture alone."""
+    """Return a file as it is shown and downloaded; one on a sheet as its picture alone."""
     view = picture_view(svg, width, height)
     return svg if view is None else with_view(svg, view, width, height)
 
 
-def plots(results: Sequence[Version], at: int | None) -> list[Plot | None]:
-    """Decibels against shapes and against bytes, with the knee marked."""
-    if len(results) < 2 or not all(version.is_measured for version in results):
-        return []
-    decibels = [_psnr(version) for version in results]
-    kilobytes = [len(version.result.svg.encode()) / 1000 for version in results]
+def knee(cost: Floats, gain: Floats) -> int | None:
+    """Return the knee of a curve that rises ever more slowly (Satopää et al. 2011).
 
-    def drawn(title: str, across: list[float], label: str) -> Plot | None:
+    It is the point farthest above the chord from the first to the last point, where the curve is as steep as
+    on average: before it a unit of cost buys more, after it less.
+
+    Args:
+        cost: ascending, shape (point,).
+        gain: at these costs, in any unit, shape (point,).
+
+    Returns:
+        its index; None if no point lies above the chord.
+    """
+    if len(cost) < 3 or gain[-1] <= gain[0]:
+        return None
+    across = (cost - cost[0]) / (cost[-1] - cost[0])
+    above = (gain - gain[0]) / (gain[-1] - gain[0]) - across
+    best = int(above.argmax())
+    return best if above[best] > LEAST_HEIGHT and 0 < best < len(cost) - 1 else None
+
+
+def knee_of(versions: Sequence[Version]) -> int | None:
+    """Return the version at the knee of PSNR against bytes; None if there is none."""
+    sizes = np.array([version.bytes for version in versions], np.float64)
+    decibels = np.array([version.psnr for version in versions])
+    if not np.isfinite(decibels).all() or (np.diff(sizes) <= 0).any():
+        return None
+    return knee(sizes, decibels)
+
+
+def plots(versions: Sequence[Version], at: int | None) -> list[Plot]:
+    """Return plots of the PSNR against shapes and against bytes, with the version ``at`` the knee marked."""
+    decibels = [version.psnr for version in versions]
+    if not all(map(math.isfinite, decibels)):
+        return []
+    found = []
+    for title, label, across in (
+        ("PSNR by shapes", "shapes", [float(version.shapes) for version in versions]),
+        ("PSNR by size", "size [kB]", [version.bytes / 1000 for version in versions]),
+    ):
         marks = [
             Mark(x, y, f"{version.shapes}", strong=number == at)
-            for number, (x, y, version) in enumerate(zip(across, decibels, results, strict=True))
+            for number, (x, y, version) in enumerate(zip(across, decibels, versions, strict=True))
         ]
-        return plot(title, across, decibels, (label, "PSNR [dB]"), marks=marks)
-
-    return [
-        drawn("PSNR by shapes", [float(version.shapes) for version in results], "shapes"),
-        drawn("PSNR by size", kilobytes, "size [kB]"),
-    ]
+        found.append(plot(title, across, decibels, (label, "PSNR [dB]"), marks=marks))
+    return [one for one in found if one]
 
 
-def _words(results: Sequence[Version], at: int | None) -> str:
-    """What the knee is; empty where there is none."""
+def _explanation(versions: Sequence[Version], at: int | None) -> str:
+    """Return a sentence on the knee; empty if there is none."""
     if at is None:
         return ""
-    before, here, after = results[at - 1], results[at], results[at + 1]
-
-    def bought(one: Version, two: Version) -> float:
-        return 1000 * (_psnr(two) - _psnr(one)) / (len(two.result.svg) - len(one.result.svg))
-
-    return (
-        f"Of these, {here.shapes} shapes are at the knee: up to there a kB buys "
-        f"{bought(before, here):.2g} dB, beyond it {bought(here, after):.2g} dB."
+    before, here, after = versions[at - 1 : at + 2]
+    bought, next_bought = (
+        1000 * (two.psnr - one.psnr) / (two.bytes - one.bytes) for one, two in ((before, here), (here, after))
     )
-
-
-def versions_of(results: Sequence[Result], svg_name: str) -> list[Version]:
-    """Results, ascending by their shapes, that are downloaded as ``svg_name`` with these numbers in it."""
-    stem = Path(svg_name).stem
-    made = [Version(result, f"{stem}-{result.as_dict()['shapes']}.svg") for result in results]
-    return sorted(made, key=lambda version: version.shapes)
+    return (
+        f"Of these, {here.shapes} shapes are at the knee: up to there a kB buys {bought:.2g} dB, "
+        f"beyond it {next_bought:.2g} dB."
+    )

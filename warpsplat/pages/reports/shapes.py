@@ -1,9 +1,9 @@
-"""The shapes of a file as a report lists them, with the decibels that each is worth."""
+"""The shapes of a file as a report lists them, with their contributions."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,75 +20,58 @@ from warpsplat.svg.numbers import hex_colors
 from warpsplat.svg.read_kept import KeptScene
 
 ROUNDING = 1 / (12 * 255**2)
-"""Mean squared error that 8 bits have anyway: a file that shows an image exactly has no decibels."""
+"""Mean squared error of rounding to 8 bits: an exact file has a finite PSNR by it."""
 
 MOST_LAYERS = 24
-"""More named groups than these are no layers to choose from."""
+"""Most named groups that are offered as layers."""
 
 PARTS = 4
-"""Layers of a file that names none: its shapes in painter's order, in so many parts."""
+"""Layers of a file without names: parts of its shapes in painter's order."""
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
-@dataclass(frozen=True)
-class Listing:
-    """Shapes, back to front, as lists of equal length; and their layers, back to front."""
-
-    elements: list[int | None]
-    """Which element of the document draws each, counted from 0, the root; None: no single one."""
-    kinds: list[str]
-    colors: list[list[str]]
-    """For style sheets: one, or the first and last of a gradient; none of what is kept as it is."""
-    opacities: list[float]
-    layers: list[int]
-    worth: list[float | None]
-    """PSNR that goes with the shape [dB]; None: not known."""
-    names: list[str]
-    """Of the layers."""
-    background: int | None
-    """The element that is the background."""
-
-    def data(self) -> dict[str, Any]:
-        """For the page's script."""
-        return vars(self)
-
-
-def listing(base: KeptScene, worth: list[float | None] | None) -> Listing:
-    """What there is to list of a file that was read.
+def listing(base: KeptScene, contributions: list[float | None] | None) -> dict[str, Any]:
+    """Return the shapes of a file for the page's script, as lists with an entry for each, back to front.
 
     Args:
-        base: what was read.
-        worth: see ``decibels``; None: not known.
+        base: the file.
+        contributions: see ``contributions``; None: unknown.
+
+    Returns:
+        ``elements`` (the number of the element in the document, the root being 0; None: no single one),
+        ``kinds``, ``colors`` (for style sheets: one, the first and last of a gradient, or none),
+        ``opacities``, ``contributions`` and ``layers``; also ``names`` of the layers, back to front, and
+        ``background``, the number of its element or None.
     """
     scene = base.scene
     layers, names = _layers(base)
-    return Listing(
-        elements=list(base.elements),
-        kinds=[_kind(scene, i) for i in range(len(scene))],
-        colors=_colors(scene),
-        opacities=[round(float(value), 2) for value in scene.opacities],
-        layers=layers,
-        worth=worth or [None] * len(scene),
-        names=names,
-        background=base.background_element,
-    )
+    return {
+        "elements": list(base.elements),
+        "kinds": [_kind(scene, i) for i in range(len(scene))],
+        "colors": _colors(scene),
+        "opacities": [round(float(value), 2) for value in scene.opacities],
+        "layers": layers,
+        "contributions": contributions or [None] * len(scene),
+        "names": names,
+        "background": base.background_element,
+    }
 
 
-def decibels(scene: Scene, target: FloatArray, backend: Backend) -> list[float | None] | None:
-    """What each shape is worth: by how much the PSNR falls without it, the others staying as they are.
+def contributions(scene: Scene, target: FloatArray, backend: Backend) -> list[float | None] | None:
+    """Return by how much the PSNR falls without each shape, the others staying as they are.
 
     Args:
         scene: shapes on a canvas of the target's size.
-        target: sRGB in [0, 1], shape (height, width, 3); of a transparent canvas premultiplied with opacity.
+        target: sRGB in [0, 1], shape (height, width, 3), or premultiplied, shape (height, width, 4).
         backend: where to compute.
 
     Returns:
-        decibels, None for pictures that are kept; None where there is no room to compute them.
+        decibels, None for pictures that are kept; None if there is not enough memory.
     """
     height, width = target.shape[:2]
     viewport = Viewport(width, height, 1.0)
-    # What lies behind an opaque shape is found by what light that lets through.
+    # What lies behind a shape is computed from the light that it transmits, which must not be zero.
     scene = replace(
         scene,
         opacities=np.minimum(scene.opacities, OPACITY_RANGE[1]),
@@ -109,7 +92,7 @@ def decibels(scene: Scene, target: FloatArray, backend: Backend) -> list[float |
 
 
 def _squared_error(difference: FloatArray) -> float:
-    """Mean over pixels and colours; with opacity, of that on black and that on white."""
+    """Return the mean over pixels and colours; with opacity, the mean of the errors on black and on white."""
     color = difference[..., :3].astype(np.float64)
     if difference.shape[2] == 3:
         return float(np.mean(color**2))
@@ -117,7 +100,7 @@ def _squared_error(difference: FloatArray) -> float:
 
 
 def matched(base: KeptScene, target: FloatArray) -> tuple[KeptScene, FloatArray]:
-    """A file and an image on one canvas: a background that the file has lies behind the image as well."""
+    """Return a file and an image on one canvas: the background of the file lies behind the image as well."""
     canvas = base.scene.canvas
     if target.shape[2] == 4 and base.has_background:
         assert canvas.background is not None
@@ -146,7 +129,7 @@ def _colors(scene: Scene) -> list[list[str]]:
 
 
 def _layers(base: KeptScene) -> tuple[list[int], list[str]]:
-    """The layer of each shape, and their names: groups with names, or else parts in painter's order."""
+    """Return the layer of each shape, and the names: those of groups, or parts in painter's order."""
     count = len(base.scene)
     if base.document is not None:
         named = _named_groups(base.document, base.elements)
@@ -166,7 +149,7 @@ def _layers(base: KeptScene) -> tuple[list[int], list[str]]:
 
 
 def _named_groups(document: Document, numbers: tuple[int | None, ...]) -> list[str]:
-    """The outermost group with a name that the element of each shape is in."""
+    """Return the name of the outermost named group around each shape."""
     elements = list(document.root.iter())
 
     def name_of_layer(element: Element) -> str:
@@ -176,6 +159,6 @@ def _named_groups(document: Document, numbers: tuple[int | None, ...]) -> list[s
             found = (
                 element.get(LABEL) or element.get("id") or found if element is not document.root else found
             )
-        return found or "without a name"
+        return found or "unnamed"
 
     return ["kept" if number is None else name_of_layer(elements[number]) for number in numbers]

@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from warpsplat.errors import ImageError, printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.progress import Progress
 from warpsplat.pages import page
-from warpsplat.pages.embed import image_uri
 from warpsplat.pages.plot import Plot, plot
 from warpsplat.pages.reports.pictures import (
     MOST_ERROR,
     PAGE_PIXELS,
-    ROOM,
-    ROOM_SHARE,
     SHORT_PIXELS,
-    Shown,
+    ShownImage,
+    capacity_of,
     encoded,
     encoded_map,
     error_map,
@@ -27,43 +25,55 @@ from warpsplat.pages.reports.pictures import (
     shown_image,
     thumbnails,
 )
-from warpsplat.pages.reports.shapes import decibels, listing, matched
+from warpsplat.pages.reports.shapes import contributions, listing, matched
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
 from warpsplat.svg.page import picture_view, with_view
 from warpsplat.svg.read_kept import load_kept
 from warpsplat.svg.strips import draw
 
-ASSETS = ("viewer.css", "report.css", "viewer.js", "copy.js", "report.js")
+ASSETS = ("viewer.css", "report.css", "viewer.js", "report.js")
+
+EXACT = "exact"
+"""Text for a PSNR that is not finite."""
+
+SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing", "pixel": "pixel art"}
+
+FIGURES = (
+    ("PSNR", "psnr", ".2f", ".2f", "dB"),
+    ("SSIM", "ssim", ".3f", ".4f", ""),
+    ("MS-SSIM", "ms_ssim", "", ".4f", ""),
+    ("SSIMULACRA2", "ssimulacra2", ".1f", ".2f", ""),
+    ("Size", "bytes", ".1f", ".1f", "kB"),
+    ("Size, gzipped", "gzip_bytes", "", ".1f", "kB"),
+    ("Shapes", "shapes", ",d", ",d", ""),
+    ("Paths", "paths", "", ",d", ""),
+    ("Nodes", "nodes", "", ",d", ""),
+    ("Steps", "iterations", "", ",d", ""),
+    ("Time", "seconds", ".1f", ".1f", "s"),
+)
+"""Name, key, format in the headline (empty: not there), format in the table, unit."""
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of a result besides the file itself."""
+    """Facts about a result besides the file itself."""
 
     figures: Mapping[str, Any] = field(default_factory=dict)
-    """As ``Result.as_dict`` or ``Score.as_dict`` has them; what is missing is not shown."""
+    """As ``Result.as_dict`` or ``Score.as_dict``; missing ones are not shown."""
     history: Sequence[Progress] = ()
-    """Of the training."""
+    """Progress of the training."""
     command: str = ""
-    """That makes the file again; empty: nothing is said."""
+    """Command that makes the file again; empty: unknown."""
     before: float | None = None
-    """Of a refined SVG, its own PSNR [dB]."""
+    """PSNR of the SVG before it was refined [dB]."""
     kept: str = ""
-    """Of a refined SVG, what was kept as it is."""
+    """Elements of a refined SVG that were kept."""
 
     @staticmethod
     def of(result: Result, command: str = "") -> Facts:
-        """Of what a run made."""
+        """Return the facts of a run."""
         return Facts(result.as_dict(), result.history, command, result.before, result.kept)
-
-
-class Report(NamedTuple):
-    """A page, and what lists show of it."""
-
-    text: str
-    thumbnail: str
-    """The image and the file side by side, as a data URI; empty without an index."""
 
 
 def report_page(
@@ -76,187 +86,150 @@ def report_page(
     svg_name: str,
     own: bool = False,
     back: str = "",
-) -> Report:
-    """The page.
+) -> str:
+    """Return the page.
 
     Args:
         svg: the file's text, ours or not.
-        image: what it shows.
-        backend: where to compute what each shape is worth.
-        facts: what is known of it besides.
-        name: of the image, for people.
-        svg_name: that the file is downloaded as.
+        image: the image that it shows.
+        backend: where to compute the contributions of shapes.
+        facts: further facts.
+        name: name of the image, for people.
+        svg_name: file name of the download.
         own: whether this program wrote the text just now.
-        back: where a link to an index leads; empty: there is none.
+        back: link to an index, with a thumbnail for it; empty: there is none.
 
     Raises:
         ImageError: the image cannot be read, or the SVG cannot be drawn at its size.
-        TypeError: an image of no known form.
+        TypeError: the image has an unknown form.
     """
     image = held(image)
     shown = shown_image(image, name, SHORT_PIXELS if facts.figures.get("reduced") else PAGE_PIXELS)
     height, width = shown.pixels.shape[:2]
     view = picture_view(svg, shown.width, shown.height)
     drawn = svg if view is None else with_view(svg, view, shown.width, shown.height)
-    own = own and view is None
     base, target, why_not = None, shown.pixels, ""
     try:
         base, target = matched(load_kept(drawn, width, height, svg_name), shown.pixels)
     except ImageError as error:
         why_not = str(error).removeprefix(f"{svg_name}: ")
-    room = ROOM + ROOM_SHARE * len(image) if isinstance(image, bytes) else math.inf
-    pixels = draw(drawn, width, height, own=own and not shown.is_reduced)
-    differs = encoded_map(error_map(pixels, target), room / 3)
-    listed = None if base is None else listing(base, decibels(base.scene, target, backend))
-    # Base64 takes four bytes for three.
-    left = room - len(differs) * 3 / 4
-    picture = encoded(shown.pixels, left)
-    thumbnail = image_uri(thumbnails(shown.pixels, pixels)) if back else ""
-    text = page(
+    pixels = draw(drawn, width, height, own=own and view is None and not shown.reduced_size)
+    listed = None if base is None else listing(base, contributions(base.scene, target, backend))
+    count = len(listed["kinds"]) if listed else 0
+    return page(
         "report.html.j2",
         assets=ASSETS,
         name=printable(name),
         svg_name=printable(svg_name),
         back=back,
-        thumbnail=thumbnail,
-        pictures=[
-            {"name": "image", "label": "Original", "url": picture, "pixels": True},
-            {"name": "svg", "label": "SVG", "url": "", "pixels": False},
-            {"name": "error", "label": "Error map", "url": differs, "pixels": True},
-        ],
+        thumbnail=thumbnails(shown.pixels, pixels) if back else "",
+        pictures=_pictures(shown, error_map(pixels, target), capacity_of(image)),
         width=shown.width,
         height=shown.height,
-        reduced=f"{width}×{height}" if shown.is_reduced else "",
+        reduced=shown.reduced_size,
         transparent=target.shape[2] == 4,
         scale={"colors": map_colors(), "most": f"{MOST_ERROR:g}"},
-        heads=headline(facts.figures),
-        rows=table(facts, shown),
+        headline=headline(facts.figures),
+        rows=table(facts, shown) + levels(facts.figures),
         notes=notes(facts),
-        plots=[one for one in plots(facts.history) if one],
+        plots=plots(facts.history),
         reduced_part=any(not progress.fine for progress in facts.history),
         command=facts.command,
-        levels=levels(facts.figures),
         listed=listed is not None,
-        joined=listed is not None and facts.figures.get("shapes") not in (None, len(listed.kinds)),
+        joined=listed is not None and facts.figures.get("shapes") not in (None, count),
         why_not=why_not,
-        data={"svg": svg, "view": view, "listing": listed.data() if listed else None, "name": svg_name},
+        data={"svg": svg, "view": view, "listing": listed, "name": svg_name},
     )
-    return Report(text, thumbnail)
+
+
+def _pictures(shown: ShownImage, errors: Any, capacity: float) -> list[dict[str, Any]]:
+    """Return the pictures under the slider."""
+    differences = encoded_map(errors, capacity / 3)
+    original = encoded(shown.pixels, capacity - len(differences) * 3 / 4)  # base64 takes four bytes for three
+    return [
+        {"name": "image", "label": "Original", "url": original, "pixels": True},
+        {"name": "svg", "label": "SVG", "url": "", "pixels": False},
+        {"name": "error", "label": "Error map", "url": differences, "pixels": True},
+    ]
 
 
 def headline(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """The figures that count most: name, value, unit."""
+    """Return the most important figures: name, value, unit."""
     found = [
-        ("PSNR", _psnr(figures), "dB"),
-        ("SSIM", _number(figures, "ssim", ".3f"), ""),
-        ("SSIMULACRA2", _number(figures, "ssimulacra2", ".1f"), ""),
-        ("Size", _kilobytes(figures, "bytes"), "kB"),
-        ("Shapes", _number(figures, "shapes", ",d"), ""),
-        ("Time", _number(figures, "seconds", ".1f"), "s"),
+        (name, value, unit)
+        for name, key, form, _, unit in FIGURES
+        if form and (value := _value(figures, key, form)) is not None
     ]
-    return [(name, value, "" if value == EXACT else unit) for name, value, unit in found if value is not None]
+    return [(name, value, "" if value == EXACT else unit) for name, value, unit in found]
 
 
-EXACT = "exact"
-"""In place of decibels that are not finite."""
-
-
-def _psnr(figures: Mapping[str, Any]) -> str | None:
-    if figures.get("psnr") is None:
-        return EXACT if figures.get("ssim") == 1 else None
-    return _number(figures, "psnr", ".2f")
-
-
-def _number(figures: Mapping[str, Any], name: str, form: str) -> str | None:
-    value = figures.get(name) if isinstance(figures, Mapping) else None
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return None
-    value = int(value) if form == ",d" else value
-    return format(value, form).replace(",", "\N{THIN SPACE}").replace("-", "\N{MINUS SIGN}")
-
-
-def _kilobytes(figures: Mapping[str, Any], name: str) -> str | None:
-    count = figures.get(name)
-    return f"{count / 1000:.1f}" if isinstance(count, (int, float)) else None
-
-
-def table(facts: Facts, shown: Shown) -> list[tuple[str, str]]:
-    """All figures: name, and value with its unit."""
+def table(facts: Facts, shown: ShownImage) -> list[tuple[str, str]]:
+    """Return all figures: name, and value with its unit."""
     figures = facts.figures
-    rows: list[tuple[str, str | None, str]] = [
-        ("Image", f"{shown.width} × {shown.height}", "px"),
-        ("Subject", _subject(figures), ""),
-        ("PSNR", _psnr(figures), "dB"),
-        ("PSNR before", None if facts.before is None else f"{facts.before:.2f}", "dB"),
-        ("SSIM", _number(figures, "ssim", ".4f"), ""),
-        ("MS-SSIM", _number(figures, "ms_ssim", ".4f"), ""),
-        ("SSIMULACRA2", _number(figures, "ssimulacra2", ".2f"), ""),
-        ("Size", _kilobytes(figures, "bytes"), "kB"),
-        ("Size, gzipped", _kilobytes(figures, "gzip_bytes"), "kB"),
-        ("Shapes", _number(figures, "shapes", ",d"), ""),
-        ("Paths", _number(figures, "paths", ",d"), ""),
-        ("Nodes", _number(figures, "nodes", ",d"), ""),
-        ("Steps", _number(figures, "iterations", ",d") if figures.get("iterations") else None, ""),
-        ("Time", _number(figures, "seconds", ".1f"), "s"),
-    ]
+    rows = [("Image", f"{shown.width} × {shown.height}", "px")]
+    if (subject := figures.get("subject")) is not None:
+        subject = SUBJECTS.get(str(subject), str(subject))
+        rows.append(("Subject", f"{subject}: {figures['why']}" if figures.get("why") else subject, ""))
+    for name, key, _, form, unit in FIGURES:
+        if (value := _value(figures, key, form)) is not None and (key != "iterations" or figures[key]):
+            rows.append((name, value, unit))
+        if key == "psnr" and facts.before is not None:
+            rows.append(("PSNR before", f"{facts.before:.2f}", "dB"))
     return [
         (name, value if value == EXACT or not unit else f"{value}\N{NO-BREAK SPACE}{unit}")
         for name, value, unit in rows
-        if value is not None
     ]
 
 
-SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing", "pixel": "pixel art"}
-
-
-def _subject(figures: Mapping[str, Any]) -> str | None:
-    subject = figures.get("subject")
-    if subject is None:
+def _value(figures: object, key: str, form: str) -> str | None:
+    """Return a figure as text; None if it is missing. A manifest may contain anything."""
+    value = figures.get(key) if isinstance(figures, Mapping) else None
+    if key == "psnr" and value is None and isinstance(figures, Mapping) and figures.get("ssim") == 1:
+        return EXACT
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return None
-    name = SUBJECTS.get(str(subject), str(subject))
-    return f"{name}: {figures['why']}" if figures.get("why") else name
+    value = int(value) if form == ",d" else value / 1000 if key.endswith("bytes") else value
+    return format(value, form).replace(",", "\N{THIN SPACE}").replace("-", "\N{MINUS SIGN}")
 
 
 def notes(facts: Facts) -> list[str]:
-    """What is to be known of the run, each as a sentence."""
+    """Return remarks on the run, each as a sentence."""
     figures = facts.figures
     found = []
     if figures.get("stopped"):
         found.append(
-            f"The run was stopped after {figures.get('iterations', 0)} steps: this is what there was."
+            f"The run was stopped after {figures.get('iterations', 0)} steps: this is the result so far."
         )
     if figures.get("reduced"):
         found.append(f"{figures['reduced']}.")
     if figures.get("renewed"):
-        found.append(f"Numbers of shapes were not finite, {figures['renewed']} times; these began anew.")
+        found.append(f"{figures['renewed']} times shapes had numbers that were not finite, and were reset.")
     if facts.kept:
-        found.append(f"Kept as it is: {facts.kept}.")
+        found.append(f"Kept unchanged: {facts.kept}.")
     missed = figures.get("missed")
     found += [f"Goal missed: {goal}." for goal in (missed if isinstance(missed, (list, tuple)) else ())]
     return found
 
 
 def levels(figures: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Name and figure of each level's picture."""
+    """Return the name and PSNR of each level's picture."""
     given = figures.get("levels")
     found = []
     for level in given if isinstance(given, (list, tuple)) else ():
-        count, value = _number(level, "shapes", ",d"), _number(level, "psnr", ".2f")
+        count, psnr = _value(level, "shapes", ",d"), _value(level, "psnr", ".2f")
         if count is not None:
-            found.append(
-                (f"The first {count} shapes", EXACT if value is None else f"{value}\N{NO-BREAK SPACE}dB")
-            )
+            psnr = EXACT if psnr is None else f"{psnr}\N{NO-BREAK SPACE}dB"
+            found.append((f"The first {count} shapes", psnr))
     return found
 
 
-def plots(history: Sequence[Progress]) -> list[Plot | None]:
-    """PSNR and the number of shapes over time."""
+def plots(history: Sequence[Progress]) -> list[Plot]:
+    """Return plots of the PSNR and the number of shapes over time, if they change."""
     seconds = [progress.seconds for progress in history]
-    faint = [not progress.fine for progress in history]
+    psnr = [progress.psnr for progress in history]
     shapes = [float(progress.shapes) for progress in history]
-    return [
-        plot("PSNR", seconds, [p.psnr for p in history], ("time [s]", "PSNR [dB]"), faint=faint),
-        plot("Shapes", seconds, shapes, ("time [s]", "shapes"), from_zero=True, filled=True)
-        if len(set(shapes)) > 1
-        else None,
-    ]
+    faint = [not progress.fine for progress in history]
+    found = [plot("PSNR", seconds, psnr, ("time [s]", "PSNR [dB]"), faint=faint)]
+    if len(set(shapes)) > 1:
+        found.append(plot("Shapes", seconds, shapes, ("time [s]", "shapes"), filled=True))
+    return [one for one in found if one]

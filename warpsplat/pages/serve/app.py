@@ -1,6 +1,6 @@
-"""Answer the page's requests. Errors are one line of plain text with their status.
+"""The requests of the page. Errors are one line of plain text with their status.
 
-Everything is found by its name in the store: no part of an address is ever a path of the file system.
+Everything is looked up by its name in the store: no part of an address is ever a path of the file system.
 """
 
 from __future__ import annotations
@@ -23,51 +23,59 @@ from starlette.routing import Route
 
 from warpsplat.errors import ImageError, UsageError, WarpsplatError, explain
 from warpsplat.native import release_memory
-from warpsplat.pages.serve.events import events
-from warpsplat.pages.serve.form import settings_of
+from warpsplat.pages.serve.form import serve_page, settings_of
 from warpsplat.pages.serve.guard import line
 from warpsplat.pages.serve.limits import Refused
-from warpsplat.pages.serve.pictures import DEFAULT_NAME, Picture, plain_name, read_picture
 from warpsplat.pages.serve.store import Store
-from warpsplat.pages.serve.worker import Machine, Worker
+from warpsplat.pages.serve.uploads import DEFAULT_NAME, plain_name, read_upload
+from warpsplat.pages.serve.worker import Machine, RunThread
 from warpsplat.run.command_line import vectorize_command
 
 MAX_REQUEST = 20_000
-"""Maximum size of bodies that are not images [bytes]."""
+"""Largest body of a request that is no image [bytes]."""
 
 UPLOAD_TIME = 300.0
-"""Maximum time of an upload [s], for which space is reserved."""
+"""Longest upload [s]: others wait for the memory that is reserved for it."""
 
-TIDY_INTERVAL = 2.0
-"""Time between two searches for closed pages [s]."""
+EXPIRY_INTERVAL = 2.0
+"""Time between two searches for pages that were closed [s]."""
 
 LAST_WAIT = 10.0
-"""Time for the current run to end with the server [s]."""
+"""Longest wait for the current run when the server ends [s]."""
+
+EVENT_INTERVAL = 0.15
+"""Shortest time between two events [s]."""
+
+PULSE = 5.0
+"""Longest time between two events [s]: only writing reveals that a page was closed."""
+
+CACHED = {"Cache-Control": "private, max-age=3600, immutable"}
+"""Headers of what never changes."""
 
 
 class Service:
-    """Handlers of a page's requests."""
+    """The answers to a page's requests."""
 
-    def __init__(self, store: Store, machine: Machine, page: str, max_memory: str | None = None) -> None:
-        """Do nothing yet.
+    def __init__(self, store: Store, machine: Machine, max_memory: str | None = None) -> None:
+        """Start nothing yet.
 
         Args:
-            store: what is held.
+            store: sessions and runs.
             machine: where runs are computed.
-            page: as HTML.
-            max_memory: of each run, as the command line has it.
+            max_memory: limit of each run, as on the command line.
         """
-        self._store, self._machine, self._page, self._max_memory = store, machine, page, max_memory
-        self._reading = asyncio.Semaphore(1)
+        self._store, self._machine, self._max_memory = store, machine, max_memory
+        self._page = serve_page(store.limits)
+        self._decoding = asyncio.Semaphore(1)
 
     def app(self) -> Starlette:
-        """Return the application, which does the runs while it lives."""
+        """Return the application, which does the runs while it is served."""
         session = "/sessions/{session}"
         image, run = session + "/images/{image}", session + "/runs/{run}"
         routes = (
             ("GET", "/", self.show_page),
             ("POST", "/sessions", self.open_session),
-            ("GET", f"{session}/events", self.tell),
+            ("GET", f"{session}/events", self.stream_events),
             ("POST", f"{session}/images", self.upload),
             ("GET", image, self.show_image),
             ("DELETE", image, self.remove_image),
@@ -79,79 +87,88 @@ class Service:
         )
         return Starlette(
             routes=[Route(path, answer, methods=[method]) for method, path, answer in routes],
-            exception_handlers={
-                Refused: _refused,
-                HTTPException: _unknown,
-                WarpsplatError: _failed,
-                Exception: _failed,
-            },
-            lifespan=self._living,
+            exception_handlers=dict.fromkeys((Refused, HTTPException, WarpsplatError, Exception), _error),
+            lifespan=self._lifespan,
         )
 
     @contextlib.asynccontextmanager
-    async def _living(self, _: Starlette) -> AsyncIterator[None]:
-        worker = Worker(self._store, self._machine)
+    async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
+        worker = RunThread(self._store, self._machine)
         worker.start()
-        tidying = asyncio.create_task(self._tidy())
+        expiring = asyncio.create_task(self._expire())
         try:
             yield
         finally:
-            tidying.cancel()
+            expiring.cancel()
             self._store.close()
             await run_in_threadpool(worker.join, LAST_WAIT)
 
-    async def _tidy(self) -> None:
+    async def _expire(self) -> None:
         while True:
-            await asyncio.sleep(TIDY_INTERVAL)
+            await asyncio.sleep(EXPIRY_INTERVAL)
             if self._store.expire():
                 await run_in_threadpool(release_memory)
 
     async def show_page(self, _: Request) -> Response:
-        """Return the page. Its own head says what it may load and run."""
+        """Send the page, whose head has a policy of its own."""
         return HTMLResponse(self._page, headers={"Content-Security-Policy": "frame-ancestors 'none'"})
 
     async def open_session(self, _: Request) -> Response:
         """Open a session for a page."""
         return JSONResponse({"session": self._store.open()}, 201)
 
-    async def tell(self, request: Request) -> Response:
-        """Stream the states of a session."""
+    async def stream_events(self, request: Request) -> Response:
+        """Send the states of a session until it is forgotten."""
         session = request.path_params["session"]
-        self._store.state_of(session)  # refused before the stream begins
-        return StreamingResponse(events(self._store, session), media_type="text/event-stream")
+        self._store.state_of(session)  # raises before the stream begins
+        return StreamingResponse(self._events(session), media_type="text/event-stream")
+
+    async def _events(self, session: str) -> AsyncIterator[str]:
+        """Yield server-sent events, each the whole state, so that a page may miss some."""
+        version, last, silent = -1, "", 0.0
+        with contextlib.suppress(Refused), self._store.attended(session):  # a forgotten page opens a new one
+            while not self._store.closed:
+                if self._store.version != version:
+                    version = self._store.version
+                    text = json.dumps(self._store.state_of(session), allow_nan=False)
+                    if text != last:
+                        last, silent = text, 0.0
+                        yield f"data: {text}\n\n"
+                if silent >= PULSE:
+                    silent = 0.0
+                    yield ": still here\n\n"
+                await asyncio.sleep(EVENT_INTERVAL)
+                silent += EVENT_INTERVAL
 
     async def upload(self, request: Request) -> Response:
-        """Receive an image as the body of the request."""
+        """Take an image: the body of the request is its file."""
         session = request.path_params["session"]
         self._store.state_of(session)
         name = plain_name(request.query_params.get("name", DEFAULT_NAME))
         limit = self._store.limits.upload
-        size = _length(request)
-        if size is None or size > limit:
-            what = "says no size" if size is None else f"has {size / 1e6:.1f} MB"
-            raise Refused(
-                411 if size is None else 413, f"{name}: {what}; at most {limit / 1e6:g} MB are taken"
-            )
-        self._store.reserve(size)
-        try:
+        length = request.headers.get("content-length", "")
+        if not (length.isascii() and length.isdigit()):
+            raise Refused(411, f"{name}: the request has no Content-Length")
+        size = int(length)
+        if size > limit:
+            raise Refused(413, f"{name}: has {size / 1e6:.1f} MB; the limit is {limit / 1e6:g} MB")
+        with self._store.reserved(size):
             try:
                 data = await asyncio.wait_for(_body(request, limit, name), UPLOAD_TIME)
             except asyncio.TimeoutError:
-                raise Refused(408, f"{name}: did not come within {UPLOAD_TIME:g} s") from None
-            async with self._reading:  # one at a time: pixels take many times the memory of their file
-                picture = await run_in_threadpool(read_picture, data, name)
-        finally:
-            self._store.unreserve(size)
-        return JSONResponse({"image": self._store.add_picture(session, picture)}, 201)
+                raise Refused(408, f"{name}: the upload took more than {UPLOAD_TIME:g} s") from None
+            async with self._decoding:  # one at a time: pixels take many times the memory of their file
+                upload = await run_in_threadpool(read_upload, data, name)
+        return JSONResponse({"image": self._store.add_upload(session, upload)}, 201)
 
     async def show_image(self, request: Request) -> Response:
-        """Return the displayed picture of an image."""
-        picture = self._picture(request)
-        return Response(picture.shown, media_type=picture.media, headers=KEPT)
+        """Send the picture of an image."""
+        upload = self._store.upload(*_names(request))
+        return Response(upload.picture, media_type=upload.media_type, headers=CACHED)
 
     async def remove_image(self, request: Request) -> Response:
-        """Delete an image and its runs."""
-        self._store.remove_picture(request.path_params["session"], request.path_params["image"])
+        """Forget an image and its runs."""
+        self._store.remove_upload(*_names(request))
         await run_in_threadpool(release_memory)
         return Response(status_code=204)
 
@@ -159,49 +176,46 @@ class Service:
         """Queue a run of ``image`` with ``settings``."""
         session = request.path_params["session"]
         given = _parsed(await _body(request, MAX_REQUEST, "the request"))
-        image = given.get("image")
-        picture = self._store.picture(session, image if isinstance(image, str) else "")
+        image = str(given.get("image"))
+        upload = self._store.upload(session, image)
         values, settings = settings_of(given.get("settings", {}), self._max_memory)
-        path = f"./{picture.name}" if picture.name.startswith("-") else picture.name
+        path = f"./{upload.name}" if upload.name.startswith("-") else upload.name
         command = vectorize_command(settings, path, f"{_stem(path)}.svg")
-        run = self._store.add_run(session, str(image), values, settings, command)
-        return JSONResponse({"run": run}, 201)
+        return JSONResponse({"run": self._store.add_run(session, image, values, settings, command)}, 201)
 
     async def stop(self, request: Request) -> Response:
-        """Stop a run, with the shapes so far."""
-        self._store.stop_run(request.path_params["session"], request.path_params["run"])
+        """End a run with its current shapes."""
+        self._store.stop_run(*_names(request))
         return Response(status_code=204)
 
     async def remove_run(self, request: Request) -> Response:
-        """Delete a run."""
-        self._store.remove_run(request.path_params["session"], request.path_params["run"])
+        """Forget a run."""
+        self._store.remove_run(*_names(request))
         await run_in_threadpool(release_memory)
         return Response(status_code=204)
 
     async def show_live(self, request: Request) -> Response:
-        """Return the current shapes of a run."""
-        run = self._store.run(request.path_params["session"], request.path_params["run"])
+        """Send the current shapes of a run."""
+        run = self._store.run(*_names(request))
         return _svg(run.svg or run.live.picture, {})
 
     async def show_result(self, request: Request) -> Response:
-        """Return the file of a run; as an attachment with ``download``."""
-        run = self._store.run(request.path_params["session"], request.path_params["run"])
+        """Send the file of a run; ``download`` in the query makes the browser save it."""
+        run = self._store.run(*_names(request))
         if "download" not in request.query_params:
-            return _svg(run.svg, KEPT)
-        name = quote(_stem(run.picture.name), safe="")
-        disposition = f"attachment; filename*=UTF-8''{name}.svg"
-        return _svg(run.svg, {"Content-Disposition": disposition})
-
-    def _picture(self, request: Request) -> Picture:
-        return self._store.picture(request.path_params["session"], request.path_params["image"])
+            return _svg(run.svg, CACHED)
+        name = quote(_stem(run.upload.name), safe="")
+        return _svg(run.svg, {"Content-Disposition": f"attachment; filename*=UTF-8''{name}.svg"})
 
 
-KEPT = {"Cache-Control": "private, max-age=3600, immutable"}
-"""Headers of immutable responses."""
+def _names(request: Request) -> tuple[str, str]:
+    """Return the session of a request, and its image or run."""
+    session, name = request.path_params.values()
+    return session, name
 
 
 def _stem(name: str) -> str:
-    """Return the name of the SVG for an image's file."""
+    """Return the name of a file without its ending."""
     stem, _, ending = name.rpartition(".")
     return stem if stem and "/" not in ending else name
 
@@ -212,14 +226,8 @@ def _svg(data: bytes, headers: dict[str, str]) -> Response:
     return Response(data, media_type="image/svg+xml", headers=headers)
 
 
-def _length(request: Request) -> int | None:
-    """Return the declared size of a body [bytes], or None."""
-    given = request.headers.get("content-length", "")
-    return int(given) if given.isascii() and given.isdigit() else None
-
-
 async def _body(request: Request, limit: int, name: str) -> bytes:
-    """Return the body; refuse it as soon as it is too long: uvicorn discards the rest."""
+    """Return the body, refused as soon as it is too long: uvicorn discards what follows an answer."""
     parts, size = [], 0
     async for part in request.stream():
         size += len(part)
@@ -232,27 +240,20 @@ async def _body(request: Request, limit: int, name: str) -> bytes:
 def _parsed(body: bytes) -> dict[str, Any]:
     try:
         given = json.loads(body)
-    except ValueError:  # of the encoding as well
+    except ValueError:  # includes a wrong encoding
         given = None
     if not isinstance(given, dict):
-        raise Refused(400, "the request must be an object of JSON")
+        raise Refused(400, "the request must be a JSON object")
     return given
 
 
-async def _refused(_: Request, error: Exception) -> Response:
-    assert isinstance(error, Refused)
-    headers = [("Retry-After", "5")] if error.status in {429, 503} else []
-    return line(error.status, str(error), headers)
-
-
-async def _failed(_: Request, error: Exception) -> Response:
-    """Answer errors of the library: unreadable images, conflicting settings, or faults."""
+async def _error(_: Request, error: Exception) -> Response:
+    """Return the answer to a request that failed."""
+    if isinstance(error, Refused):
+        return line(error.status, str(error), {"Retry-After": "5"} if error.status in {429, 503} else {})
+    if isinstance(error, HTTPException):
+        return line(error.status_code, "not found" if error.status_code == 404 else error.detail)
     if os.environ.get("WARPSPLAT_TRACEBACK"):
         traceback.print_exception(error)
     status = 415 if isinstance(error, ImageError) else 400 if isinstance(error, UsageError) else 500
     return line(status, explain(error)[0])
-
-
-async def _unknown(_: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    return line(error.status_code, "there is nothing here" if error.status_code == 404 else error.detail)

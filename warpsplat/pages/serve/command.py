@@ -1,4 +1,4 @@
-"""``warpsplat serve``."""
+"""The command ``warpsplat serve``."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ HOST, PORT = "127.0.0.1", 8765
     default=PORT,
     show_default=True,
     metavar="N",
-    help="Where it listens; 0: any port that is free.",
+    help="Port to listen on; 0: any that is free.",
 )
 @click.option(
     "--host",
     default=HOST,
     show_default=True,
     metavar="ADDRESS",
-    help="Address of this machine; other machines can reach any but 127.0.0.1 and ::1.",
+    help="Address to listen on; other machines can reach any but 127.0.0.1 and ::1.",
 )
 @click.option("--open", "opens", is_flag=True, help="Open the page in a browser.")
 @click.option(
@@ -39,12 +39,12 @@ HOST, PORT = "127.0.0.1", 8765
     default=f"{Limits.upload // 10**6}MB",
     show_default=True,
     metavar="SIZE",
-    help="Largest file that is taken.",
+    help="Largest file that is accepted.",
 )
 @click.option(
     "--max-memory",
     metavar="SIZE",
-    help="Memory for a run to stay below, as 4GB: a larger image is worked on at a smaller size.",
+    help="Memory limit of a run, such as 4GB: larger images are processed at a smaller size.",
 )
 @click.option(
     "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
@@ -61,9 +61,9 @@ def command(
 ) -> None:
     """Serve a page to vectorize images in a browser, until Ctrl-C.
 
-    Drop an image on it, choose, see the shapes grow, stop when it pleases,
-    compare results side by side and save them. Nothing leaves this machine,
-    and nothing is kept: images and results are in memory only.
+    Drop an image on it, choose settings, watch the shapes grow, stop at any
+    time, compare results side by side and save them. Nothing leaves this
+    machine or is stored: images and results are kept in memory only.
     """
     interrupt = Interrupt()
     from warpsplat.fit.options import parse_bytes
@@ -77,14 +77,14 @@ def command(
     from warpsplat.run.options import settings_from
 
     limits = Limits(upload=parse_bytes(max_upload))
-    settings_from({"max_memory": max_memory})  # errors are reported now
+    settings_from({"max_memory": max_memory})  # reports errors now
     start_warp()
     choose_device(device)
     server = WarpsplatServer(
         host, port, machine=Machine(device, threads), limits=limits, max_memory=max_memory
     )
     if not is_loopback(host):
-        risk = "others can reach it, and who has the address can use it; it is not encrypted"
+        risk = "others can reach it, and anyone with the address can use it; it is not encrypted"
         echo(f"warpsplat: --host {host}: {risk}", err=True)
     set_verbosity(quiet=False)  # the page shows compilation too
 

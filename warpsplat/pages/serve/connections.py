@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import logging
 import os
 import socket
@@ -13,12 +12,12 @@ from typing import Any
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 MOST = 500
-"""Connections, where there are files for as many."""
+"""Most connections."""
 
 LEAST = 2
 
-OTHERS = 24
-"""Open files kept in reserve: pipes to worker processes, compiled kernels, the system's own."""
+RESERVE = 24
+"""Open files kept for other purposes: pipes to worker processes, compiled kernels, the system's own."""
 
 HEAD_TIME = 5.0
 """Longest wait for a request, after connecting or after the last response [s]."""
@@ -27,10 +26,7 @@ BODY_TIME = 60.0
 """Longest pause within the body of a request [s]."""
 
 RETRY = 1.0
-"""Pause before accepting again when the system is out of files [s]."""
-
-SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
-"""Errors that mean so."""
+"""Pause after a connection could not be accepted [s]."""
 
 
 def most_connections() -> int:
@@ -45,89 +41,70 @@ def most_connections() -> int:
     try:
         taken = len(os.listdir("/dev/fd"))
     except OSError:
-        taken = OTHERS
-    return max(LEAST, min(MOST, limit - taken - OTHERS))
+        taken = RESERVE
+    return max(LEAST, min(MOST, limit - taken - RESERVE))
 
 
 class Protocol(H11Protocol):
-    """An HTTP connection that can tell whether its client is idle."""
+    """An HTTP connection that is closed if its client stays idle, also before the first request."""
 
-    ended: Callable[[], object] = staticmethod(lambda: None)
-    """Called when the connection is closed."""
-    heard = 0.0
+    on_close: Callable[[], object] = staticmethod(lambda: None)
+    last_data = 0.0
     """Time at which data last arrived [s, the loop's clock]."""
-    since = 0.0
-    """Time from which it has waited for a request [s, the loop's clock]."""
+    waiting_since = 0.0
+    """Time since which it has waited for a request [s, the loop's clock]."""
 
     def connection_made(self, transport: Any) -> None:
         """Start both clocks."""
-        self.heard = self.since = self.loop.time()
+        self.last_data = self.waiting_since = self.loop.time()
         super().connection_made(transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Report that the connection is closed."""
         super().connection_lost(exc)
-        self.ended()
+        self.on_close()
 
     def data_received(self, data: bytes) -> None:
         """Note the time, and parse the data."""
-        self.heard = self.loop.time()
+        self.last_data = self.loop.time()
         super().data_received(data)
 
     def on_response_complete(self) -> None:
-        """Wait for the next request from now on."""
-        self.since = self.loop.time()
+        """Start to wait for the next request."""
+        self.waiting_since = self.loop.time()
         super().on_response_complete()
 
     def close_if_idle(self) -> None:
-        """Close the connection if its client has kept it waiting for too long."""
+        """Close the connection if the server has waited for its client too long."""
         now = self.loop.time()
         if self.cycle is None or self.cycle.response_complete:
-            late = now - self.since > HEAD_TIME
+            late = now - self.waiting_since > HEAD_TIME
         else:
-            late = self.cycle.more_body and now - self.heard > BODY_TIME
+            late = self.cycle.more_body and now - self.last_data > BODY_TIME
         if late:
             self.transport.abort()
 
 
-class Acceptor:
-    """Accepts connections while there are files for them; others wait in the system's queue."""
+async def accept(listener: socket.socket, make: Callable[[], Protocol]) -> None:
+    """Accept connections while there are files for them; further ones wait in the system's queue.
 
-    def __init__(self, listener: socket.socket, make: Callable[[], Protocol]) -> None:
-        """Start accepting, within a running loop. ``make`` returns the protocol of a new connection."""
-        listener.setblocking(False)
-        self._listener, self._make = listener, make
-        self._room = asyncio.Semaphore(most_connections())
-        self._has_warned = False
-        self._task = asyncio.get_running_loop().create_task(self._accept())
-
-    async def _accept(self) -> None:
-        loop = asyncio.get_running_loop()
-        while True:
-            await self._room.acquire()
-            try:
-                connection, _ = await loop.sock_accept(self._listener)
-            except OSError as error:
-                self._room.release()
-                if error.errno in SHORT:
-                    self._warn(error)
-                await asyncio.sleep(RETRY)
-                continue
-            protocol = self._make()
-            protocol.ended = self._room.release
-            try:
-                await loop.connect_accepted_socket(lambda made=protocol: made, connection)  # type: ignore[misc]
-            except OSError:  # it is gone already
-                connection.close()
-                self._room.release()
-
-    def _warn(self, error: OSError) -> None:
-        """Warn once that the system is out of files."""
-        if not self._has_warned:
-            self._has_warned = True
-            logging.getLogger("warpsplat").warning("connections have to wait: %s", error.strerror)
-
-    def close(self) -> None:
-        """Stop accepting and close the listening socket."""
-        self._task.cancel()
-        self._listener.close()
+    Args:
+        listener: a listening socket that does not block.
+        make: returns the protocol of a new connection.
+    """
+    loop = asyncio.get_running_loop()
+    free = asyncio.Semaphore(most_connections())
+    has_warned = False
+    while True:
+        await free.acquire()
+        protocol = make()
+        try:
+            connection, _ = await loop.sock_accept(listener)
+            protocol.on_close = free.release
+            await loop.connect_accepted_socket(lambda made=protocol: made, connection)  # type: ignore[misc]
+        except OSError as error:  # out of files, or the client is gone
+            free.release()
+            if not has_warned:
+                logging.getLogger("warpsplat").warning("connections have to wait: %s", error.strerror)
+            has_warned = True
+            await asyncio.sleep(RETRY)

@@ -1,4 +1,4 @@
-"""The settings on the page, with names, defaults and help of the command line."""
+"""The page and its form: settings have the names, defaults and texts of the command line."""
 
 from __future__ import annotations
 
@@ -7,23 +7,39 @@ from typing import Any
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.pages import page
+from warpsplat.pages.serve.limits import Limits
+from warpsplat.run.options import BY_NAME
 
 FIELDS = ("subject", "curves", "closed", "open", "mixed", "quality", "paint", "colors")
-"""Options, in the order of the page."""
+"""Options of the form, in its order."""
+
+
+def serve_page(limits: Limits) -> str:
+    """Return the page as HTML. It is the same for all sessions: their states arrive as events."""
+    options = {name: BY_NAME[name] for name in FIELDS}
+    defaults = {name: option.default if option.choices else "" for name, option in options.items()}
+    return page(
+        "serve.html.j2",
+        assets=("viewer.css", "serve.css", "viewer.js", "serve.js"),
+        connects=True,
+        options=options,
+        data={"upload": limits.upload, "defaults": defaults},
+    )
 
 
 def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str, Any], Settings]:
-    """Return what a page asks for.
+    """Return the settings that a page asks for.
 
     Args:
-        given: options and their values, as JSON has them.
-        max_memory: of the server.
+        given: options and their values, as parsed from JSON.
+        max_memory: limit of the server.
 
     Returns:
-        What was given, in the order of ``FIELDS``, and the settings.
+        The values that were given, in the order of ``FIELDS``, and the settings.
 
     Raises:
-        UsageError: an option that the page does not offer, or a value that cannot be used.
+        UsageError: an option that the page does not offer, or an invalid value.
     """
     if not isinstance(given, Mapping):
         raise UsageError("settings must be an object")

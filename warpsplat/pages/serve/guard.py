@@ -1,11 +1,11 @@
-"""Protect the server on this machine from other users and other pages.
+"""Access control: what other users and other web pages cannot do to a server on this machine, and why.
 
-* Another user of the machine can connect: a token, which only the printed address has, becomes a cookie.
-* A page of the web can send requests here (CSRF): the cookie is kept from it (``SameSite``), and what
-  changes something needs our own ``Origin``. No answer allows another origin to read it, or to frame it.
+* Another user of the machine can connect: the printed address has a token, which becomes a cookie.
+* A page of the web can send requests here (CSRF): the cookie is kept from it (``SameSite``), and requests
+  that change something need our own ``Origin``. No answer allows another origin to read or frame it.
 * A name of the web can be made to lead here (DNS rebinding): ``Host`` must be an address or ``localhost``.
-* What was uploaded can be hostile: answers say their type and that it is not to be guessed, and that nothing
-  in them may run or load. Our own page says itself what it may do (``pages.environment.policy``).
+* Uploads can be hostile: answers state their type, forbid guessing it, and let nothing in them run or load.
+  The policy of our own page is in its head (``pages.environment.policy``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import secrets
-from collections.abc import Iterable
+from collections.abc import Mapping
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from warpsplat.errors import printable
 
 TOKEN = "token"
-"""Query parameter of the address."""
+"""Name of the token in an address' query."""
 
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -33,32 +33,33 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
+    # An SVG that is opened by itself runs and loads nothing.
+    "Content-Security-Policy": (
+        "default-src 'none'; style-src 'unsafe-inline'; sandbox; frame-ancestors 'none'"
+    ),
 }
-"""Headers of every response."""
-
-NOTHING = "default-src 'none'; style-src 'unsafe-inline'; sandbox; frame-ancestors 'none'"
-"""Policy of other responses: an SVG opened by itself runs and loads nothing."""
+"""Headers of every answer that has none of its own."""
 
 
 class Guard:
-    """Wraps an application: rejects unauthorised requests, and adds headers to responses."""
+    """Middleware that admits authorised requests only, and adds the headers of every answer."""
 
     def __init__(self, app: ASGIApp, token: str, host: str = "") -> None:
-        """Wrap ``app``.
+        """Wrap an application.
 
         Args:
-            app: behind it.
-            token: what the address must have.
-            host: a name of this machine under which it may be asked, beside addresses and ``localhost``.
+            app: answers the requests that are admitted.
+            token: must be in the address.
+            host: name of this machine that requests may use, besides addresses and ``localhost``.
         """
         self._app, self._token, self._host = app, token, host.lower()
         self._tickets: set[str] = set()
 
     def ticket(self) -> str:
-        """Return a token for one use, because other users can read a browser's command line."""
-        made = secrets.token_urlsafe(16)
-        self._tickets.add(made)
-        return made
+        """Return a token for one use: other users can read the command line of a browser."""
+        ticket = secrets.token_urlsafe(16)
+        self._tickets.add(ticket)
+        return ticket
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
@@ -66,35 +67,34 @@ class Guard:
             await self._app(scope, receive, send)
             return
 
-        async def marked(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                for name, value in (HEADERS | {"Content-Security-Policy": NOTHING}).items():
+                for name, value in HEADERS.items():
                     headers.setdefault(name, value)
             await send(message)
 
-        await (self._checked(Request(scope)) or self._app)(scope, receive, marked)
+        await (self._refusal(Request(scope)) or self._app)(scope, receive, send_with_headers)
 
-    def _checked(self, request: Request) -> Response | None:
-        """Return the response to an unauthorised request, or to one with the token; None to pass it on."""
-        headers = request.headers
-        name, port = _place(headers.get("host", ""))
-        if not self._is_ours(name):
-            return line(403, f"this server is asked by its address, not as {printable(name) or 'nobody'}")
-        if request.method not in {"GET", "HEAD"} and not _is_same(headers):
-            return line(403, "another page may not ask for this")
+    def _refusal(self, request: Request) -> Response | None:
+        """Return the answer to a request that is refused or brings the token; None: it is admitted."""
+        name, port = _host_and_port(request.headers.get("host", ""))
+        if not self._is_trusted(name):
+            return line(403, f"this server does not answer to the name '{printable(name)}'")
+        if request.method not in {"GET", "HEAD"} and not _is_same_origin(request.headers):
+            return line(403, "requests from other pages are not allowed")
         cookie = f"warpsplat-{port}"
         given = request.query_params.get(TOKEN)
-        if given is not None and request.url.path == "/" and self._is_right(given):
+        if given is not None and request.url.path == "/" and self._take(given):
             answer = RedirectResponse("/", 303)
             answer.set_cookie(cookie, self._token, httponly=True, samesite="strict")
             return answer
-        if not self._is_known(request.cookies.get(cookie, "")):
-            return line(403, "open the address that warpsplat serve printed: it has a token")
+        if not self._is_token(request.cookies.get(cookie, "")):
+            return line(403, "open the address that warpsplat serve printed: it contains a token")
         return None
 
-    def _is_ours(self, name: str) -> bool:
-        """Return whether a host name is safe from DNS rebinding."""
+    def _is_trusted(self, name: str) -> bool:
+        """Tell whether a host is an address or a name that nobody else can make lead here."""
         if name.lower() in {"localhost", self._host}:
             return bool(name)
         try:
@@ -103,26 +103,27 @@ class Guard:
             return False
         return True
 
-    def _is_right(self, token: str) -> bool:
+    def _take(self, token: str) -> bool:
+        """Tell whether a token is right; a ticket is used up by it."""
         if token in self._tickets:
             self._tickets.remove(token)
             return True
-        return self._is_known(token)
+        return self._is_token(token)
 
-    def _is_known(self, token: str) -> bool:
+    def _is_token(self, token: str) -> bool:
         return hmac.compare_digest(token.encode(), self._token.encode())
 
 
-def _is_same(headers: Headers) -> bool:
-    """Return whether a request comes from a page of this server, or from no page."""
+def _is_same_origin(headers: Headers) -> bool:
+    """Tell whether a request comes from a page of this server, or from no page."""
     origin = headers.get("origin")
     if origin is None:
         return headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
     return urlsplit(origin).netloc.lower() == headers.get("host", "").lower()
 
 
-def _place(host: str) -> tuple[str, int]:
-    """Return the host and port of a request; no host if invalid."""
+def _host_and_port(host: str) -> tuple[str, int]:
+    """Return what a request was sent to; an empty name if it is malformed."""
     try:
         found = urlsplit(f"//{host}")
         return found.hostname or "", found.port or 80
@@ -130,6 +131,6 @@ def _place(host: str) -> tuple[str, int]:
         return "", 80
 
 
-def line(status: int, text: str, headers: Iterable[tuple[str, str]] = ()) -> PlainTextResponse:
-    """Return a response of one line."""
-    return PlainTextResponse(f"{text}\n", status, dict(headers))
+def line(status: int, text: str, headers: Mapping[str, str] | None = None) -> PlainTextResponse:
+    """Return an answer of one line."""
+    return PlainTextResponse(f"{text}\n", status, headers)

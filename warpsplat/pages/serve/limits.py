@@ -1,4 +1,4 @@
-"""Limits of a server, and the error for exceeding them."""
+"""Limits of the server, and the error of a request that exceeds one."""
 
 from __future__ import annotations
 
@@ -7,33 +7,32 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a server."""
+    """What a server accepts and holds at most."""
 
     upload: int = 50_000_000
-    """Maximum size of an image's file [bytes]."""
+    """Size of an image's file [bytes]."""
     waiting: int = 20
-    """Maximum number of waiting runs."""
+    """Runs in the queue."""
     runs: int = 100
-    """Maximum number of runs, finished ones included."""
+    """Runs that are held, finished ones included."""
     images: int = 256 << 20
-    """Maximum size of all images, stored or being uploaded [bytes]; two of the largest always fit."""
+    """All images that are held or being uploaded [bytes]; two of the largest fit in any case."""
     results: int = 128 << 20
-    """Maximum size of all SVGs [bytes]."""
+    """All SVGs that are held [bytes]."""
     sessions: int = 100
-    """Maximum number of sessions."""
+    """Pages whose images and results are held."""
     grace: float = 120.0
-    """Time until a closed page and its runs are deleted [s]; it may just be reloading."""
+    """Time until a closed page is forgotten, with its runs [s]: it may just be being reloaded."""
 
     @property
-    def room(self) -> int:
-        """Space for images [bytes]."""
+    def image_capacity(self) -> int:
+        """Capacity for images [bytes]."""
         return max(self.images, 2 * self.upload)
 
 
-class Refused(Exception):  # noqa: N818 - an answer, no fault
-    """An error response: a status, and one line."""
+class Refused(Exception):  # noqa: N818 - an answer, not a fault
+    """A request that is answered with an error: its HTTP status, and one line."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
         self.status = status
-        """HTTP status."""

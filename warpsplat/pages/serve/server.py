@@ -1,4 +1,4 @@
-"""The server: its socket, its address, and its shutdown."""
+"""The server: its socket, its address, and its end."""
 
 from __future__ import annotations
 
@@ -15,22 +15,21 @@ import uvicorn
 
 from warpsplat.errors import UsageError, printable
 from warpsplat.pages.serve.app import Service
-from warpsplat.pages.serve.connections import Acceptor, Protocol
+from warpsplat.pages.serve.connections import Protocol, accept
 from warpsplat.pages.serve.guard import TOKEN, Guard
 from warpsplat.pages.serve.limits import Limits
-from warpsplat.pages.serve.page import serve_page
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
 
 LAST_ANSWERS = 2
-"""Time for responses in progress at shutdown [s]."""
+"""Longest wait for unfinished answers when the server ends [s]."""
 
 
-def bound(host: str, port: int) -> socket.socket:
-    """Return a listening socket.
+def listening_socket(host: str, port: int) -> socket.socket:
+    """Return a socket that listens.
 
     Raises:
-        UsageError: it cannot be had; the message says why.
+        UsageError: the address cannot be used; the message says why.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
@@ -46,7 +45,7 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only this machine can connect to an address."""
+    """Tell whether only this machine can connect to an address."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -54,7 +53,7 @@ def is_loopback(host: str) -> bool:
 
 
 class WarpsplatServer:
-    """A server that listens from its creation, and answers during ``run``."""
+    """A server that listens from the beginning, and answers during ``run``."""
 
     def __init__(
         self,
@@ -68,43 +67,44 @@ class WarpsplatServer:
         """Listen.
 
         Args:
-            host: address, or name, of this machine.
-            port: 0: any that is free.
+            host: address or name of this machine.
+            port: number of the port; 0: any that is free.
             machine: where runs are computed.
-            limits: of what it takes and holds.
-            max_memory: of each run.
+            limits: what it accepts and holds.
+            max_memory: limit of each run.
 
         Raises:
-            UsageError: the port cannot be had.
+            UsageError: the address cannot be used.
         """
-        self._host, self._socket = host, bound(host, port)
+        self._host, self._socket = host, listening_socket(host, port)
         self.port = int(self._socket.getsockname()[1])
-        """Port that it listens on."""
         self._token = secrets.token_urlsafe(24)
         self.store = Store(limits)
-        page = serve_page(self.store.limits)
-        service = Service(self.store, machine or Machine(), page, max_memory)
-        self._guard = Guard(service.app(), self._token, host)
+        self._guard = Guard(Service(self.store, machine or Machine(), max_memory).app(), self._token, host)
 
     def close(self) -> None:
         """Stop listening."""
         self._socket.close()
 
     def address(self, token: str | None = None) -> str:
-        """Return the page's address; ``token``: another token than the server's."""
-        shown = (
-            "127.0.0.1" if self._host in {"0.0.0.0", ""} else "[::1]" if self._host == "::" else self._host
-        )
-        shown = f"[{shown}]" if ":" in shown and not shown.startswith("[") else shown
-        return f"http://{shown}:{self.port}/?{TOKEN}={token or self._token}"
+        """Return the address of the page; ``token``: in place of the permanent one."""
+        host = {"0.0.0.0": "127.0.0.1", "": "127.0.0.1", "::": "::1"}.get(self._host, self._host)
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{self.port}/?{TOKEN}={token or self._token}"
 
     def ticket(self) -> str:
-        """Return the page's address with a token for one use."""
+        """Return an address of the page that can be used once."""
         return self.address(self._guard.ticket())
 
     def run(self, stop: Callable[[], bool], ready: Callable[[], None] = lambda: None) -> None:
-        """Answer requests until ``stop`` returns true; call ``ready`` at the start."""
-        logging.getLogger("uvicorn").setLevel(logging.CRITICAL)  # what it has to say is of clients' making
+        """Answer requests until ``stop()``, which is polled, is true; ``ready`` is called at the start."""
+
+        def is_over() -> bool:
+            if stop():
+                self.store.close()  # ends the streams of events, which uvicorn would wait for
+            return self.store.closed
+
+        logging.getLogger("uvicorn").setLevel(logging.CRITICAL)  # its messages are about faulty clients
         config = uvicorn.Config(
             self._guard,
             http=Protocol,
@@ -113,22 +113,14 @@ class WarpsplatServer:
             log_config=None,
             access_log=False,
             server_header=False,
-            timeout_keep_alive=5,
             timeout_graceful_shutdown=LAST_ANSWERS,
         )
-        asyncio.run(_Uvicorn(config, self._socket, self._is_over(stop), ready).serve([]))
-
-    def _is_over(self, stop: Callable[[], bool]) -> Callable[[], bool]:
-        def is_over() -> bool:
-            if stop():
-                self.store.close()  # streams of events end by it, which uvicorn would wait for
-            return self.store.closed
-
-        return is_over
+        self._socket.setblocking(False)
+        asyncio.run(_PolledServer(config, self._socket, is_over, ready).serve([]))
 
 
-class _Uvicorn(uvicorn.Server):
-    """Polls ``stop`` instead of installing signal handlers, so that ours handle a second Ctrl-C."""
+class _PolledServer(uvicorn.Server):
+    """Polls whether to end instead of handling signals: ours also handle a second Ctrl-C."""
 
     def __init__(
         self,
@@ -142,14 +134,14 @@ class _Uvicorn(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
-        """Install no handlers."""
+        """Leave the handlers of signals as they are."""
         yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start answering."""
+        """Start to answer."""
         await super().startup(sockets)
-        self._door = Acceptor(self._listener, self._protocol)
-        self._is_over()  # from the first question on a signal is a wish
+        self._accepting = asyncio.create_task(accept(self._listener, self._protocol))
+        self._is_over()  # from the first poll on a signal is a request to stop
         self._ready()
 
     def _protocol(self) -> Protocol:
@@ -157,11 +149,12 @@ class _Uvicorn(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop answering."""
-        self._door.close()
+        self._accepting.cancel()
+        self._listener.close()
         await super().shutdown(sockets)
 
     async def on_tick(self, counter: int) -> bool:
-        """Return whether to end; called ten times a second."""
+        """Close idle connections and return whether to end; called ten times a second."""
         for connection in list(self.server_state.connections):
             assert isinstance(connection, Protocol)
             connection.close_if_idle()

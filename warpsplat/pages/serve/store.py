@@ -1,102 +1,99 @@
-"""Images and results of all pages: in memory, bounded, and deleted with the page."""
+"""All that the server holds: in memory, bounded, and forgotten with the page."""
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 from warpsplat.fit.settings import Settings
 from warpsplat.pages.serve.limits import Limits, Refused
 from warpsplat.pages.serve.live import Live
-from warpsplat.pages.serve.pictures import Picture
-from warpsplat.pages.serve.runs import Run
-from warpsplat.pages.serve.session import Session
+from warpsplat.pages.serve.sessions import QueuedRun, Session
+from warpsplat.pages.serve.uploads import Upload
 from warpsplat.run.result import Result
 
-Thing = TypeVar("Thing")
+Item = TypeVar("Item")
 
 
-def _held(things: dict[str, Thing], name: str, what: str) -> Thing:
-    """One of what a session has.
-
-    Raises:
-        Refused: there is none of that name.
-    """
-    if name not in things:
-        raise Refused(404, f"no such {what}: only the latest are held")
-    return things[name]
+def _find(items: dict[str, Item], name: str, kind: str) -> Item:
+    if name not in items:
+        raise Refused(404, f"no such {kind}: only the latest are kept")
+    return items[name]
 
 
 class Store:
-    """All sessions, and the queue of runs. Any thread may use it."""
+    """All sessions, and the queue of runs. Any thread may use it.
+
+    Methods that take the name of a session, an image or a run raise ``Refused`` if it does not exist.
+    """
 
     def __init__(self, limits: Limits | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self.limits = limits or Limits()
         self.version = 0
-        """Increases with every change that pages should see."""
+        """Grows with every change that a page shows."""
         self.closed = False
         self._clock = clock
         self._sessions: dict[str, Session] = {}
-        self._queue: deque[Run] = deque()
-        self._coming = 0
-        """Space reserved for uploads in progress [bytes]."""
+        self._queue: deque[QueuedRun] = deque()
+        self._uploading = 0
+        """Size of unfinished uploads [bytes]."""
         self._lock = threading.Condition(threading.RLock())
 
     # Sessions
 
     def open(self) -> str:
-        """Open a session and return its name.
+        """Return the name of a new session.
 
         Raises:
             Refused: there are too many.
         """
         with self._lock:
             if len(self._sessions) >= self.limits.sessions:
-                raise Refused(
-                    503, f"{self.limits.sessions} pages are open; close some and try again in a while"
-                )
+                raise Refused(503, f"{self.limits.sessions} pages are open; close some and try again later")
             name = secrets.token_urlsafe(16)
             self._sessions[name] = Session(name, self._clock())
             return name
 
     def _session(self, name: str) -> Session:
         if name not in self._sessions:
-            raise Refused(404, "this page was closed for a while and its images are gone: load it anew")
+            raise Refused(404, "this page was closed for a while and its images are gone: reload it")
         return self._sessions[name]
 
-    def attend(self, name: str) -> None:
-        """Count a reader of a session's events."""
+    @contextlib.contextmanager
+    def attended(self, name: str) -> Iterator[None]:
+        """Count a reader of a session's events in the block."""
         with self._lock:
-            self._session(name).readers += 1
-
-    def leave(self, name: str) -> None:
-        """Remove a reader."""
-        with self._lock:
-            if session := self._sessions.get(name):
+            session = self._session(name)
+            session.readers += 1
+        try:
+            yield
+        finally:
+            with self._lock:
                 session.readers -= 1
                 session.seen = self._clock()
 
     def is_attended(self, name: str) -> bool:
-        """Return whether a session's events have a reader."""
+        """Tell whether anybody reads a session's events."""
         with self._lock:
             return name in self._sessions and self._sessions[name].readers > 0
 
     def expire(self) -> bool:
-        """Delete sessions without a reader for a while; return whether there were any."""
+        """Forget sessions that nobody has read for a while; return whether there were any."""
         with self._lock:
             before = self._clock() - self.limits.grace
-            gone = [s for s in self._sessions.values() if s.readers <= 0 and s.seen <= before]
-            for session in gone:
-                self._forget(session, list(session.runs.values()))
+            expired = [s for s in self._sessions.values() if s.readers <= 0 and s.seen <= before]
+            for session in expired:
+                self._forget(session, session.runs.values())
                 del self._sessions[session.id]
-            return bool(gone)
+            return bool(expired)
 
     def state_of(self, name: str) -> dict[str, Any]:
-        """Return a session's state for its page, as JSON values."""
+        """Return the state of a session for JSON."""
         with self._lock:
             session = self._session(name)
             busy = any(run.state == "running" for run in self._all_runs())
@@ -104,53 +101,46 @@ class Store:
 
     # Images
 
-    def reserve(self, size: int) -> None:
-        """Reserve space for an upload, until ``unreserve``.
+    @contextlib.contextmanager
+    def reserved(self, size: int) -> Iterator[None]:
+        """Reserve memory for an upload of ``size`` bytes in the block.
 
         Raises:
             Refused: there is none.
         """
         with self._lock:
             self._make_room(size)
-            self._coming += size
+            self._uploading += size
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._uploading -= size
 
-    def unreserve(self, size: int) -> None:
-        """Release the space for an upload."""
-        with self._lock:
-            self._coming -= size
-
-    def add_picture(self, name: str, picture: Picture) -> str:
-        """Store an image, and return its name in the session.
+    def add_upload(self, name: str, upload: Upload) -> str:
+        """Hold an image, and return its name in the session.
 
         Raises:
-            Refused: there is no room for it, or no such session.
+            Refused: there is no memory for it.
         """
         with self._lock:
             session = self._session(name)
-            self._make_room(picture.size)
+            self._make_room(upload.size)
             image = secrets.token_urlsafe(8)
-            session.pictures[image] = picture
+            session.uploads[image] = upload
             self._changed()
             return image
 
-    def picture(self, name: str, image: str) -> Picture:
-        """Return an image.
-
-        Raises:
-            Refused: there is none of that name.
-        """
+    def upload(self, name: str, image: str) -> Upload:
+        """Return an image."""
         with self._lock:
-            return _held(self._session(name).pictures, image, "image")
+            return _find(self._session(name).uploads, image, "image")
 
-    def remove_picture(self, name: str, image: str) -> None:
-        """Delete an image and its runs.
-
-        Raises:
-            Refused: there is none of that name.
-        """
+    def remove_upload(self, name: str, image: str) -> None:
+        """Forget an image and its runs."""
         with self._lock:
-            self.picture(name, image)
-            self._drop_picture(self._session(name), image)
+            self.upload(name, image)
+            self._drop_upload(self._session(name), image)
 
     # Runs
 
@@ -158,39 +148,38 @@ class Store:
         """Queue a run, and return its name.
 
         Raises:
-            Refused: too many wait, or there is no such image.
+            Refused: the queue is full.
         """
         with self._lock:
-            session, picture = self._session(name), self.picture(name, image)
+            session, upload = self._session(name), self.upload(name, image)
             if len(self._queue) >= self.limits.waiting:
-                raise Refused(429, f"{len(self._queue)} runs wait already: try again when one is done")
+                raise Refused(429, f"{len(self._queue)} runs are waiting: try again when one is done")
             while sum(1 for _ in self._all_runs()) >= self.limits.runs and self._drop_oldest_run():
                 pass
             live = Live(lambda: self.is_attended(name), self._changed)
-            session.begun += 1
-            run = Run(
-                secrets.token_urlsafe(8), session.begun, image, picture, values, settings, command, live=live
+            session.runs_started += 1
+            run = QueuedRun(
+                secrets.token_urlsafe(8),
+                session.runs_started,
+                image,
+                upload,
+                values,
+                settings,
+                command,
+                live=live,
             )
             session.runs[run.id] = run
             self._queue.append(run)
             self._changed()
             return run.id
 
-    def run(self, name: str, run: str) -> Run:
-        """Return a run.
-
-        Raises:
-            Refused: there is none of that name.
-        """
+    def run(self, name: str, run: str) -> QueuedRun:
+        """Return a run."""
         with self._lock:
-            return _held(self._session(name).runs, run, "run")
+            return _find(self._session(name).runs, run, "run")
 
     def stop_run(self, name: str, run: str) -> None:
-        """Stop a run, with the shapes so far, or remove it from the queue.
-
-        Raises:
-            Refused: there is none of that name.
-        """
+        """End a run with its current shapes; one that waits leaves the queue."""
         with self._lock:
             found = self.run(name, run)
             if found.state == "waiting":
@@ -199,18 +188,14 @@ class Store:
             self._changed()
 
     def remove_run(self, name: str, run: str) -> None:
-        """Stop and delete a run.
-
-        Raises:
-            Refused: there is none of that name.
-        """
+        """End and forget a run."""
         with self._lock:
             self._forget(self._session(name), [self.run(name, run)])
 
     # The worker
 
-    def next(self) -> Run | None:
-        """Wait for the next run of the queue; None once the store is closed."""
+    def next(self) -> QueuedRun | None:
+        """Wait for the next run and return it; None once the store is closed."""
         with self._lock:
             self._lock.wait_for(lambda: self.closed or self._queue)
             if self.closed:
@@ -221,30 +206,27 @@ class Store:
             self._changed()
             return run
 
-    def finish(self, run: Run, outcome: Result | str) -> None:
-        """Store a run's result or error, deleting the oldest results if there is no space."""
+    def finish(self, run: QueuedRun, outcome: Result | str) -> None:
+        """Take the result or the error of a run; the oldest results go if there are too many."""
         with self._lock:
-            if isinstance(outcome, str):
-                run.fail(outcome)
-            else:
-                run.finish(outcome)
+            run.finish(outcome)
             while self._result_bytes() > self.limits.results and self._drop_oldest_run(but=run):
                 pass
             self._changed()
 
     def close(self) -> None:
-        """Close: start no run, stop the current one, end the streams of events."""
+        """Forget everything, ask the current run to stop, and end the streams of events."""
         with self._lock:
             self.closed = True
             for session in self._sessions.values():
-                self._forget(session, list(session.runs.values()))
+                self._forget(session, session.runs.values())
             self._sessions.clear()
             self._changed()
 
-    # Room
+    # Capacity
 
     def held(self) -> dict[str, int]:
-        """Return the number of everything, and the bytes of images and results."""
+        """Return the numbers of sessions and runs, and the sizes of images and results [bytes]."""
         with self._lock:
             return {
                 "sessions": len(self._sessions),
@@ -252,7 +234,7 @@ class Store:
                 "waiting": len(self._queue),
                 "images": self._image_bytes(),
                 "results": self._result_bytes(),
-                "coming": self._coming,
+                "uploading": self._uploading,
             }
 
     def _changed(self) -> None:
@@ -260,38 +242,40 @@ class Store:
             self.version += 1
             self._lock.notify_all()
 
-    def _all_runs(self) -> Iterator[Run]:
+    def _all_runs(self) -> Iterator[QueuedRun]:
         for session in self._sessions.values():
             yield from session.runs.values()
 
     def _image_bytes(self) -> int:
-        return sum(p.size for session in self._sessions.values() for p in session.pictures.values())
+        return sum(u.size for session in self._sessions.values() for u in session.uploads.values())
 
     def _result_bytes(self) -> int:
         return sum(len(run.svg) for run in self._all_runs())
 
     def _make_room(self, size: int) -> None:
-        """Make space for an image by deleting the oldest ones without pending runs."""
-        room = self.limits.room - self._coming - size
-        while self._image_bytes() > room:
-            for session in self._sessions.values():
-                idle = (i for i in session.pictures if all(run.is_over for run in session.runs_of(i)))
-                if oldest := next(idle, None):
-                    self._drop_picture(session, oldest)
-                    break
-            else:
-                break
-        if self._image_bytes() > room:
-            held = f"{self.limits.room / 1e6:.0f} MB of images are held and in work"
+        """Drop the oldest images without unfinished runs until ``size`` bytes are free."""
+        capacity = self.limits.image_capacity - self._uploading - size
+        idle = [
+            (session, image)
+            for session in self._sessions.values()
+            for image in session.uploads
+            if all(run.is_over for run in session.runs_of(image))
+        ]
+        for session, image in idle:
+            if self._image_bytes() <= capacity:
+                return
+            self._drop_upload(session, image)
+        if self._image_bytes() > capacity:
+            held = f"{self.limits.image_capacity / 1e6:.0f} MB of images are in use"
             raise Refused(503, f"{held}: try again when a run is done")
 
-    def _drop_picture(self, session: Session, image: str) -> None:
+    def _drop_upload(self, session: Session, image: str) -> None:
         self._forget(session, session.runs_of(image))
-        del session.pictures[image]
+        del session.uploads[image]
         self._changed()
 
-    def _drop_oldest_run(self, but: Run | None = None) -> bool:
-        """Delete the oldest finished run; return whether there was one."""
+    def _drop_oldest_run(self, but: QueuedRun | None = None) -> bool:
+        """Forget the oldest run that is over; return whether there was one."""
         for session in self._sessions.values():
             for run in session.runs.values():
                 if run.is_over and run is not but:
@@ -299,8 +283,8 @@ class Store:
                     return True
         return False
 
-    def _forget(self, session: Session, runs: list[Run]) -> None:
-        for run in runs:
+    def _forget(self, session: Session, runs: Iterable[QueuedRun]) -> None:
+        for run in list(runs):
             run.stopping.set()
             if run in self._queue:
                 self._queue.remove(run)

@@ -1,4 +1,4 @@
-"""Do the runs in one thread, one after the other, each with the whole machine."""
+"""The worker: one thread that does the queued runs one by one, each with the whole machine."""
 
 from __future__ import annotations
 
@@ -14,67 +14,59 @@ import warpsplat
 from warpsplat.errors import explain
 from warpsplat.native import release_memory
 from warpsplat.pages.serve.live import Live
-from warpsplat.pages.serve.runs import Run
+from warpsplat.pages.serve.sessions import QueuedRun
 from warpsplat.pages.serve.store import Store
 from warpsplat.run.result import Result
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Device and threads of runs."""
+    """Where runs are computed."""
 
     device: str = "auto"
     threads: int | None = None
 
 
-class Worker(threading.Thread):
-    """Does the runs in a store's queue until it is closed."""
+class RunThread(threading.Thread):
+    """Does the runs of a store's queue until the store is closed."""
 
     def __init__(self, store: Store, machine: Machine) -> None:
-        # Where the program has to end at once, as within the compiler, it does not wait for a run.
+        # A daemon: when the program has to end at once, as within the compiler, it does not wait for a run.
         super().__init__(name="runs", daemon=True)
         self._store, self._machine = store, machine
 
     def run(self) -> None:
         """Do one run after the other."""
         while run := self._store.next():
-            with _notices(run.live):
-                outcome = self._made(run)
+            with _notices_to(run.live):
+                outcome = self._outcome(run)
             self._store.finish(run, outcome)
             del run, outcome
             release_memory()
 
-    def _made(self, run: Run) -> Result | str:
-        """Return the result, or an error."""
+    def _outcome(self, run: QueuedRun) -> Result | str:
+        """Return the result, or the error."""
         try:
             return warpsplat.vectorize(
-                run.picture.data,
+                run.upload.data,
                 settings=run.settings,
-                name=run.picture.name,
+                name=run.upload.name,
                 device=self._machine.device,
                 threads=self._machine.threads,
                 callback=run.live,
                 stop=run.stopping.is_set,
             )
-        except BaseException as error:  # whatever it is, the next run may do better
+        except BaseException as error:  # whatever it is, the next run may succeed
             if os.environ.get("WARPSPLAT_TRACEBACK"):
                 traceback.print_exception(error)
             return explain(error)[0]
 
 
-class _Handler(logging.Handler):
-    def __init__(self, live: Live) -> None:
-        super().__init__()
-        self._live = live
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._live.notify(record.getMessage())
-
-
 @contextlib.contextmanager
-def _notices(live: Live) -> Iterator[None]:
-    """Show the library's notices on the run's page."""
-    log, handler = logging.getLogger("warpsplat"), _Handler(live)
+def _notices_to(live: Live) -> Iterator[None]:
+    """Show the notices of the library on a run's page."""
+    log, handler = logging.getLogger("warpsplat"), logging.Handler()
+    handler.emit = lambda record: live.notify(record.getMessage())  # type: ignore[method-assign]
     log.addHandler(handler)
     try:
         yield

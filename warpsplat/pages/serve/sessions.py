@@ -1,0 +1,93 @@
+"""A session is an open page: its images, and its runs from their place in the queue to their files."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from warpsplat.fit.settings import Settings
+from warpsplat.pages.serve.live import Live
+from warpsplat.pages.serve.uploads import Upload
+from warpsplat.run.result import Result
+
+State = Literal["waiting", "running", "done", "stopped", "failed"]
+
+FIGURES = ("psnr", "ssim", "bytes", "shapes", "seconds", "subject", "why", "reduced")
+"""Keys of ``Result.as_dict`` that the page shows."""
+
+
+@dataclass(eq=False)
+class QueuedRun:
+    """A run that a page asked for. ``Store`` changes it under its lock."""
+
+    id: str
+    number: int
+    """Number among the runs of its session, from 1."""
+    image: str
+    """Name of the upload in its session."""
+    upload: Upload
+    values: dict[str, Any]
+    """Settings, as they were given."""
+    settings: Settings
+    command: str
+    """Shell command that makes the same file."""
+    state: State = "waiting"
+    live: Live = field(default_factory=Live)
+    stopping: threading.Event = field(default_factory=threading.Event)
+    """Set to end the run with its current shapes."""
+    svg: bytes = b""
+    figures: dict[str, Any] = field(default_factory=dict)
+    error: str = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it is done, stopped or failed."""
+        return self.state not in {"waiting", "running"}
+
+    def finish(self, outcome: Result | str) -> None:
+        """Take the result, or the error."""
+        if isinstance(outcome, str):
+            self.error, self.state = outcome, "failed"
+        else:
+            figures = outcome.as_dict()
+            self.svg = outcome.svg.encode()
+            self.figures = {name: figures[name] for name in FIGURES if name in figures}
+            self.state = "stopped" if outcome.stopped else "done"
+        self.live.picture = b""
+
+    def as_dict(self, place: int) -> dict[str, Any]:
+        """Return the state for JSON; ``place``: the number of runs before it."""
+        names = ("id", "number", "image", "values", "command", "state", "error", "figures")
+        found = {name: getattr(self, name) for name in names}
+        if self.state == "waiting":
+            found["place"] = place
+        elif self.state == "running":
+            found |= {"live": self.live.as_dict(), "stopping": self.stopping.is_set()}
+        return found
+
+
+@dataclass(eq=False)
+class Session:
+    """A page: its images and runs, oldest first."""
+
+    id: str
+    seen: float
+    """Time at which it was opened, or its last reader left [s]."""
+    readers: int = 0
+    """Open streams of events."""
+    runs_started: int = 0
+    uploads: dict[str, Upload] = field(default_factory=dict)
+    runs: dict[str, QueuedRun] = field(default_factory=dict)
+
+    def runs_of(self, image: str) -> list[QueuedRun]:
+        """Return the runs of an image."""
+        return [run for run in self.runs.values() if run.image == image]
+
+    def as_dict(self, places: Mapping[QueuedRun, int]) -> dict[str, Any]:
+        """Return the state for JSON; ``places``: for each waiting run, the number of runs before it."""
+        return {
+            "images": [{"id": name} | upload.as_dict() for name, upload in self.uploads.items()],
+            "runs": [run.as_dict(places.get(run, 0)) for run in self.runs.values()],
+        }
