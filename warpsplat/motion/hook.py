@@ -17,8 +17,8 @@ from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
     from warpsplat.fit.progress import Progress
+    from warpsplat.motion.preview import Preview
     from warpsplat.motion.recorder import Recorder
-    from warpsplat.motion.terminal.preview import Preview
     from warpsplat.run.result import Result
 
 PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
@@ -83,7 +83,7 @@ class MotionHook(RunHook):
         else:
             self._check_animation(self._file, [*inputs, *outputs], overwrite=overwrite)
         if self._protocol:
-            from warpsplat.motion.terminal.start import start_preview
+            from warpsplat.motion.preview import start_preview
 
             self._preview = start_preview(sys.stderr, None if self._protocol == "auto" else self._protocol)
 
@@ -108,7 +108,7 @@ class MotionHook(RunHook):
 
         def watched(progress: Progress) -> None:
             if preview:
-                preview.report(progress)
+                preview.update(progress)
             on_progress(progress)
             if recorder:
                 recorder(progress)
@@ -118,7 +118,7 @@ class MotionHook(RunHook):
     def show(self, result: Result, image: bytes | Path | None) -> None:
         """Show the finished picture, beside the image if there is one."""
         if self._preview:
-            from warpsplat.motion.terminal.start import show_finished
+            from warpsplat.motion.preview import show_finished
 
             show_finished(self._preview, result, image)
 
