@@ -71,13 +71,13 @@ def test_refine_as_well(image: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     [
         (
             ["--animate", "a.avi"],
-            "a.avi: is no kind of animation; its name ends with .svg, .gif, .webp or .mp4",
+            "a.avi: not an animation format; the name must end in .svg, .gif, .webp or .mp4",
         ),
-        (["--animate", "-"], "an animation does not go to the standard output: give --animate FILE"),
+        (["--animate", "-"], "an animation cannot be written to the standard output: give --animate FILE"),
         (["--animate", "a.svg"], "a.svg: is another file of this run; give another name"),
         (["--animate", "there.gif/a.gif"], "there.gif/a.gif: {here}/there.gif is not a folder"),
         (["--animate", "a.gif", "--animate-width", "9"], "an animation is 16 to 2048 px wide, not 9"),
-        (["--animate-what", "drawing"], "--animate-what and --animate-width say how --animate FILE is made"),
+        (["--animate-what", "drawing"], "--animate-what and --animate-width need --animate FILE"),
         (
             ["--animate", "there.gif"],
             "there.gif: exists and was not written by warpsplat; --overwrite replaces it",

@@ -8,38 +8,35 @@ from dataclasses import dataclass
 
 from warpsplat.portable.elementary import power
 
-SECONDS = 6.0
-"""Of an animation's movement, where it is not said."""
+DEFAULT_SECONDS = 6.0
+"""Duration of an animation's movement [s]."""
 
-SHORTEST, LONGEST = 0.5, 60.0
-"""Of what may be said [s]."""
+MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
 
 HOLD = 2.0
-"""The finished picture stays, before a loop begins again [s]."""
+"""Time that the finished picture is shown before a loop starts again [s]."""
 
 EARLY = 1.5
-"""Power of a share of the animation that is the share of the run: much changes early, little late."""
+"""Share of the run = share of the animation to this power: much changes early, little late."""
 
 
 @dataclass(frozen=True)
 class Showing:
-    """One picture of an animation."""
+    """A picture of an animation."""
 
     index: int
-    """Of the pictures that there are."""
+    """Among the recorded pictures."""
     seconds: float
     """How long it is shown."""
 
 
 def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing]:
-    """Which pictures of a run ``seconds`` of ``ticks`` equal parts show.
-
-    Early ones are shown longer; late ones are skipped where there are more than parts.
+    """Return which recorded pictures an animation shows; late ones are skipped if there are more than ticks.
 
     Args:
-        moments: when the pictures were, counted in reports of the run, ascending.
-        ticks: parts.
-        seconds: in all.
+        moments: when the pictures were recorded, as numbers of progress reports, ascending.
+        ticks: equal parts of the animation.
+        seconds: duration.
     """
     found: list[Showing] = []
     for tick in range(ticks if moments else 0):
@@ -53,8 +50,6 @@ def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing
 
 
 def kept(moments: Sequence[int], most: int) -> list[int]:
-    """Indices of those pictures of a run that goes on that are kept where there is room for ``most``: those
-    that would be shown, the first and the last one among them.
-    """
+    """Return the indices of at most ``most`` pictures: those that would be shown, the first and the last."""
     chosen = {showing.index for showing in showings(moments, most - 2, 1.0)}
     return sorted(chosen | {0, len(moments) - 1})
