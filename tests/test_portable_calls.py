@@ -40,10 +40,8 @@ EXCEPTIONS = {
     ("warpsplat/pages/plot.py", "math.log10"): "a page's plot",
     ("warpsplat/portable/elementary.py", "**"): "powers of -1, which are whole numbers",
     ("warpsplat/portable/filters.py", "cv2.distanceTransformWithLabels"): "counts in whole numbers",
-    ("warpsplat/motion/terminal/blocks.py", "@"): "a preview",
     ("warpsplat/drawing/trace/assign.py", "cv2.distanceTransformWithLabels"): "counts in whole numbers",
-    ("warpsplat/motion/terminal/blocks.py", "cv2.cvtColor"): "a preview",
-    ("warpsplat/motion/terminal/layout.py", "cv2.resize"): "a preview",
+    ("warpsplat/motion/preview.py", "cv2.resize"): "a preview",
 }
 """What a file may call all the same, and what for."""
 

@@ -1,4 +1,4 @@
-"""Shapes as elements that move."""
+"""Shapes as moving elements."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, with_gradients
-from warpsplat.motion.moving import elements, kept_points
+from warpsplat.motion.moving import kept_points, moving_elements
 from warpsplat.scene import Basis, Scene
 
 UNITS = 400.0
 
 
 def made(*scenes: Scene) -> tuple[list[str], str]:
-    """One a line, of keys that are a second apart; and the rules."""
-    text, rules = elements(scenes, range(len(scenes)), 1.0, UNITS, lambda scene: f"<still{len(scene)}/>")
+    """Return lines of elements, with keyframes a second apart, and the rules."""
+    text, rules = moving_elements(
+        scenes, range(len(scenes)), 1.0, UNITS, lambda scene: f"<static{len(scene)}/>"
+    )
     return text.splitlines(), rules
 
 
 def places(line: str) -> list[str]:
-    """Path data of a moving path, by key."""
+    """Return the path data of a moving path by keyframe."""
     found = re.search(r'<animate attributeName="d" begin="0s" [^>]*values="([^"]*)"', line)
     assert found
     return found[1].split(";")
@@ -34,7 +36,7 @@ def commands(data: str) -> list[tuple[str, int]]:
     ]
 
 
-def test_paths_go_from_place_to_place_by_the_same_commands() -> None:
+def test_paths_move_with_equal_commands() -> None:
     scene = mixed_scene()
     lines, _ = made(scene, replace(scene, points=scene.points + np.float32(1)), scene)
     assert len(lines) == len(scene)
@@ -46,7 +48,7 @@ def test_paths_go_from_place_to_place_by_the_same_commands() -> None:
         assert abs(u - x - 10) <= 2 and abs(v - y - 10) <= 2, "400 units on a canvas of 40"
 
 
-def test_what_is_not_there_comes_and_goes() -> None:
+def test_shapes_fade_in_and_out() -> None:
     scene = mixed_scene()
     less = scene.take(np.arange(1, len(scene)))
     lines, _ = made(less, scene, scene, less)
@@ -55,7 +57,7 @@ def test_what_is_not_there_comes_and_goes() -> None:
     assert 'animation:i 1s linear 0s backwards,o 1s linear 2s forwards"' in fading[0]
 
 
-def test_what_comes_is_where_it_is_first_while_it_comes() -> None:
+def test_a_new_shape_waits_at_its_first_position() -> None:
     scene = mixed_scene()
     less, moved = scene.take(np.arange(1, len(scene))), replace(scene, points=scene.points + np.float32(1))
     lines, _ = made(less, less, scene, moved)
@@ -67,7 +69,7 @@ def test_what_comes_is_where_it_is_first_while_it_comes() -> None:
 
 
 @pytest.mark.parametrize("opacity", [1.0, 0.9, 0.6])
-def test_what_covers_stays_below_what_comes_in_its_place(opacity: float) -> None:
+def test_an_opaque_element_stays_until_its_successor_is_there(opacity: float) -> None:
     scene = with_gradients(mixed_scene())
     scene = replace(
         scene,
@@ -76,8 +78,8 @@ def test_what_covers_stays_below_what_comes_in_its_place(opacity: float) -> None
     )
     number = int((scene.paint != 0).sum())
     count = iter(range(9 * number))
-    text, _ = elements([scene, scene], range(2), 1.0, UNITS, lambda _: f"<still{next(count)}/>")
-    groups = [line for line in text.splitlines() if "<still" in line]
+    text, _ = moving_elements([scene, scene], range(2), 1.0, UNITS, lambda _: f"<static{next(count)}/>")
+    groups = [line for line in text.splitlines() if "<static" in line]
     assert len(groups) == 2 * number
     assert sum("animation:gi 1s linear 0s backwards" in line for line in groups) == number
     goes = "go 0s linear 1s forwards" if opacity > 0.8 else "go 1s linear 0s forwards"
@@ -106,7 +108,7 @@ def test_an_outline_that_loses_points_keeps_its_commands() -> None:
     assert commands(first) == commands(second) and first != second
 
 
-def test_which_points_are_left() -> None:
+def test_kept_points() -> None:
     before = np.array([[0, 0], [5, 0], [5, 5], [0, 5], [0, 2]], np.float32)
     assert kept_points(before, before[[0, 2, 4]] + np.float32(0.4)).tolist() == [0, 2, 4]
     assert kept_points(before, before[[1, 2, 3, 4]]).tolist() == [1, 2, 3, 4]
@@ -115,5 +117,5 @@ def test_which_points_are_left() -> None:
 def test_gradients_stay_until_they_change() -> None:
     scene = with_gradients(mixed_scene())
     lines, _ = made(scene, scene, scene)
-    assert sum("<still1/>" in line for line in lines) == int((scene.paint != 0).sum())
-    assert not any("<still" in line and "animation" in line for line in lines)
+    assert sum("<static1/>" in line for line in lines) == int((scene.paint != 0).sum())
+    assert not any("<static" in line and "animation" in line for line in lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run
 from warpsplat.cli import signals
-from warpsplat.motion.terminal import detect, start
+from warpsplat.motion import preview
 from warpsplat.svg.viewer import render_own
 
 SHORT = [*QUICK[:2], "--iterations", "40", *QUICK[4:]]
@@ -70,13 +71,13 @@ def test_refine_as_well(image: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     [
         (
             ["--animate", "a.avi"],
-            "a.avi: is no kind of animation; its name ends with .svg, .gif, .webp or .mp4",
+            "a.avi: not an animation format; the name must end in .svg, .gif, .webp or .mp4",
         ),
-        (["--animate", "-"], "an animation does not go to the standard output: give --animate FILE"),
+        (["--animate", "-"], "an animation cannot be written to the standard output: give --animate FILE"),
         (["--animate", "a.svg"], "a.svg: is another file of this run; give another name"),
         (["--animate", "there.gif/a.gif"], "there.gif/a.gif: {here}/there.gif is not a folder"),
         (["--animate", "a.gif", "--animate-width", "9"], "an animation is 16 to 2048 px wide, not 9"),
-        (["--animate-what", "drawing"], "--animate-what and --animate-width say how --animate FILE is made"),
+        (["--animate-what", "drawing"], "--animate-what and --animate-width need --animate FILE"),
         (
             ["--animate", "there.gif"],
             "there.gif: exists and was not written by warpsplat; --overwrite replaces it",
@@ -108,7 +109,7 @@ def test_without_a_terminal_a_line_says_so(
     captured = capfdbinary.readouterr()
     lines = captured.err.decode().splitlines()
     assert lines[0] == (
-        "warpsplat: --preview: stderr is no terminal that shows pictures; --preview=blocks prints them"
+        "warpsplat: --preview: stderr is not a terminal that shows pictures; --preview=blocks prints them"
     )
     assert captured.out.startswith(b"<svg") and len(lines) == 2
 
@@ -116,26 +117,22 @@ def test_without_a_terminal_a_line_says_so(
 def test_an_encoding_without_half_blocks(
     image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(start, "HALF", "\udc80")
+    monkeypatch.setattr(preview, "HALF", "\udc80")
     assert run("vectorize", image, "-o", tmp_path / "a.svg", *QUICK, "--preview=blocks") == 0
     assert "has no half blocks" in one_line(capsys.readouterr().err)
 
 
-def test_the_preview_knows_of_notices(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which go below it; those that pass leave no line."""
-    import sys
-
-    monkeypatch.setattr(detect, "_size", lambda stream, environ: (80, 24, 0, 0))
-    made = start.start_preview(sys.stderr, "blocks")
-    assert made
-    moved = []
-    monkeypatch.setattr(made, "move_on", lambda: moved.append(1))
+def test_notices_go_below_the_preview(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages that are overwritten leave no line."""
+    moved: list[preview.Preview] = []
+    monkeypatch.setattr(preview.Preview, "move_on", lambda self: moved.append(self))  # noqa: PLW0108
     log = logging.getLogger("warpsplat")
-    log.warning("a notice")
-    log.warning("compiling", extra={"passing": True})
-    assert len(moved) == 1
-    again = start.start_preview(sys.stderr, "blocks")
-    assert again and sum(type(handler).__name__ == "_NoticeHandler" for handler in log.handlers) == 1
+    for _ in range(2):  # a second preview replaces the first
+        made = preview.start_preview(sys.stderr, "blocks")
+        log.warning("a notice")
+        log.warning("compiling", extra={"passing": True})
+        assert moved == [made]
+        moved.clear()
 
 
 @pytest.mark.parametrize("terminal", [True, False])

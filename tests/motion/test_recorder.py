@@ -50,7 +50,7 @@ def shown(svg: str, width: int) -> np.ndarray:
 @pytest.mark.parametrize("what", ["training", "drawing"])
 @pytest.mark.parametrize(("ending", "least"), [("gif", 28), ("webp", 28), ("mp4", 28)])
 def test_a_film_ends_with_the_file(
-    recorded: Recorded, tmp_path: Path, ending: str, least: float, what: recorder.What
+    recorded: Recorded, tmp_path: Path, ending: str, least: float, what: recorder.Subject
 ) -> None:
     made, result = recorded
     path = tmp_path / f"a.{ending}"
@@ -120,7 +120,7 @@ def test_what_is_kept_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """By number and by bytes; the first and the last scenes are there, the early ones are denser."""
     scene = mixed_scene()
     scenes = [replace(scene, widths=np.full_like(scene.widths, i)) for i in range(250)]
-    monkeypatch.setattr(recorder, "MOST_SCENES", 60)
+    monkeypatch.setattr(recorder, "MAX_SCENES", 60)
     made = Recorder()
     snapshots(made, scenes)
     assert 30 < len(made.scenes) <= 60
@@ -129,7 +129,7 @@ def test_what_is_kept_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     early, later = (sum(first <= moment < first + 50 for moment in made.moments) for first in (0, 120))
     assert early > later
     assert max(np.diff(made.moments)) < 20
-    monkeypatch.setattr(recorder, "MOST_BYTES", 10 * recorder._bytes_of(scene))
+    monkeypatch.setattr(recorder, "MAX_BYTES", 10 * recorder._bytes_of(scene))
     made = Recorder()
     snapshots(made, scenes[:100])
     assert 5 <= len(made.scenes) <= 10
@@ -157,7 +157,7 @@ def test_what_cannot_be_made_is_said(
     recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made, result = recorded
-    with pytest.raises(UsageError, match=r"a\.avi: is no kind of animation; its name ends with \.svg, "):
+    with pytest.raises(UsageError, match=r"a\.avi: not an animation format; the name must end in \.svg, "):
         made.save(tmp_path / "a.avi", result)
     with pytest.raises(UsageError, match="16 to 2048 px wide, not 5"):
         made.save(tmp_path / "a.gif", result, width=5)
@@ -165,7 +165,7 @@ def test_what_cannot_be_made_is_said(
         made.save(tmp_path / "a.gif", result, seconds=0.1)
     with pytest.raises(UsageError, match="training or drawing, not dance"):
         made.save(tmp_path / "a.gif", result, what="dance")
-    with pytest.raises(UsageError, match="no training to show"):
+    with pytest.raises(UsageError, match="there is no training to show"):
         Recorder().save(tmp_path / "a.gif", result, what="training")
     monkeypatch.setattr(films, "VIDEO_PACKAGE", "no_such_package")
     with pytest.raises(UsageError, match="pip install no_such_package, or warpsplat with its extra"):

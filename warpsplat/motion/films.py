@@ -1,213 +1,203 @@
-"""Write animations as GIF, WebP or MP4."""
+"""Films: rasterise SVGs as frames and encode frames as a GIF, WebP or MP4."""
 
 from __future__ import annotations
 
 import importlib.util
 import io
-import itertools
 import math
 import struct
 import tempfile
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from PIL import Image
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.image import WEBP_SIDE
 from warpsplat.files.marks import GIF_COMMENT, MP4_MARK, WEBP_MARK
 from warpsplat.motion.timing import HOLD
+from warpsplat.svg.inspect import inspect_svg, svg_size
+from warpsplat.svg.viewer import render_own, render_svg
 
 VIDEO_PACKAGE = "av"
-"""FFmpeg with an encoder of H.264, which browsers, QuickTime and Windows play. OpenCV has
-none: it writes MPEG-4 part 2, which plays in no browser.
-"""
+"""FFmpeg with an H.264 encoder; OpenCV only has MPEG-4 part 2, which no browser plays."""
 
 
-@dataclass(frozen=True)
-class Format:
-    """Properties of a kind of film."""
+class FilmFormat(NamedTuple):
+    """Defaults of a file format."""
 
     rate: float
     """Frames per second."""
     side: int
-    """Default of the longer side [px]."""
+    """Longest side if no width is given [px]."""
 
 
-FORMATS = {".gif": Format(12.5, 480), ".webp": Format(15, 800), ".mp4": Format(25, 800)}
-"""Kinds of films by their ending: a GIF counts hundredths of a second, and grows with its area."""
+FORMATS = {".gif": FilmFormat(12.5, 480), ".webp": FilmFormat(15, 800), ".mp4": FilmFormat(25, 800)}
+"""By extension. GIFs count in hundredths of a second, and are large."""
 
-ENDINGS = (".svg", *FORMATS)
-"""File name endings of animations."""
+MIN_SIDE = 320
+"""Longest side of a film of a smaller image [px]."""
 
-LEAST_SIDE = 320
-"""Longer side of films of smaller images [px]: shapes have no pixels."""
+MAX_PIXELS = 80_000_000
+"""Of all frames of a film: the GIF and WebP encoders hold them all, with four bytes per pixel."""
+
+Size = tuple[int, int]
+"""Width and height [px]."""
 
 Frame = tuple[Image.Image, float]
-"""An image, RGB or RGBA, and its duration [s]."""
+"""An RGB or RGBA picture, and how long it is shown [s]."""
 
 
 def check_format(path: Path) -> None:
-    """Check that an animation of this name can be made.
+    """Check that an animation with this extension can be made.
 
     Raises:
-        UsageError: there is none of that ending, or a package is missing; the message says how it is
-            installed.
+        UsageError: the extension is unknown, or a package is missing; the message says how to install it.
     """
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        known = ", ".join(ENDINGS[:-1]) + " or " + ENDINGS[-1]
-        raise UsageError(f"{path}: is no kind of animation; its name ends with {known}")
-    if ending == ".mp4" and importlib.util.find_spec(VIDEO_PACKAGE) is None:
+    extension = path.suffix.lower()
+    if extension not in (".svg", *FORMATS):
+        raise UsageError(f"{path}: not an animation format; the name must end in .svg, .gif, .webp or .mp4")
+    if extension == ".mp4" and importlib.util.find_spec(VIDEO_PACKAGE) is None:
         raise UsageError(
             f"{path}: MP4s need a package that is not installed: "
             f"pip install {VIDEO_PACKAGE}, or warpsplat with its extra: '.[video]'"
         )
 
 
-def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
-    """Return the pixels of a film per pixel of an image of ``size``.
+# Frames.
 
-    The longer side is at most ``WEBP_SIDE``, also the limit of H.264, if the shorter one keeps a pixel.
+
+def size_of(text: str) -> tuple[float, float]:
+    """Return the width and height of an SVG [px].
+
+    Raises:
+        ImageError: it has no size.
+    """
+    size = svg_size(inspect_svg(text).root)
+    if size is None:
+        raise ImageError("has neither a size nor a viewBox")
+    return size
+
+
+def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
+    """Return pixels of the film per pixel of a picture of ``size``.
+
+    The shorter side keeps at least a pixel as long as the longer one has at most ``WEBP_SIDE``, which is also
+    the limit of H.264 encoders.
     """
     if width is not None:
         zoom = width / size[0]
     else:
-        most = FORMATS[path.suffix.lower()].side
-        zoom = min(most, max(*size, LEAST_SIDE)) / max(size)
+        zoom = min(FORMATS[path.suffix.lower()].side, max(*size, MIN_SIDE)) / max(size)
     return min(max(zoom, 1 / min(size)), WEBP_SIDE / max(size))
 
 
-MOST_PIXELS = 80_000_000
-"""Maximum number of pixels of a film: GIF and WebP encoders hold all frames, with four bytes a pixel."""
+def frame_size(text: str, zoom: float) -> Size:
+    """Return the whole pixels that an SVG covers at ``zoom``."""
+    width, height = size_of(text)
+    return max(1, int(width * zoom + 1e-6)), max(1, int(height * zoom + 1e-6))
 
 
-def ticks_of(path: Path, size: tuple[int, int], seconds: float) -> int:
-    """Return the maximum number of moving frames of a film of ``size``."""
-    most = MOST_PIXELS // (size[0] * size[1])
+def frame_count(path: Path, size: Size, seconds: float) -> int:
+    """Return the largest number of frames for a movement of ``seconds``."""
+    most = MAX_PIXELS // (size[0] * size[1])
     return max(2, min(most, round(FORMATS[path.suffix.lower()].rate * seconds)))
 
 
-def encoded(path: Path, frames: Iterable[Frame]) -> bytes:
-    """Return a film in the format of ``path``; the last frame stays ``HOLD`` seconds longer.
+def rasterised(text: str, size: Size, zoom: float | None = None) -> Image.Image:
+    """Render an SVG as viewers do: RGBA, cropped to ``size``.
 
-    GIF and WebP play again and again. GIF and MP4 have no opacity: transparency is white there.
+    Args:
+        text: any SVG; without a ``zoom``, one that was written by warpsplat, of this size.
+        size: of the picture.
+        zoom: magnification.
+
+    Raises:
+        ImageError: it cannot be drawn.
     """
-    make = {".gif": _gif, ".webp": _webp, ".mp4": _mp4}[path.suffix.lower()]
-    return make(_held(frames))
+    image = render_own(text) if zoom is None else render_svg(text, zoom=zoom)
+    return image.convert("RGBA").crop((0, 0, *size))
 
 
-def _held(frames: Iterable[Frame]) -> Iterator[Frame]:
-    """Extend the duration of the last frame."""
-    before: Frame | None = None
-    for frame in frames:
-        if before:
-            yield before
-        before = frame
-    if before:
-        yield before[0], before[1] + HOLD
+# Encoders.
+
+
+def encoded(path: Path, frames: Iterable[Frame]) -> bytes:
+    """Return the film in the format of ``path``; the last frame is shown ``HOLD`` seconds longer.
+
+    GIF and WebP loop. GIF and MP4 have no opacity: transparency becomes white.
+    """
+    *others, (last, seconds) = frames
+    encode = {".gif": _gif, ".webp": _webp, ".mp4": _mp4}[path.suffix.lower()]
+    return encode([*others, (last, seconds + HOLD)])
 
 
 def _opaque(picture: Image.Image) -> Image.Image:
-    """Return an image on white."""
+    """Return the picture on white."""
     if picture.mode == "RGB":
         return picture
-    white = Image.new("RGBA", picture.size, "white")
-    return Image.alpha_composite(white, picture).convert("RGB")
+    return Image.alpha_composite(Image.new("RGBA", picture.size, "white"), picture).convert("RGB")
 
 
-COLORS = 255
-"""Colours of a GIF's frame; one of 256 is left for unchanged pixels."""
+GIF_COLORS = 255
+"""Per frame; one of 256 is left for the pixels that did not change."""
+
+PALETTE_PIXELS = 10_000
+"""Pixels that a frame's palette is chosen from; all of them take nine times as long for half a decibel."""
 
 
-ENOUGH_PIXELS = 10_000
-"""Pixels to choose a frame's colours from; all of them take nine times as long, for half a decibel."""
+def _with_palette(picture: Image.Image) -> Image.Image:
+    step = max(1, math.isqrt(picture.width * picture.height // PALETTE_PIXELS))
+    sample = picture.resize([max(1, side // step) for side in picture.size], Image.Resampling.NEAREST)
+    quantized = sample.quantize(GIF_COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    return quantized if step == 1 else picture.quantize(palette=quantized, dither=Image.Dither.NONE)
 
 
-def _few_colors(picture: Image.Image) -> Image.Image:
-    """Reduce an image to ``COLORS``."""
-    step = max(1, math.isqrt(picture.width * picture.height // ENOUGH_PIXELS))
-    some = picture.resize([max(1, side // step) for side in picture.size], Image.Resampling.NEAREST)
-    table = some.quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    return table if step == 1 else picture.quantize(palette=table, dither=Image.Dither.NONE)
+def _gif(frames: list[Frame]) -> bytes:
+    """Encode with a palette per frame: a common one shows banding, and dithering flickers."""
+    pictures = [_with_palette(_opaque(picture)) for picture, _ in frames]
+    times = [round(100 * seconds) * 10 for _, seconds in frames]
+    return _encoded_by_pillow(pictures, times, format="GIF", comment=GIF_COMMENT, optimize=False)
 
 
-def _gif(frames: Iterable[Frame]) -> bytes:
-    """Write a GIF with a colour table a frame: a common one shows steps in skies and skin.
-
-    Without dithering, whose grain would flicker and take twice the bytes.
-    """
-    pictures, times = [], []
-    for picture, seconds in frames:
-        pictures.append(_few_colors(_opaque(picture)))
-        times.append(round(100 * seconds) * 10)
-    packed = io.BytesIO()
-    pictures[0].save(
-        packed,
-        "GIF",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=times,
-        loop=0,
-        comment=GIF_COMMENT,
-        optimize=False,
-    )
-    return packed.getvalue()
-
-
-WEBP_QUALITY = 80
-
-WEBP_METHOD = 2
-"""WebP effort, 0 to 6: twice as fast as the default 4, for 4 % more bytes; 1 and 0 take 30 % more."""
-
-
-def _webp(frames: Iterable[Frame]) -> bytes:
-    pictures = list(frames)
-    packed = io.BytesIO()
-    pictures[0][0].save(
-        packed,
-        "WEBP",
-        save_all=True,
-        append_images=[picture for picture, _ in pictures[1:]],
-        duration=[round(1000 * seconds) for _, seconds in pictures],
-        loop=0,
-        quality=WEBP_QUALITY,
-        method=WEBP_METHOD,
-    )
-    data = packed.getvalue() + WEBP_MARK
+def _webp(frames: list[Frame]) -> bytes:
+    times = [round(1000 * seconds) for _, seconds in frames]
+    # Method 2 is twice as fast as the default 4, for 4 % more bytes; 1 and 0 take 30 % more.
+    data = _encoded_by_pillow([picture for picture, _ in frames], times, format="WEBP", quality=80, method=2)
+    data += WEBP_MARK
     return data[:4] + struct.pack("<I", len(data) - 8) + data[8:]
 
 
+def _encoded_by_pillow(pictures: list[Image.Image], times: list[int], **options: Any) -> bytes:
+    """Encode a loop; ``times`` in ms."""
+    packed = io.BytesIO()
+    pictures[0].save(packed, save_all=True, append_images=pictures[1:], duration=times, loop=0, **options)
+    return packed.getvalue()
+
+
 H264 = {"crf": "17", "preset": "veryfast", "threads": "1"}
-"""Of x264, whose authors say that an eye hardly tells 18 from the source. Films are as large as with 18 and
-the usual preset, half a decibel further from the source, and take a third of the time; several threads would
-mostly wait, as pictures come one by one."""
+"""Options of x264: files as large as with CRF 18 and the default preset, half a decibel worse, in a third of
+the time. Several threads would mostly wait, as frames come one by one."""
 
 
-def _mp4(frames: Iterable[Frame]) -> bytes:
-    # In a file: its table of contents comes to the front, for players that do not wait for all.
-    with tempfile.TemporaryDirectory(prefix="warpsplat-") as folder:
-        path = Path(folder, "film.mp4")
-        _encode_h264(path, frames)
-        return path.read_bytes() + MP4_MARK
-
-
-def _encode_h264(path: Path, frames: Iterable[Frame]) -> None:
-    """Write an MP4 for all players: even sides, a constant rate, and half-size chroma."""
+def _mp4(frames: list[Frame]) -> bytes:
+    """Encode an MP4 that all players accept: even sides, constant rate, chroma at half the resolution."""
     import av
 
     rate = round(FORMATS[".mp4"].rate)
-    frames = iter(frames)
-    first = next(frames)
-    width, height = (max(2, side // 2 * 2) for side in first[0].size)
-    with av.open(str(path), "w", options={"movflags": "faststart"}) as film:
-        stream = film.add_stream("libx264", rate=rate, options=H264)
-        stream.width, stream.height = width, height
-        stream.pix_fmt = "yuv420p"
-        for picture, seconds in itertools.chain([first], frames):
-            shown = av.VideoFrame.from_image(_opaque(picture).crop((0, 0, width, height)))
-            for _ in range(max(1, round(rate * seconds))):
-                shown.pts = None
-                film.mux(stream.encode(shown))
-        film.mux(stream.encode(None))
+    width, height = (max(2, side // 2 * 2) for side in frames[0][0].size)
+    # By way of a file, so that "faststart" can move the index to the front, for players that stream.
+    with tempfile.TemporaryDirectory(prefix="warpsplat-") as folder:
+        path = Path(folder, "film.mp4")
+        with av.open(str(path), "w", options={"movflags": "faststart"}) as film:
+            stream = film.add_stream("libx264", rate=rate, options=H264)
+            stream.width, stream.height = width, height
+            stream.pix_fmt = "yuv420p"
+            for picture, seconds in frames:
+                shown = av.VideoFrame.from_image(_opaque(picture).crop((0, 0, width, height)))
+                for _ in range(max(1, round(rate * seconds))):
+                    shown.pts = None
+                    film.mux(stream.encode(shown))
+            film.mux(stream.encode(None))
+        return path.read_bytes() + MP4_MARK

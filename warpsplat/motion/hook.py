@@ -1,4 +1,4 @@
-"""``--animate`` and ``--preview``: how the shapes came to be, as a file and in the terminal."""
+"""``--animate`` and ``--preview``: show a run as an animation and in the terminal."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
     from warpsplat.fit.progress import Progress
+    from warpsplat.motion.preview import Preview
     from warpsplat.motion.recorder import Recorder
-    from warpsplat.motion.terminal.preview import Preview
     from warpsplat.run.result import Result
 
 PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
@@ -28,13 +28,13 @@ OPTIONS = {
         "--animate",
         type=FILE,
         metavar="FILE",
-        help="Write an animation as well: .svg, .gif, .webp or .mp4.",
+        help="Also write an animation: .svg, .gif, .webp or .mp4.",
     ),
     "animate_what": click.option(
         "--animate-what",
         type=click.Choice(["training", "drawing"]),
-        help="How the shapes came to be, or how they are drawn one after the other.  [default: training,"
-        " and drawing of what is traced]",
+        help="How the shapes were optimised, or how they are drawn one after the other.  [default: training;"
+        " drawing for traced images]",
     ),
     "animate_width": click.option(
         "--animate-width",
@@ -45,14 +45,14 @@ OPTIONS = {
     "preview": click.option(
         "--preview",
         type=click.Choice(PROTOCOLS),
-        help="Show the picture in the terminal (stderr), live during the run, as well as the terminal can;"
-        " or --preview=blocks ...",
+        help="Show the picture in the terminal (stderr), live during the run, by its best protocol;"
+        " --preview=NAME chooses one.",
     ),
 }
 
 
 class MotionHook(RunHook):
-    """Records a run for an animation, and draws it in the terminal."""
+    """Records a run for an animation, and shows it in the terminal."""
 
     options = OPTIONS
 
@@ -76,14 +76,14 @@ class MotionHook(RunHook):
         return "--animate" if self._file else "--preview" if self._protocol else None
 
     def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
-        """Check that the animation can be made and is none of the run's files, and open the preview."""
+        """Check that the animation can be made and is no other file of the run, and start the preview."""
         if self._file is None:
             if self._what or self._width is not None:
-                raise UsageError("--animate-what and --animate-width say how --animate FILE is made")
+                raise UsageError("--animate-what and --animate-width need --animate FILE")
         else:
             self._check_animation(self._file, [*inputs, *outputs], overwrite=overwrite)
         if self._protocol:
-            from warpsplat.motion.terminal.start import start_preview
+            from warpsplat.motion.preview import start_preview
 
             self._preview = start_preview(sys.stderr, None if self._protocol == "auto" else self._protocol)
 
@@ -94,7 +94,7 @@ class MotionHook(RunHook):
         from warpsplat.motion.recorder import Recorder, check_width
 
         if path == STANDARD:
-            raise UsageError("an animation does not go to the standard output: give --animate FILE")
+            raise UsageError("an animation cannot be written to the standard output: give --animate FILE")
         check_format(path)
         check_width(self._width)
         check_output(path, *files, overwrite=overwrite)
@@ -108,7 +108,7 @@ class MotionHook(RunHook):
 
         def watched(progress: Progress) -> None:
             if preview:
-                preview.report(progress)
+                preview.update(progress)
             on_progress(progress)
             if recorder:
                 recorder(progress)
@@ -118,12 +118,12 @@ class MotionHook(RunHook):
     def show(self, result: Result, image: bytes | Path | None) -> None:
         """Show the finished picture, beside the image if there is one."""
         if self._preview:
-            from warpsplat.motion.terminal.start import show_finished
+            from warpsplat.motion.preview import show_finished
 
             show_finished(self._preview, result, image)
 
     def finish(self, done: Done) -> None:
-        """Write the animation, drawn on the device of the run."""
+        """Write the animation, rendered on the device of the run."""
         if self._file is None or self._recorder is None:
             return
         from warpsplat.run.result import Result
@@ -132,10 +132,10 @@ class MotionHook(RunHook):
         assert isinstance(result, Result)
         what = self._what or self._recorder.shows(result)
         if what == "training" and not self._recorder.has_training:
-            echo(f"warpsplat: {self._file}: no training to show, so it shows the drawing", err=True)
+            echo(f"warpsplat: {self._file}: no training to show; it shows the drawing instead", err=True)
             what = "drawing"
         log = logging.getLogger("warpsplat")
-        log.info(f"{self._file}: pictures of the {what} ...", extra={"passing": True})
+        log.info(f"{self._file}: drawing frames of the {what} ...", extra={"passing": True})
         device, threads = done.request.device, done.request.threads
         try:
             size = self._recorder.save(

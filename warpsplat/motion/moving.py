@@ -1,8 +1,7 @@
-"""Write the shapes of a run as animated elements of an SVG (SMIL): those that persist move, others fade in or
-out.
+"""Shapes of a run as moving elements of an SVG: SMIL moves them, new ones fade in, removed ones fade out.
 
-Path data are interpolated by viewers where their commands are the same, so that a shape has as many points
-throughout as in the beginning: where the run has removed one, it lies between its neighbours.
+Viewers interpolate path data with equal commands, so an element has as many points throughout as in the
+beginning: a point that the run has removed lies between its neighbours.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpsplat.motion.follow import lives
+from warpsplat.motion.follow import track_shapes
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
@@ -21,124 +20,124 @@ from warpsplat.svg.data import even_cubic_data, even_spline_data
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.write import OPACITY_DECIMALS, PAINTED, STROKE_ATTRIBUTES
 
-Form = tuple[int, int, int, int]
-"""Properties that are fixed while a shape moves: kind, basis, rule, closed."""
+COVERING = 0.8
+"""Opacity from which an element stays until the next one of its shape is there. Translucent ones fade out as
+the next fades in: two of them cover too much; but two fading opaque ones let the background shine through.
+"""
 
 
-class Value(NamedTuple):
-    """Of an attribute."""
+class PathForm(NamedTuple):
+    """What does not change while a shape moves."""
+
+    kind: int
+    basis: int
+    rule: int
+    closed: int
+
+
+class AttributeValue(NamedTuple):
+    """An attribute at a keyframe."""
 
     numbers: FloatArray
-    """As they are."""
     text: str
-    """As it is written."""
 
 
 @dataclass
-class Piece:
-    """A life, or a part of one, as an element."""
+class MovingElement:
+    """The element of a shape, from one keyframe to another."""
 
     key: int
-    """The first one that it is in."""
-    form: Form | None
-    """None: it stays where it is."""
+    """First keyframe."""
+    form: PathForm | None
+    """None: it cannot move."""
     slots: IndexArray
-    """Which of its points are those of the shape as it is now, shape (point,)."""
+    """Which of its points are those of the shape at the last keyframe, shape (point,)."""
     points: list[FloatArray] = field(default_factory=list)
-    """By key, shape (point, 2)."""
-    values: dict[str, list[Value]] = field(default_factory=dict)
-    """Of its attributes, by key."""
+    """By keyframe, shape (point, 2)."""
+    values: dict[str, list[AttributeValue]] = field(default_factory=dict)
+    """By attribute and keyframe."""
     end: int = 0
-    """The last key that it is in."""
+    """Last keyframe."""
     markup: str = ""
-    """Of what stays."""
+    """If it cannot move."""
     covers: bool = False
-    """Whether nearly nothing is seen through it."""
-    followed: bool = False
-    """Whether its life goes on in another piece."""
+    """Whether it is nearly opaque."""
+    continued: bool = False
+    """Whether another element of the same shape follows."""
 
 
-def elements(
-    scenes: Sequence[Scene], keys: Sequence[int], tick: float, units: float, still: Callable[[Scene], str]
+def moving_elements(
+    scenes: Sequence[Scene], keys: Sequence[int], tick: float, units: float, static: Callable[[Scene], str]
 ) -> tuple[str, str]:
-    """What moves from each of the scenes ``keys`` to the next one, as elements and their style sheet.
+    """Return elements that move between the scenes ``keys``, and their style sheet.
 
     Args:
-        scenes: of the run, as their files have them, without gaps in which shapes move far.
-        keys: indices of those that are shown, ascending.
-        tick: time from one of them to the next [s].
-        units: of the elements' coordinates that a canvas is wide.
-        still: the markup of a scene of shapes that cannot move, as gradients: what is to be shown from one
-            key to the next.
+        scenes: of the run, as their files show them, with little movement between two.
+        keys: indices of the scenes that are keyframes, ascending.
+        tick: time between two keyframes [s].
+        units: width of the canvas in the elements' coordinates.
+        static: returns the markup of a scene of shapes that cannot move, such as gradients.
     """
-    followed = lives(scenes)
-    pieces: dict[int, list[Piece]] = {}
+    tracks = track_shapes(scenes)
+    elements: dict[int, list[MovingElement]] = {}
     for key, index in enumerate(keys):
-        _add(pieces, key, scenes[index], followed.numbers[index], units, still)
-    ordered = [piece for life in followed.order for piece in pieces.get(life, ())]
-    made = [_element(piece, f"p{i}", tick, len(keys) - 1) for i, piece in enumerate(ordered)]
-    return "".join(element for element, _ in made), STYLE + "".join(rule for _, rule in made)
+        _add_keyframe(elements, key, scenes[index], tracks.numbers[index], units, static)
+    ordered = [element for shape in tracks.order for element in elements.get(shape, ())]
+    written = [_written(element, f"p{i}", tick, len(keys) - 1) for i, element in enumerate(ordered)]
+    return "".join(text for text, _ in written), STYLE + "".join(rule for _, rule in written)
 
 
-def _add(
-    pieces: dict[int, list[Piece]],
+def _add_keyframe(
+    elements: dict[int, list[MovingElement]],
     key: int,
     scene: Scene,
     numbers: IndexArray,
     units: float,
-    still: Callable[[Scene], str],
+    static: Callable[[Scene], str],
 ) -> None:
-    """The shapes of a key, each behind what its life has so far."""
+    """Add a keyframe to the elements of each shape."""
     zoom = units / scene.canvas.width
     colors, movable = hex_colors(scene.colors), _movable(scene)
     twins = np.append(scene.twin[1:], 0)
     for row in np.flatnonzero(scene.twin == 0).tolist():
-        life = pieces.setdefault(int(numbers[row]), [])
-        if not movable[row]:
-            markup = still(scene.take(np.arange(row, row + 1 + twins[row])))
-            if not (life and life[-1].markup == markup):
-                _begin(life, Piece(key, None, np.zeros(0, np.intp), markup=markup))
-            life[-1].end, life[-1].covers = key, _opacity(scene, row) >= COVERING
-            continue
-        form, points = _form(scene, row), zoom * scene.points[scene.first[row] : scene.first[row + 1]]
-        if not (life and _goes_on(life[-1], form, points)):
-            _begin(life, Piece(key, form, np.arange(len(points)), [points]))
-        life[-1].end, life[-1].covers = key, bool(scene.opacities[row] >= COVERING)
-        for name, value in _look(scene, row, colors[row], zoom).items():
-            life[-1].values.setdefault(name, []).append(value)
+        own = elements.setdefault(int(numbers[row]), [])
+        if movable[row]:
+            form, points = _form(scene, row), zoom * scene.points[scene.first[row] : scene.first[row + 1]]
+            if not (own and _continues(own[-1], form, points)):
+                _append(own, MovingElement(key, form, np.arange(len(points)), [points]))
+            opacity = float(scene.opacities[row])
+            for name, value in _attributes(scene, row, colors[row], zoom).items():
+                own[-1].values.setdefault(name, []).append(value)
+        else:
+            markup = static(scene.take(np.arange(row, row + 1 + twins[row])))
+            if not (own and own[-1].markup == markup):
+                _append(own, MovingElement(key, None, np.zeros(0, np.intp), markup=markup))
+            alone = scene.take(np.arange(row, row + 1))
+            opacity = float(alone.opacities[0] * alone.stop_opacities.min(initial=1.0))
+        own[-1].end, own[-1].covers = key, opacity >= COVERING
 
 
-def _begin(life: list[Piece], piece: Piece) -> None:
-    if life:
-        life[-1].followed = life[-1].end == piece.key - 1
-    life.append(piece)
+def _append(elements: list[MovingElement], element: MovingElement) -> None:
+    if elements:
+        elements[-1].continued = elements[-1].end == element.key - 1
+    elements.append(element)
 
 
-COVERING = 0.8
-"""Opacity from which on it is better that a piece stays below the next one until that is there, than that one
-goes as the other comes: then more of what is behind them would be seen than of translucent ones too little.
-"""
-
-
-def _opacity(scene: Scene, row: int) -> float:
-    """Of a shape where it is most translucent."""
-    own = scene.take(np.arange(row, row + 1))
-    return float(own.opacities[0] * own.stop_opacities.min(initial=1.0))
-
-
-def _look(scene: Scene, row: int, color: str, zoom: float) -> dict[str, Value]:
-    """What a shape looks like, besides its outline."""
+def _attributes(scene: Scene, row: int, color: str, zoom: float) -> dict[str, AttributeValue]:
+    """Return a shape's colour, opacity and width as attributes."""
     kind = Kind(int(scene.kind[row]))
     opacity, width = scene.opacities[row : row + 1], zoom * scene.widths[row : row + 1]
     found = {
-        PAINTED[kind]: Value(scene.colors[row], color),
-        f"{PAINTED[kind]}-opacity": Value(opacity, number(float(opacity[0]), OPACITY_DECIMALS)),
+        PAINTED[kind]: AttributeValue(scene.colors[row], color),
+        f"{PAINTED[kind]}-opacity": AttributeValue(opacity, number(float(opacity[0]), OPACITY_DECIMALS)),
     }
-    return found | ({"stroke-width": Value(width, number(float(width[0]), 1))} if kind == Kind.STROKE else {})
+    if kind == Kind.STROKE:
+        found["stroke-width"] = AttributeValue(width, number(float(width[0]), 1))
+    return found
 
 
 def _movable(scene: Scene) -> list[bool]:
-    """Which shapes are plain: of one contour and one colour, strokes round and whole."""
+    """Return which shapes have one contour and one colour and, if strokes, round ends and no dashes."""
     single = np.bincount(scene.contour_shapes(), minlength=len(scene)) == 1
     alone = (scene.twin == 0) & (np.append(scene.twin[1:], 0) == 0)
     rounded = (scene.cap == Cap.ROUND) & (scene.join == Join.ROUND) & (scene.dash == NO_DASHES)
@@ -147,31 +146,33 @@ def _movable(scene: Scene) -> list[bool]:
     return found
 
 
-def _form(scene: Scene, row: int) -> Form:
+def _form(scene: Scene, row: int) -> PathForm:
     contour = int(np.searchsorted(scene.starts, scene.first[row]))
-    return int(scene.kind[row]), int(scene.basis[row]), int(scene.rule[row]), int(scene.closed[contour])
+    return PathForm(
+        int(scene.kind[row]), int(scene.basis[row]), int(scene.rule[row]), int(scene.closed[contour])
+    )
 
 
-def _goes_on(piece: Piece, form: Form, points: FloatArray) -> bool:
-    """Whether a shape can be the next place of a piece; if so, it is that now."""
-    if piece.form != form or len(points) > len(piece.slots):
+def _continues(element: MovingElement, form: PathForm, points: FloatArray) -> bool:
+    """Make a shape's outline the next keyframe of an element; return False if it cannot be."""
+    if element.form != form or len(points) > len(element.slots):
         return False
-    if len(points) < len(piece.slots):
-        if form[1] == Basis.CUBIC:
+    if len(points) < len(element.slots):
+        if form.basis == Basis.CUBIC:
             return False
-        piece.slots = piece.slots[kept_points(piece.points[-1][piece.slots], points)]
-    count = len(piece.points[0])
-    slots = piece.slots
-    if form[3]:
+        element.slots = element.slots[kept_points(element.points[-1][element.slots], points)]
+    count = len(element.points[0])
+    slots = element.slots
+    if form.closed:
         slots = np.concatenate([slots[-1:] - count, slots, slots[:1] + count])
         points = np.concatenate([points[-1:], points, points[:1]])
     filled = [interp(np.arange(count), slots, column) for column in points.T]
-    piece.points.append(np.stack(filled, axis=1).astype(np.float32))
+    element.points.append(np.stack(filled, axis=1).astype(np.float32))
     return True
 
 
 def kept_points(before: FloatArray, after: FloatArray) -> IndexArray:
-    """Which points of an outline are those of one with fewer, in their order: the nearest in all.
+    """Return which points of an outline remain in one with fewer: the nearest in total, in order.
 
     Args:
         before: shape (point, 2).
@@ -180,72 +181,76 @@ def kept_points(before: FloatArray, after: FloatArray) -> IndexArray:
     Returns:
         shape (kept,).
     """
-    apart = ((after[:, None] - before) ** 2).sum(axis=2)
-    # Of the first points of either: the least sum in which the last one of ``after`` is that of the column.
-    sums = np.full(apart.shape, np.inf)
-    sums[0] = apart[0]
+    squares = ((after[:, None] - before) ** 2).sum(axis=2)
+    # sums[i, j]: the least sum for the first points of both, where point i of ``after`` is j of ``before``.
+    sums = np.full(squares.shape, np.inf)
+    sums[0] = squares[0]
     for i in range(1, len(after)):
-        sums[i, 1:] = apart[i, 1:] + np.minimum.accumulate(sums[i - 1])[:-1]
+        sums[i, 1:] = squares[i, 1:] + np.minimum.accumulate(sums[i - 1])[:-1]
     found, end = np.zeros(len(after), np.intp), len(before)
     for i in reversed(range(len(after))):
         found[i] = end = int(np.argmin(sums[i, :end]))
     return found
 
 
-# Elements.
+# Markup.
 
 TOLERANCE = {
     **dict.fromkeys(("fill", "stroke"), 6 / 255),
     **dict.fromkeys(("fill-opacity", "stroke-opacity"), 0.04),
     "stroke-width": 0.5,
 }
-"""By which attributes may lag behind the run's: colours, opacities, units. Only what changes costs time."""
+"""Changes of attributes that are not shown, as each costs time: colour and opacity [0, 1], width [units]."""
 
 STYLE = (
     "@keyframes i{from{fill-opacity:0;stroke-opacity:0}}@keyframes gi{from{opacity:0}}"
     "@keyframes o{to{fill-opacity:0;stroke-opacity:0}}@keyframes go{to{opacity:0}}"
 )
-"""How paths, and groups, come and go."""
+"""How paths and groups fade in and out."""
 
 
-def _element(piece: Piece, name: str, tick: float, last: int) -> tuple[str, str]:
-    """An element, and the rule of how it changes.
+def _written(element: MovingElement, name: str, tick: float, last: int) -> tuple[str, str]:
+    """Return an element and the rule of its changes.
 
-    Paths move by SMIL, which all browsers know; colours and opacities change by style sheets, which take a
+    Paths move by SMIL, which all browsers support; colours and opacities change by style sheets, which take a
     third of the time.
 
     Args:
-        piece: what it is.
+        element: to write.
         name: of the rule.
-        tick: from a key to the next [s].
-        last: number of the last key.
+        tick: time between two keyframes [s].
+        last: number of the last keyframe.
     """
-    group = "g" if piece.form is None else ""
-    plays, rule = [], ""
-    if changes := _changes(piece.values):
-        first, end = changes[0], changes[-1]
-        rule = f"@keyframes {name}{{{_steps(piece.values, changes)}}}"
-        plays.append(_play(name, piece.key + first, end - first, tick, "backwards"))
-    if piece.key:
-        plays.append(_play(f"{group}i", piece.key - 1, 1, tick, "backwards"))
-    if piece.end < last and piece.followed and piece.covers:
-        plays.append(_play(f"{group}o", piece.end + 1, 0, tick, "forwards"))
-    elif piece.end < last:
-        plays.append(_play(f"{group}o", piece.end, 1, tick, "forwards"))
-    style = f' style="animation:{",".join(plays)}"' if plays else ""
-    if piece.form is None:
-        return f"<g{style}>{piece.markup}</g>\n", ""
-    attributes = "".join(f' {name}="{values[-1].text}"' for name, values in piece.values.items())
-    kind, _, evenodd, _ = piece.form
-    more = f" {STROKE_ATTRIBUTES}" if kind == Kind.STROKE else ' fill-rule="evenodd"' if evenodd else ""
-    return _path(
-        [_data(points, piece.form) for points in piece.points], attributes + more + style, piece.key, tick
-    ), rule
+    group = "g" if element.form is None else ""
+    animations, rule = [], ""
+
+    def animate(rule_name: str, key: int, ticks: int, fill: str = "backwards") -> None:
+        animations.append(f"{rule_name} {_seconds(ticks * tick)} linear {_seconds(key * tick)} {fill}")
+
+    if changes := _changes(element.values):
+        rule = f"@keyframes {name}{{{_steps(element.values, changes)}}}"
+        animate(name, element.key + changes[0], changes[-1] - changes[0])
+    if element.key:
+        animate(f"{group}i", element.key - 1, 1)
+    if element.end < last:
+        waits = element.continued and element.covers
+        animate(f"{group}o", element.end + waits, 1 - waits, "forwards")
+    style = f' style="animation:{",".join(animations)}"' if animations else ""
+    if element.form is None:
+        return f"<g{style}>{element.markup}</g>\n", ""
+    attributes = "".join(f' {name}="{values[-1].text}"' for name, values in element.values.items())
+    if element.form.kind == Kind.STROKE:
+        attributes += f" {STROKE_ATTRIBUTES}"
+    elif element.form.rule:
+        attributes += ' fill-rule="evenodd"'
+    data = [_path_data(points, element.form) for points in element.points]
+    return _path(data, attributes + style, element.key, tick), rule
 
 
 def _path(data: list[str], attributes: str, key: int, tick: float) -> str:
-    """A path that moves from a key on; while it comes, before that, it is where it is first. Before and after
-    it has its last place: before, it is not seen, and animations that are over cost no time.
+    """Return a path that moves from keyframe ``key`` on and waits at its first position while it fades in.
+
+    Before and after, it has its last position: before, it is invisible, and finished animations cost no time.
     """
     head = f'<path d="{data[-1]}"{attributes}'
     if len(set(data)) == 1:
@@ -256,10 +261,8 @@ def _path(data: list[str], attributes: str, key: int, tick: float) -> str:
     return f'{head}><animate attributeName="d" {times} values="{";".join(data)}"/></path>\n'
 
 
-def _changes(values: dict[str, list[Value]]) -> list[int]:
-    """Keys of the piece at which attributes have left what they were by more than their tolerance, and those
-    before them.
-    """
+def _changes(values: dict[str, list[AttributeValue]]) -> list[int]:
+    """Return keyframes at which an attribute has changed by more than its tolerance, and those before."""
     found: set[int] = set()
     for name, course in values.items():
         now = course[0].numbers
@@ -270,31 +273,24 @@ def _changes(values: dict[str, list[Value]]) -> list[int]:
     return sorted(found)
 
 
-def _steps(values: dict[str, list[Value]], changes: list[int]) -> str:
+def _steps(values: dict[str, list[AttributeValue]], changes: list[int]) -> str:
+    """Return the steps of a rule, with the attributes' final values at the last one."""
     first, length = changes[0], changes[-1] - changes[0]
     texts = []
     for i in changes:
-        share = number(100 * (i - first) / length, 1)
-        said = ";".join(
-            f"{name}:{course[-1 if i == changes[-1] else i].text}" for name, course in values.items()
-        )
-        texts.append(f"{share}%{{{said}}}")
+        key = -1 if i == changes[-1] else i
+        declarations = ";".join(f"{name}:{course[key].text}" for name, course in values.items())
+        texts.append(f"{number(100 * (i - first) / length, 1)}%{{{declarations}}}")
     return "".join(texts)
-
-
-def _play(name: str, key: int, ticks: int, tick: float, fill: str) -> str:
-    """Of a rule, from a key on for some ticks."""
-    return f"{name} {_seconds(ticks * tick)} linear {_seconds(key * tick)} {fill}"
 
 
 def _seconds(time: float) -> str:
     return f"{number(time, 3)}s"
 
 
-def _data(points: FloatArray, form: Form) -> str:
-    """Of an outline, with commands that depend on the number of its points alone."""
-    kind, basis, _, closed = form
-    spline = basis == Basis.SPLINE
+def _path_data(points: FloatArray, form: PathForm) -> str:
+    """Return path data whose commands depend only on the number of points."""
+    spline = form.basis == Basis.SPLINE
     grid = [(x, y) for x, y in np.round(points / 2 if spline else points).astype(np.int64).tolist()]
-    text = even_spline_data(grid, bool(closed)) if spline else even_cubic_data(grid, bool(closed))
-    return f"{text}z" if closed and kind == Kind.STROKE else text
+    text = (even_spline_data if spline else even_cubic_data)(grid, bool(form.closed))
+    return f"{text}z" if form.closed and form.kind == Kind.STROKE else text

@@ -1,4 +1,4 @@
-"""Choose the frames of an animation."""
+"""When an animation shows what."""
 
 from __future__ import annotations
 
@@ -8,38 +8,35 @@ from dataclasses import dataclass
 
 from warpsplat.portable.elementary import power
 
-SECONDS = 6.0
-"""Default duration of the movement [s]."""
+DEFAULT_SECONDS = 6.0
+"""Duration of an animation's movement [s]."""
 
-SHORTEST, LONGEST = 0.5, 60.0
-"""Limits of the duration [s]."""
+MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
 
 HOLD = 2.0
-"""Time that the last frame stays before the loop restarts [s]."""
+"""Time that the finished picture is shown before a loop starts again [s]."""
 
 EARLY = 1.5
-"""Exponent from the fraction of the animation to that of the run: early changes are larger."""
+"""Share of the run = share of the animation to this power: much changes early, little late."""
 
 
 @dataclass(frozen=True)
 class Showing:
-    """A frame of an animation."""
+    """A picture of an animation."""
 
     index: int
-    """Index of the scene."""
+    """Among the recorded pictures."""
     seconds: float
-    """Duration [s]."""
+    """How long it is shown."""
 
 
 def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing]:
-    """Return the frames that show a run in ``seconds`` of ``ticks`` equal parts.
-
-    Early ones are shown longer; late ones are skipped where there are more than parts.
+    """Return which recorded pictures an animation shows; late ones are skipped if there are more than ticks.
 
     Args:
-        moments: when the pictures were, counted in reports of the run, ascending.
-        ticks: parts.
-        seconds: in all.
+        moments: when the pictures were recorded, as numbers of progress reports, ascending.
+        ticks: equal parts of the animation.
+        seconds: duration.
     """
     found: list[Showing] = []
     for tick in range(ticks if moments else 0):
@@ -53,6 +50,6 @@ def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing
 
 
 def kept(moments: Sequence[int], most: int) -> list[int]:
-    """Return the indices of ``most`` scenes to keep: those an animation would show, with both ends."""
+    """Return the indices of at most ``most`` pictures: those that would be shown, the first and the last."""
     chosen = {showing.index for showing in showings(moments, most - 2, 1.0)}
     return sorted(chosen | {0, len(moments) - 1})

@@ -1,4 +1,4 @@
-"""A run on a terminal: a small one that knows the sequences that are used."""
+"""Live previews on a small emulated terminal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 
 from tests.scenes import mixed_scene
 from warpsplat.fit.progress import Progress, Snapshot
-from warpsplat.motion.terminal.detect import Terminal
-from warpsplat.motion.terminal.preview import SHARE, Preview
+from warpsplat.motion.preview import TIME_SHARE, Preview, picture_size, resized
+from warpsplat.motion.terminal import BLOCK_CELL, Protocol, Terminal
 from warpsplat.scene import FloatArray
 
 COLUMNS, LINES = 60, 12
@@ -20,7 +20,7 @@ RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
 
 
 class Screen(io.StringIO):
-    """Characters with their colours, a cursor, and lines that have scrolled away."""
+    """Characters with colours, a cursor, and the lines that have scrolled away."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -70,10 +70,12 @@ class Screen(io.StringIO):
             self.style = "" if escape == "\x1b[0m" else escape
 
     def text(self, row: int) -> str:
-        return "".join(self.cells[row].get(x, (" ", ""))[0] for x in range(COLUMNS)).rstrip()
+        """The characters of a row, counted from the first one ever."""
+        line = (self.gone + self.cells)[row]
+        return "".join(line.get(x, (" ", ""))[0] for x in range(COLUMNS)).rstrip()
 
     def pictures(self) -> list[str]:
-        """Of each line that has a picture in it, the colours of its beginning."""
+        """The colours at the beginning of each row of a picture."""
         return [line[0][1] for line in self.gone + self.cells if line.get(0, ("", ""))[0] == "▀"]
 
 
@@ -89,7 +91,7 @@ def flat(color: tuple[int, int, int]) -> FloatArray:
     return np.full((12, 18, 3), np.array(color) / 255, np.float32)
 
 
-def report(image: FloatArray) -> Progress:
+def progress(image: FloatArray) -> Progress:
     return Progress(1, 2, 20.0, 0.0, 0.5, True, 3, Snapshot(mixed_scene, lambda: image))
 
 
@@ -99,68 +101,58 @@ def screen() -> Screen:
 
 
 def preview(screen: io.StringIO, clock: Clock, **others: object) -> tuple[Preview, list[Terminal]]:
-    """With the terminals that it sees: the last one is the one of now."""
-    terminals = [replace(Terminal("blocks", COLUMNS, LINES), **others)]
+    """A preview, and the list whose last entry it takes for the terminal."""
+    terminals = [replace(Terminal("blocks", COLUMNS, LINES, BLOCK_CELL), **others)]
     return Preview(screen, lambda: terminals[-1], clock), terminals
 
 
-def test_a_picture_is_drawn_over_the_last_one_above_the_bar(screen: Screen) -> None:
+def test_pictures_replace_each_other_above_the_bar(screen: Screen) -> None:
+    """The finished one stands beside its source."""
     clock = Clock()
     shown, _ = preview(screen, clock)
     screen.write("before\n")
     for color in (RED, BLUE):
-        shown.report(report(flat(color)))
+        shown.update(progress(flat(color)))
         screen.write(f"\rbar {color[0]:3}")
         clock.now += 10
-    rows = [row for row in range(LINES) if screen.text(row).startswith("▀")]
-    assert len(rows) == LINES - 4 and rows == list(range(rows[0], rows[-1] + 1))
-    assert screen.text(rows[0] - 1) == "before" and screen.text(rows[-1] + 1) == "bar   0"
-    assert len(screen.pictures()) == len(rows) and all("0;0;255" in style for style in screen.pictures())
-    assert not screen.style, "colours do not go on"
-
-
-def test_the_finished_picture_takes_its_place_beside_the_source(screen: Screen) -> None:
-    clock = Clock()
-    shown, _ = preview(screen, clock)
-    shown.report(report(flat(RED)))
-    screen.write("\rbar")
+    rows = LINES - 4
+    assert [screen.text(row)[:1] for row in range(1, 1 + rows)] == ["▀"] * rows
+    assert screen.text(0) == "before" and screen.text(1 + rows) == "bar   0"
+    assert len(screen.pictures()) == rows and all("0;0;255" in style for style in screen.pictures())
+    assert not screen.style, "colours end with the line"
     shown.finish(flat(GREEN), flat(BLUE))
     screen.write(" done\n")
-    assert len(screen.pictures()) == LINES - 4 and "0;0;255" in screen.pictures()[0]
-    row = screen.cells[0]
-    assert screen.text(0).startswith("▀" * 24) and "0;255;0" in row[24 + 1 + 3][1]
-    assert screen.text(LINES - 4) == "bar done"
+    assert len(screen.pictures()) == rows and "0;0;255" in screen.pictures()[0]
+    assert screen.text(1).startswith("▀" * 24) and screen.text(1 + rows) == "bar   0 done"
+    assert "0;255;0" in (screen.gone + screen.cells)[1][24 + 1 + 3][1]
 
 
 def test_lines_below_the_picture_stay(screen: Screen) -> None:
     shown, _ = preview(screen, clock := Clock())
-    shown.report(report(flat(RED)))
+    shown.update(progress(flat(RED)))
     screen.write("\rnotice\n")
     shown.move_on()
     clock.now += 10
-    shown.report(report(flat(BLUE)))
-    everything = screen.gone + screen.cells
-    texts = ["".join(line.get(x, (" ", ""))[0] for x in range(COLUMNS)).rstrip() for line in everything]
-    assert texts[LINES - 4] == "notice" and texts[LINES - 3][0] == "▀"
+    shown.update(progress(flat(BLUE)))
+    assert screen.text(LINES - 4) == "notice" and screen.text(LINES - 3)[0] == "▀"
 
 
-def test_a_terminal_of_another_size_gets_a_new_picture(screen: Screen) -> None:
+def test_a_resized_terminal_gets_a_new_picture(screen: Screen) -> None:
     shown, terminals = preview(screen, clock := Clock())
-    shown.report(report(flat(RED)))
-    clock.now += 10
-    terminals.append(Terminal("blocks", 20, 10))
-    shown.report(report(flat(BLUE)))
+    for terminal, color in ((terminals[0], RED), (Terminal("blocks", 20, 10, BLOCK_CELL), BLUE)):
+        terminals.append(terminal)
+        shown.update(progress(flat(color)))
+        clock.now += 10
     assert sum("255;0;0" in style for style in screen.pictures()) == LINES - 4
     assert sum("0;0;255" in style for style in screen.pictures()) == 10 - 4
-    terminals.append(Terminal("blocks", 5, 2))
-    clock.now += 10
     before = screen.pictures()
-    shown.report(report(flat(GREEN)))
-    assert screen.pictures() == before, "one that is too small gets none"
+    terminals.append(Terminal("blocks", 5, 2, BLOCK_CELL))
+    shown.update(progress(flat(GREEN)))
+    assert screen.pictures() == before, "too small for a picture"
 
 
 def test_drawing_takes_a_small_part_of_the_time() -> None:
-    """The next one waits by what the last one took; less after one that was held up, and after the first."""
+    """The interval depends on the last two costs; the first update and a single slow one do not count."""
     clock, drawn = Clock(), []
     shown, _ = preview(io.StringIO(), clock)
     costs = iter([2.0, 0.1, 0.1, 5.0, *[0.1] * 1000])
@@ -171,33 +163,34 @@ def test_drawing_takes_a_small_part_of_the_time() -> None:
         return flat(RED)
 
     began = clock.now
-    now = replace(report(flat(RED)), snapshot=Snapshot(mixed_scene, slow))
+    now = replace(progress(flat(RED)), snapshot=Snapshot(mixed_scene, slow))
     while clock.now < began + 200:
-        shown.report(now)
+        shown.update(now)
         clock.now += 0.01
     gaps = np.diff(drawn)
-    assert gaps[0] < 1.2 and gaps[1] == pytest.approx(0.1 / SHARE, abs=0.05)
-    assert gaps[3] == pytest.approx(0.1 / SHARE, abs=0.05), "after the one that was held up"
+    assert gaps[0] < 1.2 and gaps[[1, 3]] == pytest.approx(0.1 / TIME_SHARE, abs=0.05)
     assert 90 < len(drawn) < 110
 
 
 def test_a_pipe_gets_the_finished_picture_only() -> None:
     out = io.StringIO()
     shown, _ = preview(out, Clock(), live=False)
-    shown.report(report(flat(RED)))
+    shown.update(progress(flat(RED)))
     assert not out.getvalue()
     shown.finish(flat(RED), None)
     lines = out.getvalue().split("\n")
     assert len(lines) == LINES - 4 + 1 and not lines[-1]
-    assert not re.search(r"\x1b(?!\[[\d;]*m)|\r", out.getvalue()), "colours, and nothing that moves"
+    assert not re.search(r"\x1b(?!\[[\d;]*m)|\r", out.getvalue()), "colours, but no cursor movements"
+    out.close()
+    shown.finish(flat(RED), None)  # a closed stream is ignored
 
 
 @pytest.mark.parametrize("protocol", ["kitty", "iterm", "sixel"])
-def test_pictures_of_pixels_go_to_the_same_place(protocol: str) -> None:
+def test_pixel_protocols_draw_in_the_same_place(protocol: str) -> None:
     out = io.StringIO()
-    shown, _ = preview(out, clock := Clock(), protocol=protocol)
+    shown, _ = preview(out, clock := Clock(), protocol=protocol, cell=(10, 20))
     for color in (RED, BLUE):
-        shown.report(report(flat(color)))
+        shown.update(progress(flat(color)))
         clock.now += 10
     first, second = (part for part in out.getvalue().split("\x1b7") if "\x1b8" in part)
     rows = LINES - 4
@@ -205,12 +198,27 @@ def test_pictures_of_pixels_go_to_the_same_place(protocol: str) -> None:
     assert first.startswith(f"\r\x1b[{rows}A\x1b") and second.startswith(f"\r\x1b[{rows}A\x1b")
     assert first.endswith("\x1b\\\x1b8" if protocol != "iterm" else "\x07\x1b8")
     if protocol == "kitty":
-        names = re.findall(r"i=(\d+)", out.getvalue())
-        assert len(names) == 2 and len(set(names)) == 1, "which replaces the picture"
+        numbers = re.findall(r"i=(\d+)", out.getvalue())
+        assert len(numbers) == 2 and len(set(numbers)) == 1, "so the second replaces the first"
 
 
-def test_a_stream_that_is_closed_is_no_reason_to_fail() -> None:
-    out = io.StringIO()
-    shown, _ = preview(out, Clock())
-    out.close()
-    shown.report(report(flat(RED)))
+@pytest.mark.parametrize("protocol", ["kitty", "sixel", "blocks"])
+@pytest.mark.parametrize(("width", "height"), [(300, 200), (20, 400), (4000, 10)])
+@pytest.mark.parametrize(("columns", "lines"), [(80, 24), (200, 60), (10, 8)])
+def test_pictures_fit_in_their_proportions(
+    protocol: Protocol, width: int, height: int, columns: int, lines: int
+) -> None:
+    cell = BLOCK_CELL if protocol == "blocks" else (9, 18)
+    size = picture_size(Terminal(protocol, columns, lines, cell), width, height)
+    assert size and 1 <= size[0] < columns and 1 <= size[1] <= lines - 4
+    across, down = size[0] * cell[0], size[1] * cell[1]
+    assert protocol != "sixel" or max(across, down) <= 800
+    zoom = min(across / width, down / height)
+    for side, shown, unit in ((width, across, cell[0]), (height, down, cell[1])):
+        assert abs(side * zoom - shown) <= unit * (1 + side / min(width, height))
+
+
+def test_transparency_is_white() -> None:
+    image = np.zeros((4, 4, 4), np.float32)
+    image[..., 1], image[..., 3] = 0.25, 0.5  # premultiplied
+    assert np.array_equal(np.unique(resized(image, 4, 4).reshape(-1, 3), axis=0), [[128, 191, 128]])

@@ -1,0 +1,200 @@
+"""Show a run's picture in the terminal: live during training, and beside its source at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import os
+import secrets
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TextIO
+
+import cv2
+import numpy as np
+
+from warpsplat.cli.echo import echo
+from warpsplat.errors import ImageError
+from warpsplat.files.sources import image_of
+from warpsplat.fit.progress import Progress
+from warpsplat.motion.escapes import HALF, Pixels, picture_escapes
+from warpsplat.motion.terminal import Terminal, detect
+from warpsplat.run.result import Result
+from warpsplat.scene import FloatArray
+from warpsplat.svg.viewer import premultiplied, render_svg
+
+TIME_SHARE = 0.05
+"""Of a run's time that drawing may take: the interval between two updates depends on how long one takes."""
+
+SHORTEST_INTERVAL = 0.1
+"""Between two updates [s]."""
+
+LONGEST_FIRST_INTERVAL = 1.0
+"""Between the first two updates [s]: the first takes longer than the others."""
+
+SAVE_CURSOR, RESTORE_CURSOR = "\x1b7", "\x1b8"
+
+MAX_ROWS = 32
+"""Height of a picture."""
+
+OTHER_LINES = 4
+"""Lines of the terminal that stay free."""
+
+MAX_SIXEL_SIDE = 800
+"""Longer side of a picture of sixels [px]."""
+
+MIN_COLUMNS, MIN_LINES = 8, 7
+"""Of a terminal on which a picture shows anything."""
+
+MAX_FINISHED_SIDE = 1600
+"""Longer side at which the finished picture is rendered [px]: more than any terminal shows."""
+
+
+class Preview:
+    """Draws on a stream; during a run, above the line with the cursor, which is the progress bar's."""
+
+    def __init__(
+        self, stream: TextIO, measure: Callable[[], Terminal], clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        """``measure``: returns the terminal with its current size."""
+        self._stream, self._measure, self._clock = stream, measure, clock
+        self._terminal: Terminal | None = None
+        self._rows = 0
+        """Of the picture above the cursor; 0: there is none."""
+        self._next, self._cost = 0.0, math.inf
+        self._number = 1 + secrets.randbelow(2**24 - 1)
+
+    def update(self, progress: Progress) -> None:
+        """Draw the current picture, unless the last update was just before."""
+        begun = self._clock()
+        if progress.snapshot is None or begun < self._next:
+            return
+        terminal = self._measure()
+        if terminal.live:
+            self._draw(progress.snapshot.image(), None, terminal)
+        now = self._clock()
+        previous, self._cost = self._cost, now - begun
+        wait = min(previous, self._cost) * (1 / TIME_SHARE - 1)  # a single slow update is no measure
+        self._next = now + max(
+            SHORTEST_INTERVAL, wait if previous < math.inf else min(wait, LONGEST_FIRST_INTERVAL)
+        )
+
+    def move_on(self) -> None:
+        """Leave the picture where it is: lines were written below it, so the next one goes below them."""
+        self._rows = 0
+
+    def finish(self, image: FloatArray, source: FloatArray | None) -> None:
+        """Draw the finished picture in place of the last one, to the right of its source if both fit.
+
+        Pictures have values in [0, 1] and shapes (height, width, 3), or (height, width, 4) premultiplied.
+        """
+        self._draw(image, source, self._measure())
+
+    def _draw(self, image: FloatArray, source: FloatArray | None, terminal: Terminal) -> None:
+        if terminal != self._terminal:  # after a change of size, the old picture can be anywhere
+            self._terminal, self._rows = terminal, 0
+        size = picture_size(terminal, image.shape[1], image.shape[0])
+        if size is None:
+            return
+        columns, rows = size
+        across, down = terminal.cell
+        pixels = resized(image, columns * across, rows * down)
+        if source is not None and 2 * columns + 1 < terminal.columns:
+            gap = np.zeros((rows * down, across, 3), np.uint8)
+            pixels = np.concatenate([resized(source, columns * across, rows * down), gap, pixels], axis=1)
+            columns = 2 * columns + 1
+        text = picture_escapes(terminal, pixels, columns, rows, self._number)
+        if not terminal.live:
+            self._write(text + "\n")
+            return
+        begin = "" if self._rows == rows else "\r\x1b[2K" + rows * "\n"
+        self._rows = rows
+        self._write(f"{begin}{SAVE_CURSOR}\r\x1b[{rows}A{text}{RESTORE_CURSOR}")
+
+    def _write(self, text: str) -> None:
+        with contextlib.suppress(OSError, ValueError):  # a closed stream must not end the run
+            self._stream.write(text)
+            self._stream.flush()
+
+
+def picture_size(terminal: Terminal, width: int, height: int) -> tuple[int, int] | None:
+    """Return columns and rows of a picture: as large as fits, in its proportions.
+
+    None if the terminal is too small.
+    """
+    if terminal.columns < MIN_COLUMNS or terminal.lines < MIN_LINES:
+        return None
+    across, down = terminal.cell
+    rows = min(terminal.lines - OTHER_LINES, MAX_ROWS)
+    columns = terminal.columns - 1  # some terminals wrap after the last one
+    if terminal.protocol == "sixel":
+        rows, columns = min(rows, MAX_SIXEL_SIDE // down), min(columns, MAX_SIXEL_SIDE // across)
+    zoom = min(columns * across / width, rows * down / height)
+    size = round(width * zoom / across), round(height * zoom / down)
+    return max(1, min(size[0], columns)), max(1, min(size[1], rows))
+
+
+def resized(image: FloatArray, width: int, height: int) -> Pixels:
+    """Return a picture, which may be premultiplied RGBA, on white and with 8 bits."""
+    if image.shape[2] == 4:
+        image = image[..., :3] + (1 - image[..., 3:])
+    method = cv2.INTER_AREA if width < image.shape[1] else cv2.INTER_CUBIC
+    shown = cv2.resize(np.ascontiguousarray(image, np.float32), (width, height), interpolation=method)
+    return np.round(255 * np.clip(shown, 0, 1)).astype(np.uint8)
+
+
+def start_preview(stream: TextIO, protocol: Any) -> Preview | None:
+    """Return a preview on ``stream`` by ``protocol``, or by the best one for the terminal.
+
+    Returns None, after a notice that says why, if the stream cannot show pictures.
+    """
+    terminal = detect(stream, protocol)
+    problem = ""
+    if terminal is None:
+        problem = "stderr is not a terminal that shows pictures; --preview=blocks prints them"
+    elif terminal.protocol == "blocks" and not _can_encode(stream, HALF):
+        problem = f"the terminal's encoding, {stream.encoding}, has no half blocks"
+    if terminal is None or problem:
+        echo(f"warpsplat: --preview: {problem}", err=True)
+        return None
+    if os.name == "nt":
+        os.system("")  # makes Windows consoles interpret escape sequences
+    preview = Preview(stream, lambda: terminal.remeasured(stream))
+    log = logging.getLogger("warpsplat")
+    log.handlers = [handler for handler in log.handlers if not isinstance(handler, _NoticeHandler)]
+    log.addHandler(_NoticeHandler(preview))
+    return preview
+
+
+def _can_encode(stream: TextIO, text: str) -> bool:
+    try:
+        text.encode(stream.encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True
+
+
+class _NoticeHandler(logging.Handler):
+    """Moves a preview on when a notice is printed below its picture."""
+
+    def __init__(self, preview: Preview) -> None:
+        super().__init__()
+        self._preview = preview
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not getattr(record, "passing", False):
+            self._preview.move_on()
+
+
+def show_finished(preview: Preview, result: Result, source: bytes | Path | None) -> None:
+    """Show a result, beside its ``source`` if there is one; what cannot be read is left out."""
+    side = max(result.scene.canvas.width, result.scene.canvas.height)
+    with contextlib.suppress(ImageError):
+        rendered = render_svg(result.svg, zoom=min(1.0, MAX_FINISHED_SIDE / side))
+        original = None
+        if source is not None:
+            with contextlib.suppress(ImageError):
+                original = image_of(source, factor=max(1, side // MAX_FINISHED_SIDE))
+        preview.finish((premultiplied(rendered) / 255).astype(np.float32), original)

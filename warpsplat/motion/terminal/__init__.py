@@ -1,1 +1,0 @@
-"""Show images in terminals."""
