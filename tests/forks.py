@@ -1,13 +1,15 @@
-"""Runs commands of warpsplat under limits, and with signals at chosen moments.
+"""Run commands of warpsplat under limits, and with signals at chosen moments.
 
-``Forks`` gives tasks to a process of this module that has everything loaded and forks for each of them: a run
-starts at once, and what it does to its process is gone with it.
+``Forks`` hands tasks to a process that has everything loaded and forks for each of them: a run starts at
+once, and leaves nothing behind in its process.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib.abc
+import itertools
 import json
 import os
 import resource
@@ -26,7 +28,7 @@ QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "12")
 CLOSED = "-"
 """In place of a file: the stream is closed, as by ``>&-`` in a shell."""
 NOBODY = 65534
-"""A user without rights, by custom."""
+"""The number of the user "nobody"."""
 
 MOMENTS = {
     "decoding": ("PIL", "Image", "open"),
@@ -36,7 +38,7 @@ MOMENTS = {
     "writing": ("os", "fsync"),
     "renaming": ("os", "replace"),
 }
-"""Stages of a run by library calls that it makes there, whatever the structure of the program."""
+"""Stages of a run, by the library calls made there, whatever the structure of the program."""
 
 
 @dataclass
@@ -49,30 +51,30 @@ class Task:
     stderr: str
     """Files that these go to, or ``CLOSED``."""
     moment: str = ""
-    """At which ``signal`` comes: one of ``MOMENTS``, or "import NAME"."""
+    """When ``signal`` comes: one of ``MOMENTS``, or "import NAME"."""
     count: int = 1
-    """The how many-th time."""
+    """Number of the call at which it comes."""
     signal: int = 0
     times: int = 1
-    """That it is sent there."""
+    """Number of signals."""
     ignored: bool = False
-    """Ctrl-C is, as under ``nohup``."""
+    """Ignore Ctrl-C, as ``nohup`` does."""
     file_size: int = 0
     """Largest file [bytes], as ``ulimit -f`` sets it; 0: any."""
     rights: bool = True
-    """If not, a superuser, whom permissions do not bind, becomes another user."""
+    """False: a superuser, whom permissions do not bind, becomes another user."""
 
 
-class _ImportTrip(importlib.abc.MetaPathFinder):
-    """Calls ``pull`` as soon as ``module`` is imported."""
+class _ImportTrap(importlib.abc.MetaPathFinder):
+    """Call ``on_import`` when ``module`` is imported."""
 
-    def __init__(self, module: str, pull: Callable[[], None]) -> None:
-        self.module, self.pull = module, pull
+    def __init__(self, module: str, on_import: Callable[[], None]) -> None:
+        self.module, self.on_import = module, on_import
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: Any = None) -> None:
         """Find nothing: the next finder will."""
         if name == self.module:
-            self.pull()
+            self.on_import()
 
 
 def _refuse() -> None:
@@ -80,35 +82,31 @@ def _refuse() -> None:
     raise AssertionError("a command imports torch")
 
 
-def _lay_trip(task: Task) -> None:
+def _set_trap(task: Task) -> None:
     """Have the task's signal sent to this process at the task's moment."""
-    seen = 0
+    calls = itertools.count(1)
 
-    def pull() -> None:
-        nonlocal seen
-        seen += 1
-        if seen == task.count:
+    def strike() -> None:
+        if next(calls) == task.count:
             for _ in range(task.times):
                 os.kill(os.getpid(), task.signal)
 
     if task.moment.startswith("import "):
-        sys.meta_path.insert(0, _ImportTrip(task.moment.removeprefix("import "), pull))
+        sys.meta_path.insert(0, _ImportTrap(task.moment.removeprefix("import "), strike))
         return
     module, *path, name = MOMENTS[task.moment]
-    owner: Any = __import__(module)
-    for part in path:
-        owner = getattr(owner, part)
+    owner: Any = functools.reduce(getattr, path, __import__(module))
     original = getattr(owner, name)
 
-    def tripping(*arguments: Any, **named: Any) -> Any:
-        pull()
+    def struck(*arguments: Any, **named: Any) -> Any:
+        strike()
         return original(*arguments, **named)
 
-    setattr(owner, name, tripping)
+    setattr(owner, name, struck)
 
 
 def run(task: Task) -> None:
-    """Run a task in this process, which is fit for nothing else afterwards."""
+    """Run a task in this process, which cannot be used for anything else afterwards."""
     os.chdir(task.folder)
     for number, stream in ((1, "stdout"), (2, "stderr")):
         name = getattr(task, stream)
@@ -120,7 +118,7 @@ def run(task: Task) -> None:
     if task.ignored:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     if task.moment:
-        _lay_trip(task)
+        _set_trap(task)
     if task.file_size:
         sys.dont_write_bytecode = True  # Python itself would leave half a file in the cache of a module
         resource.setrlimit(resource.RLIMIT_FSIZE, (task.file_size, task.file_size))
@@ -133,7 +131,7 @@ def run(task: Task) -> None:
 
 
 def _end(task: Task) -> None:
-    """Run a task, then end the process as Python would, but leave its origin's clean-up alone."""
+    """Run a task, then end the process as Python would, but without the clean-up of its parent."""
     code: Any = 0
     try:
         run(task)
@@ -149,10 +147,10 @@ def _end(task: Task) -> None:
 
 
 def serve() -> None:
-    """Run a task, then end the process as Python would, without the clean-up of its origin."""
+    """Fork for each task on the standard input, and answer with its exit code."""
     from warpsplat.cli.main import main
 
-    sys.meta_path.insert(0, _ImportTrip("torch", _refuse))
+    sys.meta_path.insert(0, _ImportTrap("torch", _refuse))
     tasks, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     for line in tasks:
@@ -171,8 +169,8 @@ def serve() -> None:
 
 
 def make_image(path: Path, seed: int = 0) -> None:
-    """A small picture without any sense."""
-    import numpy as np  # not above: a cold start is to be one
+    """Save a small picture of random pixels."""
+    import numpy as np  # not above: some tasks start without any library
     from PIL import Image
 
     rng = np.random.default_rng(seed)
@@ -190,7 +188,7 @@ WARM = (
 
 
 class Forks:
-    """Gives tasks to a process that forks."""
+    """A process that forks for each task."""
 
     def __init__(self, scratch: Path) -> None:
         self.out, self.err = str(scratch / "stdout"), str(scratch / "stderr")
@@ -214,7 +212,7 @@ class Forks:
         self.process.communicate()
 
     def run(self, arguments: Sequence[str], folder: Path, **how: Any) -> tuple[int, str, str]:
-        """Exit code (or minus the signal that ended it), stdout and stderr; ``how``: see ``Task``."""
+        """Return exit code (or minus the signal that ended it), stdout and stderr; ``how``: see ``Task``."""
         task = Task(list(arguments), str(folder), **{"stdout": self.out, "stderr": self.err, **how})
         code = self._ask(task)
         out, err = (

@@ -45,7 +45,7 @@ SMOKE = {
     "cli": (
         "cli/test_vectorize.py::test_vectorize",
         "cli/test_render.py::test_render",
-        "cli/test_main.py::test_wrong_usage",
+        "cli/test_refusals.py::test_refusals",
         "cli/test_main.py::test_help_is_quick",
     ),
     "others": (

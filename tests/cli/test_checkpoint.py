@@ -54,15 +54,3 @@ def test_sigterm_leaves_a_checkpoint_and_the_next_run_goes_on(
     assert not Path("a.checkpoint").exists()
     assert run(*given, "-o", "b.svg", "--resume") == 0
     assert Path("a.svg").read_bytes() == Path("b.svg").read_bytes()
-
-
-def test_wrong_use_is_one_line(capfd: pytest.CaptureFixture[str]) -> None:
-    for given, cause in (
-        (("--resume",), "needs a checkpoint"),
-        (("--checkpoint", "photo.png", "--overwrite"), "is the input itself"),
-        (("--checkpoint", "a.svg"), "another name"),
-        (("--checkpoint", "-"), "not the standard output"),
-        (("--checkpoint", "a", "--checkpoint-every", "often"), "not a time"),
-    ):
-        assert run("vectorize", "photo.png", "-o", "a.svg", *QUICK, *given) == 2
-        assert cause in one_line(capfd.readouterr().err)

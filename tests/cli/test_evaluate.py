@@ -24,9 +24,6 @@ def test_eval(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     )
     assert run("eval", image, output) == 0
     assert f"{made['psnr']} dB" in capsys.readouterr().out
-    for bad in (image, tmp_path / "none.svg"):
-        assert run("eval", image, bad) == 3
-        assert bad.name in one_line(capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("installed", [True, False])

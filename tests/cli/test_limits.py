@@ -95,15 +95,6 @@ def test_an_input_without_permission(forks: Forks, folder: Path, name: str) -> N
     assert f"{name}: no permission" in err
 
 
-@pytest.mark.parametrize("output", ["a.png/b.svg", "/proc/b.svg", "/dev/full", "loop.svg"])
-def test_places_where_no_file_can_be(forks: Forks, folder: Path, output: str) -> None:
-    (folder / "loop.svg").symlink_to("loop.svg")
-    code, out, err = forks.run(["vectorize", "a.png", "-o", output, *QUICK], folder)
-    assert code == 2, err
-    assert out == ""
-    assert_one_line(err)
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 @pytest.mark.parametrize("command", ["info --json", "eval a.png drawing.svg"])
 def test_results_that_nobody_can_take(forks: Forks, folder: Path, command: str) -> None:

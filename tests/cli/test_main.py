@@ -1,7 +1,8 @@
-"""The command line as a whole: a light start, usage errors, streams, whatever is raised."""
+"""The command line as a whole: a light start, streams, exceptions, completion."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -12,8 +13,8 @@ from PIL import Image
 
 from tests.cli.helpers import QUICK, one_line, run, shell
 from tests.forks import CLOSED, Forks
-from warpsplat.cli.main import COMMANDS
-from warpsplat.errors import CapacityError, ExitCode
+from warpsplat.cli.main import COMMANDS, json_stream
+from warpsplat.errors import CapacityError
 from warpsplat.svg.viewer import render_own
 
 FULL = "/dev/full"
@@ -31,81 +32,6 @@ def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
     for name in COMMANDS:
         assert name in done.stdout
     assert "\\b" not in done.stdout
-
-
-WRONG = [
-    (["--curves", "0"], "curves"),
-    (["--curves", "many"], "--curves"),
-    (["--quality", "best"], "--quality"),
-    (["--device", "cuda:99"], "cuda:99"),
-    (["--device", "tpu"], "tpu"),
-    (["--frobnicate"], "--frobnicate"),
-    (["-o", "missing/folder/a.svg"], "does not exist"),
-    (["-o", "."], "is a folder"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "word"), WRONG)
-def test_wrong_usage(
-    image: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], word: str
-) -> None:
-    assert run("vectorize", image, *arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert word in one_line(captured.err)
-
-
-def test_inputs_are_never_outputs(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    svg = tmp_path / "a.svg"
-    assert run("vectorize", image, "-o", svg, "-q", *QUICK) == 0
-    kept = {p: p.read_bytes() for p in (image, svg)}
-    assert run("render", svg, "-o", svg) == 2
-    assert run("refine", svg, image, "-o", image, "--iterations", "5") == 2
-    assert run("vectorize", image, "-o", os.devnull, *QUICK) == 2
-    assert "is a device" in capsys.readouterr().err
-    assert kept == {p: p.read_bytes() for p in (image, svg)}
-
-
-ODD = [
-    (["vectorize", "."], 3),
-    (["vectorize", ""], 3),
-    (["vectorize", "photo.png", "-o", "x" * 300 + ".svg"], 2),
-    (["vectorize", "photo.png", "--max-bytes", "9" * 400], 2),
-    (["vectorize", "photo.png", "--target-psnr", "nan"], 2),
-    (["render", "good.svg", "-o", "a.png", "--scale", "1e308"], 2),
-    (["render", "good.svg", "-o", "a.png", "--scale", "1e-9"], 2),
-    (["eval", "photo.png", "square.svg"], 3),
-    (["refine", "square.svg", "photo.png", "-o", "b.svg"], 3),
-    (["refine", "pattern.svg", "photo.png", "-o", "b.svg"], 3),
-    (["refine", "clip.svg", "photo.png", "-o", "b.svg"], 3),
-    (["refine", "opacity.svg", "photo.png", "-o", "b.svg"], 3),
-    (["nonsense"], 2),
-]
-
-
-@pytest.mark.parametrize(("arguments", "code"), ODD)
-def test_odd_requests_are_one_line(
-    image: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    code: int,
-) -> None:
-    head, path = '<svg xmlns="http://www.w3.org/2000/svg" ', '<path d="M0 0H9V9Z" '
-    files = {
-        "good.svg": 'width="5in" height="4in" viewBox="0 0 50 40"/>',
-        "square.svg": f'width="40" height="40">{path}/></svg>',
-        "pattern.svg": f'width="60" height="40"><pattern id="g"/>{path}fill="url(#g)"/></svg>',
-        "clip.svg": f'width="60" height="40"><g clip-path="url(#c)">{path}/></g></svg>',
-        "opacity.svg": f'width="60" height="40">{path}stroke="red" opacity=".5"/></svg>',
-    }
-    for name, text in files.items():
-        (image.parent / name).write_text(head + text)
-    monkeypatch.chdir(image.parent)
-    before = set(os.listdir())
-    assert run(*arguments) == code
-    one_line(capsys.readouterr().err)
-    assert set(os.listdir()) == before
 
 
 @pytest.mark.slow
@@ -183,9 +109,63 @@ def test_whatever_is_raised_is_one_line_and_a_code(
     assert "Traceback" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", ["--curves", "--seed", "--quality", "--background", "--levels", "--size"])
-def test_a_refused_value_is_shown_by_its_beginning(option: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """By click as well."""
-    assert run("vectorize", "a.png", option, 5000 * "9") == ExitCode.USAGE
-    said = one_line(capsys.readouterr().err)
-    assert 70 * "9" in said and 90 * "9" not in said
+def test_an_image_without_a_command_is_vectorized(
+    image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(image.name, *QUICK) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith("photo.svg: ")
+    assert "no command given, so it is vectorized (warpsplat vectorize photo.png)" in captured.err
+    assert (tmp_path / "photo.svg").exists()
+
+
+def test_objects_keep_out_of_the_way_of_a_file(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("vectorize", "missing.png", "-o", "-", "--json") == 3
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    line, found = captured.err.splitlines()
+    assert line == f"warpsplat: {json.loads(found)['error']}"
+    assert json_stream(["vectorize", "-", "--output=-", "--json"]) == "stderr"
+    assert json_stream(["vectorize", "--", "--json"]) is None
+    assert json_stream(["vectorize", "a", "--json", "--", "-o", "-"]) == "stdout"
+
+
+@pytest.mark.parametrize(
+    ("shell", "words"), [("bash", "plain,--quality"), ("zsh", "--quality"), ("fish", "--quality")]
+)
+def test_completion(
+    shell: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_source")
+    if shell != "bash":  # whose version click asks for
+        assert run() == 0
+        assert "_warpsplat_completion" in capsys.readouterr().out
+    last = "--qual" if shell == "fish" else "2"
+    for name, value in {"COMPLETE": f"{shell}_complete"}.items():
+        monkeypatch.setenv(f"_WARPSPLAT_{name}", value)
+    monkeypatch.setenv("COMP_WORDS", "warpsplat vectorize --qual")
+    monkeypatch.setenv("COMP_CWORD", last)
+    assert run() == 0
+    assert words in capsys.readouterr().out
+
+
+def test_completion_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from warpsplat.cli.main import main\n"
+        "try: main([])\n"
+        "except SystemExit as e: assert not e.code\n"
+        "heavy = {'warp', 'torch', 'cv2', 'PIL', 'resvg_py'} & set(sys.modules); assert not heavy, heavy"
+    )
+    asked = {
+        "_WARPSPLAT_COMPLETE": "bash_complete",
+        "COMP_WORDS": "warpsplat vectorize --qu",
+        "COMP_CWORD": "2",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | asked, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.decode().split() == ["plain,--quality", "plain,--quiet"]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import QUICK, one_line, run
+from tests.cli.helpers import QUICK, run
+from tests.svg.foreign import HEAD, PATH, SMALL
 from warpsplat.metrics import psnr
 
 
@@ -20,20 +22,6 @@ def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     with Image.open(png) as picture:
         assert picture.size == (150, 100)
     assert capsys.readouterr() == ("", "")
-
-
-def test_render_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    good = tmp_path / "good.svg"
-    good.write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 4 2"/>')
-    (tmp_path / "binary.svg").write_bytes(bytes(range(256)))
-    (tmp_path / "text.svg").write_text("hello")
-    for name in ("binary.svg", "text.svg", "missing.svg", "."):
-        assert run("render", tmp_path / name, "-o", tmp_path / "a.png") == 3
-        assert name.strip(".") in one_line(capsys.readouterr().err)
-    for scale in ("0", "-1", "nan", "1e9"):
-        assert run("render", good, "-o", tmp_path / "a.png", "--scale", scale) == 2
-        assert "scale" in one_line(capsys.readouterr().err)
-    assert not (tmp_path / "a.png").exists()
 
 
 def test_render_takes_any_svg(tmp_path: Path) -> None:
@@ -86,25 +74,6 @@ def test_our_own_renderers(renderer: str, least: float, tmp_path: Path) -> None:
         assert psnr(*(np.asarray(p.convert("RGB")).astype(np.float64) for p in shown)) > least
 
 
-@pytest.mark.parametrize(
-    ("renderer", "body", "words"),
-    [
-        ("exact", "<text>a</text>", "<text>"),
-        ("splat", '<path d="M1 1h9v9zM3 3v4h4z"/>', "several contours"),
-        ("splat", '<path d="M1 1h9v9" fill="none" stroke="red"/>', "caps"),
-    ],
-)
-def test_what_they_cannot_show_is_named(
-    renderer: str, body: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    svg = tmp_path / "a.svg"
-    svg.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20">{body}</svg>')
-    assert run("render", svg, "-o", tmp_path / "a.png", "--renderer", renderer, "--device", "cpu") == 3
-    message = one_line(capsys.readouterr().err)
-    assert words in message
-    assert "a.svg" in message
-
-
 @pytest.mark.parametrize("body", ["", '<rect width="30" height="20" fill="red"/>'])
 def test_nothing_but_paper(body: str, tmp_path: Path) -> None:
     svg, png = tmp_path / "a.svg", tmp_path / "a.png"
@@ -115,11 +84,29 @@ def test_nothing_but_paper(body: str, tmp_path: Path) -> None:
         assert picture.convert("RGBA").getpixel((15, 10)) == expected
 
 
-def test_an_svg_of_very_many_pixels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Whose fault it is, the SVG's or the scale's, says the exit code."""
-    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
-    svg.write_text('<svg xmlns="http://www.w3.org/2000/svg" width="1e9" height="1e-9" viewBox="0 0 4 2"/>')
-    assert run("render", svg, "-o", png) == 3
-    assert "a.svg: has more than 200 million pixels" in one_line(capsys.readouterr().err)
-    assert run("render", svg, "-o", png, "--scale", "2") == 2
-    assert "scale 2.0 makes" in one_line(capsys.readouterr().err)
+def test_thin_pictures_take_no_more_than_they_are(tmp_path: Path) -> None:
+    svg = tmp_path / "a.svg"
+    svg.write_text(f'{HEAD}width="1" height="60000">{PATH}</svg>')
+    assert run("render", svg, "-o", tmp_path / "a.png") == 0
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.size == (1, 60000)
+
+
+def test_standard_streams(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    class Stdin:
+        buffer = io.BytesIO(f"{SMALL}{PATH}</svg>".encode())
+
+    image = tmp_path / "a.png"
+    Image.new("RGB", (40, 30)).save(image)
+    monkeypatch.setattr("sys.stdin", Stdin)
+    assert run("render", "-", "-o", "-") == 0
+    assert Image.open(io.BytesIO(capsysbinary.readouterr().out)).size == (40, 30)
+    Stdin.buffer.seek(0)
+    assert run("eval", image, "-", "--json") == 0
+    assert json.loads(capsysbinary.readouterr().out)["paths"] == 1
+    Stdin.buffer = io.BytesIO(b"hello")
+    assert run("render", "-", "-o", "-") == 3
+    assert b"standard input" in capsysbinary.readouterr().err
+    assert run("eval", "-", "-") == 2

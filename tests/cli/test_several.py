@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import run
 from warpsplat.cli.main import main
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.fit.progress import Progress
@@ -60,69 +60,6 @@ def test_names(
     values = json.loads(capsys.readouterr().out)
     assert [one["shapes"] for one in values] == [2, 5]
     assert {one["output"] for one in values} == names and all(map(os.path.isfile, names))
-
-
-REFUSED = [
-    (["--curves", "5,5"], "5 is there twice"),
-    (["--curves", "0,5"], "curves must be a whole number from 1"),
-    (["--curves", "5,x"], "not a whole number, nor several"),
-    (["--curves", "5,9", "-o", "-"], "several files: give -o 'NAME-{curves}.svg'"),
-    (["--curves", "5,9", "-o", "same-{stem}.svg"], "2 results would be same-photo.svg"),
-    (["--curves", "5,9", "-o", "new/{curves}-{x}.svg"], "'{x}' is no field"),
-    (["--curves", "5,9", "-o", "new/{curves}.svg", "--report", "no/a.html"], "no does not exist"),
-    (["--curves", "5,9", "-o", "photo.png/{curves}.svg"], "photo.png is a file, not a folder"),
-    (["--curves", "5,9", "--target-psnr", "20"], "and target-psnr do not go together"),
-    (["--curves", "5,9", "--max-bytes", "2KB"], "and max-bytes do not go together"),
-    (["--curves", "5,9", "--time-budget", "9s"], "and time-budget do not go together"),
-    (["--curves", "8,9", "--layered"], "and levels do not go together"),
-    (["--curves", "5,9", "--checkpoint", "a.ckpt"], "and --checkpoint do not go together"),
-    (["--curves", "5,9", "--data-uri"], "and --data-uri do not go together"),
-    (["--curves", "5,9", "--animate", "a.gif"], "--animate takes one number of shapes"),
-    (
-        ["--curves", "5,9", "--subject", "pixel", "-o", "new/"],
-        "photo.png: a picture of cells has a number of",
-    ),
-    (["--curves", "5,9", "photo.png"], "matrix: {curves: [5, 9]}"),
-    (["--suggest", "--curves", "5"], "--suggest and --curves do not go together"),
-    (["--suggest", "--max-bytes", "5KB"], "max-bytes as well"),
-    (["--suggest", "-o", "a.svg"], "writes nothing"),
-]
-
-
-@pytest.mark.parametrize(("flags", "words"), REFUSED)
-def test_what_does_not_go_together_is_found_before_the_work(
-    image: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    flags: list[str],
-    words: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run("vectorize", image, *flags) == 2
-    assert words in one_line(capsys.readouterr().err)
-    assert os.listdir(tmp_path) == ["photo.png"]
-
-
-def test_files_of_others_stay(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("photo-9.svg").write_text("<svg/>")
-    assert run("vectorize", image, "--curves", "3,9", *FEW) == 2
-    assert "photo-9.svg: exists and was not written by warpsplat" in one_line(capsys.readouterr().err)
-    assert not os.path.exists("photo-3.svg")
-
-
-@pytest.mark.needs("batch")
-def test_batches_say_what_to_use(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("batch", image, "--curves", "5,9") == 2
-    assert "matrix: {curves: [5, 9]}" in one_line(capsys.readouterr().err)
-    jobs = tmp_path / "jobs.yaml"
-    for value, hint in (("[5, 9]", "{curves: [...]}"), ("5,9", "{curves: [5, 9]}")):
-        jobs.write_text(f"jobs:\n  - images: photo.png\n    curves: {value}\n")
-        assert run("batch", jobs) == 2
-        assert f"matrix: {hint}" in one_line(capsys.readouterr().err)
 
 
 def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> None:

@@ -1,5 +1,4 @@
-"""Mutated and made-up inputs against the whole command line.
+"""A fuzzer for the whole command line, and properties that must hold for any input.
 
-A short run is part of the suite (``test_short_run.py``, ``test_properties.py``); a long one is
-``python -m tests.fuzz --count 100000 --seed N``; ``python -m tests.fuzz.kills`` ends runs at random moments.
+A short run is part of the suite; a long one is ``python -m tests.fuzz --count 100000``.
 """

@@ -1,4 +1,4 @@
-"""Cases: a changed input with the commands that take it, and what must hold after each of them."""
+"""Cases: a changed input with the commands that take it, and the judgement of their outcomes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from PIL import Image
+from warpsplat.run.result import job_key
 
-from tests.fuzz import checkpoints, corpus, manifests, mutate
+from tests.fuzz import checkpoints, corpus
 from tests.fuzz import vocabulary as words
 from tests.fuzz.corpus import Seed
-from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, Outcome
+from tests.fuzz.mutate import mutate_bytes, mutate_png, mutate_text
+from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, PATIENCE, Outcome
+from warpsplat.batch.manifest import Entry
 from warpsplat.errors import ExitCode
+from warpsplat.fit.settings import make_settings
+
+Mutation = Callable[[random.Random, bytes, bytes], bytes]
+"""(generator, input, another input) -> changed input."""
 
 QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "2")
 
@@ -112,30 +119,34 @@ def _option_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
     return (Command(("vectorize", "in/a.png", *given), (USAGE, INPUT)),)
 
 
-def _changed_image(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    if data.startswith(b"\x89PNG") and rng.random() < 0.6:
-        return mutate.png(rng, data, other)
-    return mutate.mutate_bytes(rng, data, other)
-
-
-def _changed_svg(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    return mutate.mutate_text(rng, data, other, words.SVG_WORDS, words.SVG_SNIPPETS)
-
-
-def _changed_yaml(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    return mutate.mutate_text(rng, data, other, words.YAML_WORDS, words.YAML_SNIPPETS)
-
-
 def _checkpoint_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
     return (Command(checkpoints.arguments(name, GOOD_IMAGE), (USAGE, INPUT), "out.svg", consumes=True),)
 
 
 def _manifest_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    return (Command(manifests.arguments(rng.random() < 0.5), (USAGE, int(ExitCode.SOME_FAILED))),)
+    arguments = ("batch", "in", "-o", "out", "--dry-run", "--manifest", name, *QUICK)
+    flags = rng.choice(((), ("--json",)))
+    return (Command((*arguments, *flags), (USAGE, int(ExitCode.SOME_FAILED))),)
 
 
 def _manifests() -> list[Seed]:
-    return manifests.manifests({name: data for name, data in FILES.items() if name.startswith("in/")})
+    """Return manifests of a batch over the folder ``in``: of failures, of missing results, of both."""
+    settings = make_settings(curves=4, iterations=2)
+    images = {name: data for name, data in FILES.items() if name.startswith("in/")}
+    keys = {f"out/{Path(name).stem}.svg": job_key(settings, data) for name, data in images.items()}
+    figures = {"psnr": 20.5, "bytes": 700, "seconds": 1.5, "paths": 4, "missed": [], "levels": []}
+    failed = b"".join(Entry(name, key, "failed", error="not an image").line() for name, key in keys.items())
+    made = b"".join(Entry(name, key, "made", "0" * 64, figures=figures).line() for name, key in keys.items())
+    return [Seed(f"{len(data)}.jsonl", data) for data in (failed, made, made + failed)]
+
+
+def _changed_image(rng: random.Random, data: bytes, other: bytes) -> bytes:
+    is_png = data.startswith(b"\x89PNG") and rng.random() < 0.6
+    return (mutate_png if is_png else mutate_bytes)(rng, data, other)
+
+
+def _text_mutation(vocabulary: tuple[str, ...], snippets: tuple[str, ...]) -> Mutation:
+    return lambda rng, data, other: mutate_text(rng, data, other, vocabulary, snippets)
 
 
 @dataclass(frozen=True)
@@ -143,18 +154,22 @@ class Target:
     """A kind of input."""
 
     seeds: Callable[[], list[Seed]]
-    change: mutate.Mutation
+    change: Mutation
     commands: Callable[[random.Random, str], tuple[Command, ...]]
     share: int
     """Its weight in a run over all targets."""
 
 
+_SVG = _text_mutation(words.SVG_WORDS, words.SVG_SNIPPETS)
+_YAML = _text_mutation(words.YAML_WORDS, words.YAML_SNIPPETS)
+_JSON = _text_mutation(words.JSON_WORDS, words.JSON_SNIPPETS)
+
 TARGETS = {
     "image": Target(corpus.images, _changed_image, _image_commands, 9),
-    "svg": Target(corpus.svgs, _changed_svg, _svg_commands, 8),
-    "yaml": Target(corpus.yamls, _changed_yaml, _yaml_commands, 2),
+    "svg": Target(corpus.svgs, _SVG, _svg_commands, 8),
+    "yaml": Target(corpus.yamls, _YAML, _yaml_commands, 2),
     "options": Target(lambda: [Seed("in.txt", b"-")], lambda rng, data, other: data, _option_commands, 1),
-    "manifest": Target(_manifests, manifests.changed, _manifest_commands, 1),
+    "manifest": Target(_manifests, _JSON, _manifest_commands, 1),
     "checkpoint": Target(checkpoints.checkpoints, checkpoints.changed, _checkpoint_commands, 2),
 }
 
@@ -184,8 +199,8 @@ BATCH_LINE = re.compile(r"(warpsplat: |\[\d+/\d+\] |failed:|  |in/|case)[^\x00-\
 def judge(command: Command, outcome: Outcome, folder: Path) -> str:
     """Return what is wrong with the outcome, in a few words; empty: nothing is."""
     code = outcome.code
-    if outcome.ended:
-        return f"no end within {MAX_SECONDS:g} s" if outcome.ended == "time" else "over 2 GiB"
+    if outcome.timed_out:
+        return f"no end within {PATIENCE:g} s"
     if code < 0:
         return f"ended by signal {-code}"
     if "Traceback" in outcome.stderr:

@@ -1,4 +1,4 @@
-"""Checkpoints to mutate, of short runs that are nearly done, so that accepted ones end soon."""
+"""Checkpoints to change, of short runs that are nearly done, so that accepted ones end soon."""
 
 from __future__ import annotations
 
@@ -7,19 +7,18 @@ import itertools
 import random
 import tempfile
 import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
 
 import warpsplat
-from tests.fuzz import mutate
 from tests.fuzz.corpus import Seed, picture
+from tests.fuzz.mutate import INTERESTING, mutate_bytes, mutate_text
+from tests.fuzz.vocabulary import JSON_SNIPPETS, JSON_WORDS
 from warpsplat.cli.vectorize import command
 
 COMMON = ("--device", "cpu", "--curves", "4", "--iterations", "56", "--subject", "photo", "--threads", "1")
 RUNS = {
-    ".closed": (),
     ".open": ("--open",),
     ".layered": ("--levels", "2,4"),
     ".painted": ("--paint", "auto"),
@@ -29,17 +28,6 @@ RUNS = {
 
 STOPPED = 53
 """Steps, past the first evaluation of the file; more in the first fit of several."""
-
-WORDS = (
-    "step", "began", "curves", "per_pixel", "settled", "rounding", "colored", "generator", "room",
-    "fits", "state", "samples", "slots", "needed", "inc", "has_uint32", "PCG64", "true", "false", "null",
-    "NaN", "Infinity",
-)  # fmt: skip
-
-SNIPPETS = (
-    "{", "}", "[", "]", ",", '"', "[" * 2000, "[0]", "{}", "null,", "1e999", "9" * 5000, '"fits": [],',
-    '"\\ud800"', "-", "\0",
-)  # fmt: skip
 
 FLOATS = np.float32([0, -0.0, 1, -1, 1e-40, 3e38, -3e38, np.inf, -np.inf, np.nan, 1e9, 2e9])
 
@@ -52,12 +40,11 @@ def checkpoints() -> list[Seed]:
             image, path = Path(folder, "a.png"), Path(folder, "checkpoint")
             picture().save(image)
             given = command.make_context("vectorize", [str(image), *COMMON, *flags]).params
-            known = {"curves", "iterations", "subject", "levels", "paint", "renderer", "device", "threads"}
-            options = {name: value for name, value in given.items() if name in known}
+            known = ("curves", "iterations", "subject", "levels", "paint", "renderer", "device", "threads")
             steps = itertools.count(1)
             warpsplat.vectorize(
                 image,
-                **options,
+                **{name: given[name] for name in known},
                 open=ending == ".open" or None,
                 checkpoint=path,
                 stop=lambda steps=steps: next(steps) >= STOPPED,  # type: ignore[misc]
@@ -73,64 +60,48 @@ def arguments(name: str, image: str) -> tuple[str, ...]:
 
 
 def changed(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    """Change bytes of the file, or those of a part of it with correct checksums."""
+    """Change bytes of the file, or of parts of it with correct checksums."""
     if rng.random() < 0.2:
-        return mutate.mutate_bytes(rng, data, other)
-    parts, others = _parts(data), _parts(other)
-    for _ in range(rng.choice((1, 1, 1, 1, 3))):
-        place = rng.randrange(len(parts)) if rng.random() < 0.8 else 0
-        name, part = parts[place]
-        action = rng.randrange(10)
-        if place == 0:
-            # What comes before identifies the run: most changes there are refused at once.
-            head, mark, rest = part.partition(b'"fits"' if rng.random() < 0.9 else b'"format"')
-            text = mutate.mutate_text(rng, mark + rest, part, WORDS, SNIPPETS)
-            parts[0] = (name, head + text)
-        elif action == 0:
-            del parts[place]
-        elif action == 1:
-            parts[place] = (name, rng.choice(others)[1])
-        elif action == 2:
-            parts[place] = (rng.choice(parts)[0], part)
-        elif action == 3:
-            parts[place] = (name, mutate.mutate_bytes(rng, part, rng.choice(others)[1]))
-        else:
-            parts[place] = (name, _other_numbers(rng, part))
-    return _packed(parts, rng)
-
-
-def _parts(data: bytes) -> list[tuple[str, bytes]]:
+        return mutate_bytes(rng, data, other)
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        return [(info.filename, archive.read(info)) for info in archive.infolist()]
-
-
-def _other_numbers(rng: random.Random, part: bytes) -> bytes:
-    """Return an array with some numbers changed, or with rows added or removed."""
-    try:
-        array = np.load(io.BytesIO(part))
-    except Exception:  # it was mutated before
-        return mutate.mutate_bytes(rng, part, part)
-    flat = array.reshape(-1)
-    whole = array.dtype == np.int32
-    for _ in range(rng.choice((1, 1, 2, 8)) if len(flat) else 0):
-        other = rng.choice(mutate.INTERESTING) if whole else rng.choice(FLOATS)
-        if rng.random() < 0.7:  # a value from elsewhere in the array is valid
-            other = rng.choice(flat)
-        flat[rng.randrange(len(flat))] = np.int64(other).astype(np.int32) if whole else other
-    if rng.random() < 0.15:
-        array = array[: rng.randrange(len(array) + 1)]
-    elif rng.random() < 0.1:
-        array = np.concatenate([array, array])
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    header, *names = parts
+    for _ in range(rng.choice((1, 1, 1, 1, 3))):
+        name, action = rng.choice(names), rng.randrange(10)
+        if action < 3:
+            # What comes before identifies the run: most changes there are refused at once.
+            head, mark, rest = parts[header].partition(b'"fits"' if rng.random() < 0.9 else b'"format"')
+            parts[header] = head + mutate_text(rng, mark + rest, rest, JSON_WORDS, JSON_SNIPPETS)
+        elif action == 3:
+            parts[name] = rng.choice((b"", parts[rng.choice(names)]))
+        elif action == 4:
+            parts[name] = mutate_bytes(rng, parts[name], parts[header])
+        else:
+            parts[name] = _change_numbers(rng, parts[name])
     made = io.BytesIO()
-    np.lib.format.write_array(made, array)
+    with zipfile.ZipFile(made, "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(zipfile.ZipInfo(name), part)
     return made.getvalue()
 
 
-def _packed(parts: list[tuple[str, bytes]], rng: random.Random) -> bytes:
-    """Return an archive; seldom a compressed one."""
-    how = zipfile.ZIP_STORED if rng.random() < 0.97 else zipfile.ZIP_DEFLATED
+def _change_numbers(rng: random.Random, part: bytes) -> bytes:
+    """Return an array with some numbers changed, or with rows added or removed."""
+    try:
+        array = np.load(io.BytesIO(part))
+    except Exception:  # it was changed before
+        return mutate_bytes(rng, part, part)
+    flat = array.reshape(-1)
+    for _ in range(rng.choice((1, 1, 2, 8)) if len(flat) else 0):
+        odd = (
+            np.array(rng.choice(INTERESTING)).astype(np.int32)
+            if flat.dtype == np.int32
+            else rng.choice(FLOATS)
+        )
+        # A value from elsewhere in the array is valid.
+        flat[rng.randrange(len(flat))] = rng.choice(flat) if rng.random() < 0.7 else odd
+    if rng.random() < 0.25:
+        array = np.concatenate([array, array])[: rng.randrange(2 * len(array) + 1)]
     made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", how, compresslevel=zlib.Z_BEST_SPEED) as archive:
-        for name in dict.fromkeys(name for name, _ in parts):
-            archive.writestr(zipfile.ZipInfo(name), next(data for other, data in parts if other == name), how)
+    np.lib.format.write_array(made, array)
     return made.getvalue()

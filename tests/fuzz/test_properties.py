@@ -83,17 +83,8 @@ def test_units_of_durations_and_sizes(number: int, blank: str, duration: str, si
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
 anything = scalars | st.lists(st.none(), max_size=1)
-KEYWORDS = (
-    "curves",
-    "iterations",
-    "precision",
-    "seed",
-    "target_psnr",
-    "time_budget",
-    "max_bytes",
-    "renderer",
-)
-names = st.sampled_from(("kind", *KEYWORDS))
+keywords = ["kind", "curves", "iterations", "precision", "seed", "target_psnr", "time_budget", "max_bytes"]
+names = st.sampled_from([*keywords, "renderer"])
 
 
 @examples(150)
@@ -185,29 +176,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def refused_with_its_line(path: Path, data: bytes) -> None:
+contents = file.map(yaml.safe_dump) | st.text("jobs: []{}-&*!|>'\"\n\t#%?,images", max_size=40)
+
+
+@pytest.mark.needs("batch")
+@examples(150)
+@given(contents.map(str.encode) | st.binary(max_size=30))
+def test_batch_files_are_jobs_or_refused(folder: Path, data: bytes) -> None:
     from tests.batch.helpers import load_jobs
 
+    path = folder / "jobs.yaml"
     path.write_bytes(data)
     try:
         assert load_jobs(path)
     except UsageError as error:
         message = one_line(error)
         assert message.startswith(f"{path}:")
-
-
-@pytest.mark.needs("batch")
-@examples(100)
-@given(file)
-def test_batch_files_of_any_content_are_jobs_or_refused(folder: Path, content: Any) -> None:
-    refused_with_its_line(folder / "jobs.yaml", yaml.safe_dump(content).encode())
-
-
-@pytest.mark.needs("batch")
-@examples(100)
-@given(st.binary(max_size=30) | st.text("jobs: []{}-&*!|>'\"\n\t#%?,images", max_size=40).map(str.encode))
-def test_batch_files_of_any_bytes_are_jobs_or_refused(folder: Path, data: bytes) -> None:
-    refused_with_its_line(folder / "jobs.yaml", data)
 
 
 options = st.fixed_dictionaries(
@@ -227,7 +211,7 @@ options = st.fixed_dictionaries(
 
 
 @pytest.mark.needs("batch")
-@examples(100)
+@examples(50)
 @given(options, options)
 def test_settings_of_a_batch_are_those_of_the_flags(
     folder: Path, defaults: dict[str, Any], own: dict[str, Any]

@@ -1,19 +1,21 @@
-"""A process that runs commands of warpsplat one after the other, and its owner's handle on it.
+"""A warm process that runs commands of warpsplat one after the other, and its owner's handle on it.
 
 Starting Python and its libraries takes a hundred times as long as most commands on small inputs. The process
-is separate so that a crash, a hang or a flood of memory is seen and survived."""
+is separate so that a crash, a hang or a flood of memory is seen and survived.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import os
+import resource
 import select
 import subprocess
 import sys
 import tempfile
-import time
 import traceback
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -21,14 +23,11 @@ from typing import Any
 from tests import ROOT
 
 MAX_SECONDS = 10.0
-"""Longest run on a small input [s of processor time, which other programs do not lengthen]."""
-PATIENCE = 10.0
-"""Ratio of wall-clock time to that: beyond, a command waits for something that does not come."""
-MAX_MEMORY = 2 << 30
-"""Most memory of a run [bytes]."""
-DRIFT = 512 << 20
-"""Memory beyond which a worker is replaced between commands [bytes], so that the next run starts fresh."""
-TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
+"""Longest run on a small input, in processor time, which other programs do not lengthen [s]."""
+PATIENCE = 100.0
+"""Time after which a command is ended [s]."""
+MAX_MEMORY, ADDRESSES = 2 << 30, 32 << 30
+"""Most memory of a run, and most that the process can allocate [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -37,40 +36,20 @@ class Outcome:
 
     code: int
     """Exit code; minus the signal's number if a signal ended the process."""
-    stdout: str
-    stderr: str
-    seconds: float
+    stdout: str = ""
+    stderr: str = ""
+    seconds: float = 0.0
     """Processor time [s]."""
-    peak: int
-    """Most memory [bytes]; 0: unknown."""
-    ended: str = ""
-    """Why the process had to be ended: "time" or "memory"."""
-
-
-def _proc(process: int | str, name: str) -> str:
-    """Return a file of Linux's account of a process; empty if there is none."""
-    try:
-        return Path(f"/proc/{process}/{name}").read_text()
-    except OSError:
-        return ""
-
-
-def _status(process: int | str, key: str) -> int:
-    """Return a size [bytes] in a process's status; 0 if it is unknown."""
-    lines = _proc(process, "status").splitlines()
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith(key)), 0)
-
-
-def _spent(process: int) -> float:
-    """Return the processor time of a process and its finished children [s]."""
-    return sum(map(int, _proc(process, "stat").rpartition(")")[2].split()[11:15])) / TICKS
+    peak: int = 0
+    """Most memory that the process has used so far [bytes]."""
+    timed_out: bool = False
 
 
 class Worker:
     """The owner's side; the process is started when it is needed, and again after it has ended."""
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Worker:
         return self
@@ -80,103 +59,69 @@ class Worker:
 
     def close(self) -> None:
         """End the process."""
-        if self._process:
-            self._process.kill()
-            self._process.wait()
-            for pipe in (self._process.stdin, self._process.stdout):
-                with contextlib.suppress(OSError):  # unsent data in the pipe
-                    assert pipe
-                    pipe.close()
-        self._process = None
+        if self.process:
+            self.process.kill()
+            self.process.communicate()
+        self.process = None
 
-    def run(self, arguments: list[str], folder: Path, stdin: Path | None = None) -> Outcome:
+    def run(self, arguments: Sequence[str], folder: Path, stdin: Path | None = None) -> Outcome:
         """Run ``warpsplat ARGUMENTS`` in ``folder``."""
-        if not self._process:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "tests.fuzz.worker"],
-                cwd=ROOT,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-            )
-            # A first command, so that start-up does not count; the limit only guards against hangs.
-            outcome = self._ask(["info"], folder, None, limit=120.0)
-            if not self._process:
-                return outcome
-        outcome = self._ask(arguments, folder, stdin, limit=MAX_SECONDS)
-        if self._process and _status(self._process.pid, "VmRSS") > DRIFT:
-            self.close()
-        return outcome
-
-    def _ask(self, arguments: list[str], folder: Path, stdin: Path | None, *, limit: float) -> Outcome:
-        process = self._process
-        assert process and process.stdin and process.stdout
-        task = {"arguments": arguments, "folder": str(folder), "stdin": str(stdin or os.devnull)}
+        if not self.process:
+            command = [sys.executable, "-m", "tests.fuzz.worker"]
+            pipe, null = subprocess.PIPE, subprocess.DEVNULL
+            self.process = subprocess.Popen(command, 0, cwd=ROOT, stdin=pipe, stdout=pipe, stderr=null)
+        process = self.process
+        assert process.stdin and process.stdout
+        task = json.dumps([list(arguments), str(folder), str(stdin or os.devnull)]).encode()
         with contextlib.suppress(BrokenPipeError):  # the process has ended, see below
-            process.stdin.write(json.dumps(task).encode() + b"\n")
-            process.stdin.flush()
-        started, before, peak, ended, spent = time.monotonic(), _spent(process.pid), 0, "", 0.0
-        while not ended and not select.select([process.stdout], [], [], 0.05)[0]:
-            children = list(map(int, _proc(process.pid, f"task/{process.pid}/children").split()))
-            held = sum(_status(p, "VmRSS") for p in (process.pid, *children))
-            peak = max(peak, held)
-            spent = _spent(process.pid) - before + sum(map(_spent, children))
-            if spent > limit or time.monotonic() - started > PATIENCE * limit:
-                ended = "time"
-            elif held > MAX_MEMORY:
-                ended = "memory"
-        if not ended:
-            answer = process.stdout.readline()
-            if answer:
-                values: dict[str, Any] = json.loads(answer)
-                values["peak"] = max(peak, values["peak"])
-                return Outcome(**values)
+            process.stdin.write(task + b"\n")
+        timed_out = not select.select([process.stdout], [], [], PATIENCE)[0]
+        answer = b"" if timed_out else process.stdout.readline()
+        if answer:
+            return Outcome(**json.loads(answer))
+        if not timed_out:
             process.wait()
         self.close()
-        return Outcome(process.returncode, "", "", spent, peak, ended)
+        return Outcome(process.returncode, timed_out=timed_out)
 
 
-def _serve() -> None:
+def serve() -> None:
     """Run the tasks on the standard input, and answer on the standard output."""
-    tasks = os.fdopen(os.dup(0), "rb")
-    answers = os.fdopen(os.dup(1), "wb")
+    resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
+    tasks, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
     from warpsplat.cli.main import main
 
     for line in tasks:
-        answers.write(json.dumps(asdict(_run(main, json.loads(line)))).encode() + b"\n")
-        answers.flush()
+        print(json.dumps(asdict(_run(main, *json.loads(line)))), file=answers, flush=True)
 
 
-def _run(main: Any, task: dict[str, Any]) -> Outcome:
-    with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")  # reset the highest memory
-    os.chdir(task["folder"])
+def _run(main: Any, arguments: list[str], folder: str, stdin: str) -> Outcome:
+    os.chdir(folder)
     umask = os.umask(0o022)
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+    with open(stdin, "rb") as source, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         # Replace the file descriptors, and not Python's streams only: native code writes as well.
-        source = os.open(task["stdin"], os.O_RDONLY)
-        for number, handle in enumerate((source, out.fileno(), err.fileno())):
-            os.dup2(handle, number)
-        os.close(source)
+        for number, file in enumerate((source, out, err)):
+            os.dup2(file.fileno(), number)
         sys.stdin, sys.stdout, sys.stderr = (
             open(number, mode, encoding="utf-8", errors="backslashreplace", closefd=False)  # noqa: SIM115
             for number, mode in enumerate("rww")
         )
         started = sum(os.times()[:4])
-        code = _call(main, task["arguments"])
+        code = _call(main, arguments)
         seconds = sum(os.times()[:4]) - started
-        for stream in (sys.stdout, sys.stderr):
+        texts = []
+        for stream, file in ((sys.stdout, out), (sys.stderr, err)):
             with contextlib.suppress(ValueError, OSError):
                 stream.flush()
-        texts = []
-        for file in (out, err):
             file.seek(0)
             texts.append(file.read(1 << 20).decode("utf-8", "replace"))
     os.umask(umask)
-    return Outcome(code, texts[0], texts[1], seconds, _status("self", "VmHWM"))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return Outcome(code, texts[0], texts[1], seconds, peak)
 
 
 def _call(main: Any, arguments: list[str]) -> int:
+    """Return the exit code of a command, as Python would end with it."""
     try:
         main(arguments)
     except SystemExit as end:
@@ -184,11 +129,11 @@ def _call(main: Any, arguments: list[str]) -> int:
             return end.code or 0
         print(end.code, file=sys.stderr)
         return 1
-    except BaseException:  # as Python does at the end
+    except BaseException:
         traceback.print_exc()
         return 1
     return 0
 
 
 if __name__ == "__main__":
-    _serve()
+    serve()

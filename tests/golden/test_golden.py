@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import warpsplat
+from tests import ROOT
 from tests.golden.cases import ALL_CASES, CASES, digest_of
 from tests.golden.pictures import PICTURES
 
-ROOT = Path(__file__).parents[2]
 EXPECTED = json.loads(Path(__file__).with_name("digests.json").read_text(encoding="utf-8"))
 
 LEVELS = {"native": "", "without AVX-512": "X86_V4 AVX512_ICL", "without AVX2": "X86_V3 X86_V4 AVX512_ICL"}
@@ -42,9 +42,7 @@ def test_every_case_is_expected() -> None:
 
 STOPPED = """
 import sys, warpsplat
-import warpsplat
-from tests.golden.cases import CASES, digest_of
-from tests.golden.pictures import PICTURES
+from tests.golden.cases import CASES
 from tests.golden.pictures import PICTURES
 picture, given = CASES["photo closed"]
 steps = iter(range(given["iterations"] // 2))

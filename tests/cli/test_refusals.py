@@ -1,0 +1,242 @@
+"""Commands that are refused: the exit code, one line that names the cause, and no file changed or left."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import one_line, run
+from tests.fuzz.corpus import own_svg
+from warpsplat.cli.main import COMMANDS
+
+WITHOUT_JSON = ("render", "serve")
+"""Commands without ``--json``."""
+
+VALID = {
+    "vectorize": "vectorize photo.png",
+    "refine": "refine drawing.svg photo.png -o a.svg",
+    "render": "render drawing.svg -o a.png",
+    "eval": "eval photo.png drawing.svg",
+    "batch": "batch good.yaml",
+    "compare": "compare photo.png --against vtracer",
+    **{name: name for name in ("bench", "info", "doctor", "serve")},
+}
+WITH_DEVICE = ("vectorize", "refine", "batch", "bench", "serve")
+OPTIMISING = ("vectorize photo.png", "refine drawing.svg photo.png")
+
+USAGE = [
+    ("nonsense", "no such command or file: nonsense; commands are vectorize, "),
+    ("vectorise photo.png", "no such command or file: vectorise; did you mean vectorize?"),
+    ("drawing.svg", "drawing.svg: with which command? warpsplat render FILE.svg"),
+    ("good.yaml", "good.yaml: with which command? warpsplat batch FILE.yaml"),
+    ("--curves 5 photo.png", "(options follow a command: warpsplat vectorize IMAGE ...)"),
+    ("vectorize photo.png --curve 5", "--curves"),
+    *[(f"{line} --nonsense", "--nonsense") for line in VALID.values()],
+    *[(f"{VALID[name]} --device cuda:99", "cuda:99") for name in WITH_DEVICE],
+    *[(line, "issing") for line in ("compare", "vectorize", "refine drawing.svg photo.png")],
+    ("vectorize photo.png --device tpu", "tpu"),
+    # Values
+    ("vectorize photo.png --curves 0", "curves"),
+    ("vectorize photo.png --curves many", "--curves"),
+    ("vectorize photo.png --quality best", "--quality"),
+    ("vectorize photo.png --threads 0", "--threads"),
+    ("vectorize photo.png --time-budget soon", "not a time"),
+    ("vectorize photo.png --max-bytes -1", "not a size"),
+    (f"vectorize photo.png --max-bytes {400 * '9'}", "not a size"),
+    ("vectorize photo.png --target-psnr -3", "target-psnr"),
+    ("vectorize photo.png --target-psnr nan", "target-psnr"),
+    ("vectorize missing.png --size 3", "not a size: '3'"),
+    ("vectorize missing.png --page b5", "page must be one of"),
+    ("vectorize missing.png --units ell", "units must be one of"),
+    ("refine drawing.svg photo.png -o a.svg --iterations 0", "iterations"),
+    ("refine drawing.svg photo.png -o a.svg --background yellow", "background"),
+    *[(f"{VALID['render']} --scale {scale}", "scale") for scale in ("0", "-1", "nan", "1e9", "1e308")],
+    ("render good.svg -o a.png --scale 1e-9", "scale"),
+    ("render many.svg -o a.png --scale 2", "scale 2.0 makes"),
+    ("bench --size 0x0", "size"),
+    ("bench --size 1x1", "size"),
+    # Outputs
+    *[(f"{line} -o none/a.png", "does not exist") for line in (*OPTIMISING, "render drawing.svg")],
+    *[(f"{line} -o photo.png", "is the input itself") for line in OPTIMISING],
+    *[(f"{line} -o foreign.svg", "exists and was not written by warpsplat") for line in OPTIMISING],
+    *[
+        (f"{line} -o {name}", "a result's name ends with ")
+        for line in (*OPTIMISING, "render drawing.svg")
+        for name in ("a.jpg", "a.txt", "a")
+    ],
+    ("vectorize photo.png -o a.gz", "a result's name ends with .svg, .svgz, .png or .pdf"),
+    ("render drawing.svg -o a.svgz", "a result's name ends with .png or .pdf"),
+    ("refine drawing.svg photo.png -o drawing.svg", "is the input itself"),
+    ("render drawing.svg -o drawing.svg", ""),
+    ("render drawing.svg -o a.pdf --renderer exact", "makes pixels"),
+    ("vectorize photo.png -o .", "is a folder"),
+    ("vectorize photo.png -o folder.svg", "folder"),
+    ("vectorize photo.png -o photo.png/a.svg", "photo.png"),
+    ("vectorize photo.png -o /proc/a.svg", "/proc"),
+    ("vectorize photo.png -o /dev/null", "is a device"),
+    ("vectorize photo.png -o loop.svg", "loop.svg"),
+    (f"vectorize photo.png -o {300 * 'x'}.svg", "xxx"),
+    ("vectorize - --curves 4", "give -o"),
+    ("vectorize - -o a.svg --importance -", "image and mask"),
+    ("vectorize photo.png -o - --data-uri", ""),
+    ("refine - - -o b.svg", ""),
+    ("eval - -", ""),
+    # Checkpoints
+    ("vectorize photo.png --resume", "needs a checkpoint"),
+    ("vectorize photo.png --checkpoint photo.png --overwrite", "is the input itself"),
+    ("vectorize photo.png -o a.svg --checkpoint a.svg", "another name"),
+    ("vectorize photo.png --checkpoint -", "not the standard output"),
+    ("vectorize photo.png --checkpoint a --checkpoint-every often", "not a time"),
+    # Several numbers of shapes
+    ("vectorize photo.png --curves 5,5", "5 is there twice"),
+    ("vectorize photo.png --curves 0,5", "curves must be a whole number from 1"),
+    ("vectorize photo.png --curves 5,x", "not a whole number, nor several"),
+    ("vectorize photo.png --curves 5,9 -o -", "several files: give -o 'NAME-{curves}.svg'"),
+    ("vectorize photo.png --curves 5,9 -o same-{stem}.svg", "2 results would be same-photo.svg"),
+    ("vectorize photo.png --curves 5,9 -o new/{curves}-{x}.svg", "'{x}' is no field"),
+    ("vectorize photo.png --curves 5,9 -o new/{curves}.svg --report no/a.html", "no does not exist"),
+    ("vectorize photo.png --curves 5,9 -o photo.png/{curves}.svg", "photo.png is a file, not a folder"),
+    ("vectorize photo.png --curves 3,9 -o foreign-{curves}.svg", "foreign-9.svg: exists and was not written"),
+    *[
+        (f"vectorize photo.png --curves 8,9 --{option}", f"and {option.split()[0]} do not go together")
+        for option in ("target-psnr 20", "max-bytes 2KB", "time-budget 9s")
+    ],
+    ("vectorize photo.png --curves 8,9 --layered", "and levels do not go together"),
+    ("vectorize photo.png --curves 5,9 --checkpoint a.ckpt", "and --checkpoint do not go together"),
+    ("vectorize photo.png --curves 5,9 --data-uri", "and --data-uri do not go together"),
+    ("vectorize photo.png --curves 5,9 --animate a.gif", "--animate takes one number of shapes"),
+    ("vectorize photo.png --curves 5,9 --subject pixel -o new/", "photo.png: a picture of cells has"),
+    ("vectorize photo.png --curves 5,9 photo.png", "matrix: {curves: [5, 9]}"),
+    ("vectorize photo.png --suggest --curves 5", "--suggest and --curves do not go together"),
+    ("vectorize photo.png --suggest --max-bytes 5KB", "max-bytes as well"),
+    ("vectorize photo.png --suggest -o a.svg", "writes nothing"),
+    # Batches
+    ("batch photo.png --curves 5,9", "matrix: {curves: [5, 9]}"),
+    ("batch list.yaml", "matrix: {curves: [...]}"),
+    ("batch text.yaml", "matrix: {curves: [5, 9]}"),
+    ("batch foreign.yaml", "foreign.svg"),
+    ("batch none.yaml", "none.yaml"),
+    ("batch wrong.yaml", "curves"),
+]
+
+INPUT = [
+    *[
+        (line.replace("photo.png", name), name)
+        for line in map(VALID.__getitem__, ("vectorize", "refine", "eval", "compare"))
+        for name in ("none.png", "broken.png")
+        if "compare" not in line or name == "none.png"
+    ],
+    *[
+        (line.replace("drawing.svg", name), name)
+        for line in map(VALID.__getitem__, ("refine", "render", "eval"))
+        for name in ("none.svg", "broken.png", "binary.svg")
+    ],
+    ("eval photo.png photo.png", "warpsplat: photo.png: not an SVG"),
+    ("vectorize .", ""),
+    ("vectorize ''", ""),
+    ("vectorize folder.svg", "folder.svg"),
+    ("render . -o a.png", ""),
+    ("render many.svg -o a.png", "many.svg: has more than 200 million pixels"),
+    ("render /dev/zero -o a.png", "device"),
+    ("render text.svg -o a.png --renderer exact --device cpu", "text.svg: "),
+    ("render text.svg -o a.png --renderer exact --device cpu", "<text>"),
+    ("render contours.svg -o a.png --renderer splat --device cpu", "several contours"),
+    ("render caps.svg -o a.png --renderer splat --device cpu", "caps"),
+    ("eval photo.png square.svg", ""),
+    ("refine square.svg photo.png -o b.svg", ""),
+    ("refine pattern.svg photo.png -o b.svg", ""),
+    ("refine clip.svg photo.png -o b.svg", ""),
+    ("refine opacity.svg photo.png -o b.svg", ""),
+    ("refine filter.svg photo.png -o b.svg", "filter"),
+]
+
+HEAD, SIZE, PATH = (
+    '<svg xmlns="http://www.w3.org/2000/svg" ',
+    'width="32" height="24">',
+    '<path d="M0 0H9V9Z" ',
+)
+SVGS = {
+    "good": 'width="5in" height="4in" viewBox="0 0 50 40"/>',
+    "many": 'width="1e9" height="1e-9" viewBox="0 0 4 2"/>',
+    "foreign": f"{SIZE}<!-- by hand --></svg>",
+    "foreign-9": f"{SIZE}<!-- by hand --></svg>",
+    "square": f'width="24" height="24">{PATH}/></svg>',
+    "pattern": f'{SIZE}<pattern id="g"/>{PATH}fill="url(#g)"/></svg>',
+    "clip": f'{SIZE}<g clip-path="url(#c)">{PATH}/></g></svg>',
+    "opacity": f'{SIZE}{PATH}stroke="red" opacity=".5"/></svg>',
+    "filter": f'{SIZE}<filter id="f"/>{PATH}filter="url(#f)"/></svg>',
+    "text": f"{SIZE}<text>a</text></svg>",
+    "contours": f'{SIZE}<path d="M1 1h9v9zM3 3v4h4z"/></svg>',
+    "caps": f'{SIZE}<path d="M1 1h9v9" fill="none" stroke="red"/></svg>',
+}
+QUICK = "iterations: 4, device: cpu"
+FILES = {
+    **{f"{name}.svg": (HEAD + text).encode() for name, text in SVGS.items()},
+    "drawing.svg": own_svg("fill"),
+    "binary.svg": bytes(range(256)),
+    "broken.png": b"no image",
+    "good.yaml": f"jobs: [{{images: photo.png, curves: 4, {QUICK}}}]".encode(),
+    "foreign.yaml": f"jobs: [{{images: foreign.png, curves: 4, {QUICK}}}]".encode(),
+    "wrong.yaml": b"jobs: [{images: photo.png, curvs: 4}]",
+    "list.yaml": b"jobs: [{images: photo.png, curves: [5, 9]}]",
+    "text.yaml": b"jobs:\n  - images: photo.png\n    curves: 5,9\n",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("inputs")
+    pixels = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+    for name in ("photo.png", "foreign.png"):
+        Image.fromarray(pixels).save(path / name)
+    for name, data in FILES.items():
+        (path / name).write_bytes(data)
+    (path / "folder.svg").mkdir()
+    (path / "loop.svg").symlink_to("loop.svg")
+    return path
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() if path.is_file() else b"" for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("code", "line", "words"), [*((2, *row) for row in USAGE), *((3, *row) for row in INPUT)]
+)
+def test_refusals(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    code: int,
+    line: str,
+    words: str,
+) -> None:
+    monkeypatch.chdir(folder)
+    before, arguments = contents(folder), shlex.split(line)
+    assert run(*arguments) == code
+    shown = capsys.readouterr()
+    said = one_line(shown.err)
+    assert said.startswith("warpsplat: ") and words in said
+    assert shown.out == ""
+    if arguments[0] not in WITHOUT_JSON and " -o -" not in line and "data-uri" not in line:
+        assert run(*arguments, "--json") == code
+        shown = capsys.readouterr()
+        assert one_line(shown.err) == said
+        assert json.loads(shown.out) == {"error": said.removeprefix("warpsplat: "), "exit_code": code}
+    assert contents(folder) == before
+
+
+def test_every_command_is_refused_something() -> None:
+    assert {*COMMANDS} <= {line.split()[0] for line, _ in USAGE}
+
+
+@pytest.mark.parametrize("option", ["--curves", "--seed", "--quality", "--background", "--levels", "--size"])
+def test_a_refused_value_is_shown_by_its_beginning(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("vectorize", "a.png", option, 5000 * "9") == 2
+    said = one_line(capsys.readouterr().err)
+    assert 70 * "9" in said and 90 * "9" not in said
