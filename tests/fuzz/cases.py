@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from PIL import Image
-from warpsplat.run.result import job_key
 
 from tests.fuzz import checkpoints, corpus
 from tests.fuzz import vocabulary as words
@@ -20,6 +19,7 @@ from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, PATIENCE, Outcome
 from warpsplat.batch.manifest import Entry
 from warpsplat.errors import ExitCode
 from warpsplat.fit.settings import make_settings
+from warpsplat.run.result import job_key
 
 Mutation = Callable[[random.Random, bytes, bytes], bytes]
 """(generator, input, another input) -> changed input."""
