@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from tests.reference.curves import spline_at
-from tests.scenes import canvas, disc, mixed_scene, random_scene
-from warpsplat.scene import Basis, Kind, Scene
-from warpsplat.scene.geometry import areas, bounds, flatten
+from tests.scenes import canvas, disc, mixed_scene, random_scene, styled_scene
+from warpsplat.scene import Basis, Cap, Join, Kind, Scene
+from warpsplat.scene.geometry import areas, bounds, enlarged, flatten
 from warpsplat.scene.geometry import beziers as beziers_of
 
 
@@ -59,3 +59,13 @@ def test_shapes_of_all_lengths_are_measured_in_their_own_rows() -> None:
         assert areas(scene)[i] > 0
         np.testing.assert_allclose(areas(scene)[i], areas(one)[0], rtol=1e-5)
         np.testing.assert_allclose(bounds(scene)[i], bounds(one)[0], rtol=1e-5)
+
+
+def test_an_enlarged_scene_looks_the_same() -> None:
+    """Dashes grow with their strokes, and pixel art stays crisp."""
+    scene = styled_scene(Cap.BUTT, Join.MITER, 0)
+    scene = replace(scene, canvas=replace(scene.canvas, crisp=True))
+    large = enlarged(scene, 3, 3 * scene.canvas.width, 3 * scene.canvas.height)
+    assert large.canvas.crisp
+    np.testing.assert_allclose(large.dashes[0], 3 * np.array(scene.dashes[0]))
+    np.testing.assert_allclose(areas(large), 9 * areas(scene), rtol=1e-4)

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpsplat.portable.linear import product
 from warpsplat.scene.attributes import Basis, Kind
-from warpsplat.scene.scene import Canvas, FloatArray, Scene
+from warpsplat.scene.scene import FloatArray, Scene
 
 PIECES = 8
 """Straight pieces of a Bézier from which areas and boxes are computed."""
@@ -84,8 +84,9 @@ def enlarged(scene: Scene, factor: int, width: int, height: int) -> Scene:
     """Return a scene ``factor`` times as large, on a canvas of ``width`` x ``height`` units."""
     return replace(
         scene,
-        canvas=Canvas(width, height, scene.canvas.background),
+        canvas=replace(scene.canvas, width=width, height=height),
         points=scene.points * factor,
         widths=scene.widths * factor,
         frames=scene.frames * factor,
+        dashes=tuple(tuple(factor * length for length in pattern) for pattern in scene.dashes),
     )

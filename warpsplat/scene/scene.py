@@ -67,6 +67,8 @@ class Scene:
     last cubic ends at point 0, a spline has a quadratic for each point. Those of an open contour are a chain:
     cubics need one point more, a spline has two points more than quadratics.
 
+    Below, "shape (shape, 3)" is an array with a row for each shape and three columns.
+
     Contours and traits may be left out: then each shape has one contour, closed in fills and open in strokes.
     """
 
@@ -92,13 +94,13 @@ class Scene:
     rule: IntArray = None  # type: ignore[assignment]
     """``Rule`` of each shape, shape (shape,); used for fills only."""
     cap: IntArray = None  # type: ignore[assignment]
-    """``Cap`` of each shape, shape (shape,); used for strokes only, as the next three."""
+    """``Cap`` of each shape, shape (shape,); used for strokes only."""
     join: IntArray = None  # type: ignore[assignment]
-    """``Join`` of each shape, shape (shape,)."""
+    """``Join`` of each shape, shape (shape,); used for strokes only."""
     miter_limits: FloatArray = None  # type: ignore[assignment]
-    """Longest miter over the width, shape (shape,); a join beyond is a bevel."""
+    """Longest miter over the width, shape (shape,); a join beyond is a bevel; used for strokes only."""
     dash: IntArray = None  # type: ignore[assignment]
-    """Row of ``dashes`` of each shape, or NO_DASHES, shape (shape,)."""
+    """Row of ``dashes`` of each shape, or NO_DASHES, shape (shape,); used for strokes only."""
     twin: IntArray = None  # type: ignore[assignment]
     """1 for a shape with the points of the one before: a path filled and stroked; shape (shape,)."""
     layer: IntArray = None  # type: ignore[assignment]
