@@ -48,7 +48,6 @@ _HOMES = {
     "suggest": "warpsplat.run.suggest",
     "refine": "warpsplat.run.refine",
     "render": "warpsplat.run.render",
-    "report": "warpsplat.pages.report",
     **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.run.prepare"),
     **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.run.svg"),
     **dict.fromkeys(
@@ -57,7 +56,6 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.progress"),
-    "Recorder": "warpsplat.motion.recorder",
     "to_pillow": "warpsplat.run.render",
     "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",
