@@ -59,13 +59,13 @@ def progress_bar(
     """Yield a callback that shows progress: a bar if stderr is a terminal, else lines with ``-vv``."""
     if not sys.stderr.isatty() or quiet:
 
-        def tell(progress: Progress) -> None:
+        def echo_step(progress: Progress) -> None:
             if verbose > 1:
                 quality = f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
                 step = f"step {progress.step}/{progress.steps}"
                 echo(f"{source}: {step}, {quality}, {progress.seconds:.1f} s", err=True)
 
-        yield tell
+        yield echo_step
         return
     bar: Any
     state = Bar()

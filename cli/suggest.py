@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 suggest_option = click.option(
     "--suggest",
     is_flag=True,
-    help="Say how many shapes the image is worth, and why, in place of making a file.",
+    help="Suggest how many shapes the image is worth, and why, instead of making a file.",
 )
 
 
@@ -44,7 +44,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     check_suggesting(settings)
     made = suggest_file(request, settings, read_input(image))
     if made is None:
-        raise click.Abort  # which says "interrupted"
+        raise click.Abort  # prints "interrupted"
     command = _command(request, settings, made)
     if request.as_json:
         echo(json.dumps({"image": str(image), "command": command, **made.as_dict()}))

@@ -54,7 +54,7 @@ def command(
     checkpoint_every: str,
     **given: Any,
 ) -> None:
-    """Turn IMAGE (- is the standard input) into an SVG and say how good the file is.
+    """Turn IMAGE (- is the standard input) into an SVG and measure the file.
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
     against the image, number of paths, size. They go to stderr where the SVG

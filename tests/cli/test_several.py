@@ -63,7 +63,7 @@ def test_names(
 
 
 REFUSED = [
-    (["--curves", "5,5"], "5 is there twice"),
+    (["--curves", "5,5"], "5 is given twice"),
     (["--curves", "0,5"], "curves must be a whole number from 1"),
     (["--curves", "5,x"], "not a whole number, nor several"),
     (["--curves", "5,9", "-o", "-"], "several files: give -o 'NAME-{curves}.svg'"),

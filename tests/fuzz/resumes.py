@@ -36,10 +36,10 @@ STEPS = 156
 
 DRIVER = """
 import os, sys
-from warpsplat.fit import stages
+from warpsplat.fit import checkpoint
 from warpsplat.fit.step import Step
 number, step, done = {number}, {step}, []
-stages.SPARE = 0.0
+checkpoint.SPARE = 0.0
 def struck(owner, name):
     function = getattr(owner, name)
     def strike(*arguments, **options):
@@ -51,7 +51,7 @@ def struck(owner, name):
             os.kill(os.getpid(), number)
         return made
     setattr(owner, name, strike)
-struck(*((stages.Stages, "save") if number == 9 else (Step, "advance")))
+struck(*((checkpoint.Checkpoint, "save") if number == 9 else (Step, "advance")))
 from warpsplat.cli.main import main
 main({arguments!r})
 """

@@ -43,7 +43,7 @@ def best_within(
 ) -> Fit:
     """Return the best drawing within ``most`` bytes, or the smallest one if none fits.
 
-    Regions go, or nodes; or, from the fewest regions that are still too large, both.
+    It removes regions, or nodes, or nodes of the drawing with the fewest regions that is still too large.
 
     Args:
         first: a drawing of all regions, which is too large.

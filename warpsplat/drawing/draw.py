@@ -26,7 +26,7 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
 LEAST_SIDE = 96
-"""Least side of an image before it was enlarged [px]: what is smaller says little of outlines."""
+"""Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
 
 
 def draw_regions(problem: Problem, run: Run) -> Fit:

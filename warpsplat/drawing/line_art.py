@@ -45,7 +45,7 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     """Trace line art as strokes, and refine them against its ink.
 
     What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: its filled areas, if the
-    settings say mixed, and strokes ordered to minimise pen-up travel.
+    settings are mixed, and strokes ordered to minimise pen-up travel.
 
     Raises:
         ImageError: there is no ink.
@@ -100,7 +100,7 @@ def _in_order(lines: Scene, refined: Scene) -> Scene:
 
 def line_settings(settings: Settings, count: int) -> Settings:
     """Return the settings of the refinement of ``count`` strokes: of their places and widths alone."""
-    still = dict.fromkeys(settings.rates, 0.0)
+    fixed = dict.fromkeys(settings.rates, 0.0)
     return replace(
         settings,
         curves=min(count, 100_000),
@@ -108,7 +108,7 @@ def line_settings(settings: Settings, count: int) -> Settings:
         coarse=0.0,
         fine_pixels=min(settings.fine_pixels, FINE_PIXELS),
         density=Density(interval=0),
-        rates={**still, "points": POINT_RATE, "widths": WIDTH_RATE},
+        rates={**fixed, "points": POINT_RATE, "widths": WIDTH_RATE},
         mixed=False,
         renderer="exact",
         texture=0.0,

@@ -28,9 +28,9 @@ def handles_through(first: Floats, second: Floats) -> Floats:
     samples = np.concatenate([points_at(first, t), points_at(second, t)], axis=-2)
     start, end = first[..., :1, :], second[..., 3:, :]
     ahead, back = _direction(first), _direction(second[..., ::-1, :])
-    way = np.linalg.norm(np.diff(np.concatenate([start, samples, end], axis=-2), axis=-2), axis=-1)
-    way = way.cumsum(axis=-1)
-    u = way[..., :-1] / np.maximum(way[..., -1:], LEAST)
+    travelled = np.linalg.norm(np.diff(np.concatenate([start, samples, end], axis=-2), axis=-2), axis=-1)
+    travelled = travelled.cumsum(axis=-1)
+    u = travelled[..., :-1] / np.maximum(travelled[..., -1:], LEAST)
     reach = np.linalg.norm(end - start, axis=-1) / 3
     for _ in range(ROUNDS):
         along, against = 3 * (1 - u) ** 2 * u, 3 * (1 - u) * u**2
@@ -52,8 +52,8 @@ def handles_through(first: Floats, second: Floats) -> Floats:
 
 def _direction(cubic: Floats) -> Floats:
     """Return unit vectors in which cubics begin; 0 for cubics without extent. Shape (..., 1, 2)."""
-    ways = cubic[..., 1:, :] - cubic[..., :1, :]
-    lengths = np.linalg.norm(ways, axis=-1)[..., None]
+    offsets = cubic[..., 1:, :] - cubic[..., :1, :]
+    lengths = np.linalg.norm(offsets, axis=-1)[..., None]
     first = (lengths > LEAST).argmax(axis=-2)[..., None]
-    way, length = (np.take_along_axis(x, first, axis=-2) for x in (ways, lengths))
-    return np.where(length > LEAST, way / np.maximum(length, LEAST), 0.0)
+    offset, length = (np.take_along_axis(x, first, axis=-2) for x in (offsets, lengths))
+    return np.where(length > LEAST, offset / np.maximum(length, LEAST), 0.0)

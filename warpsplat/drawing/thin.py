@@ -17,7 +17,7 @@ THINNEST = 4
 """Most rows or columns of an image in which tracing may miss lines too."""
 
 BEYOND = 4
-"""How far a thin image is continued [px]: regions and lines are told apart within less."""
+"""How far a thin image is continued [px]: regions and lines are distinguished within less."""
 
 SEEN = 30.0
 """PSNR from which on a thin image counts as traced [dB]; below, regions were missed."""

@@ -1,4 +1,4 @@
-"""Finish a traced drawing: fit it, remove nodes that nobody would miss, and round it to a cheap grid."""
+"""Finish a traced drawing: fit it, remove needless nodes, and round it to a cheap grid."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ class Judge:
         self._viewport = Viewport(target.shape[1], target.shape[0])
         self._target = to_tiles(target)
         self.capacity: Capacity | None = None
-        """Of a renderer into which the last drawing fits, and likely the next."""
+        """Capacity of a renderer that the last drawing fits into, and likely the next."""
 
     def errors(self, drawing: Drawing) -> Floats:
         """Return the share of each cell in the mean squared error, as ``by_cell``."""

@@ -87,7 +87,7 @@ def remove_surplus(step: Step, count: int) -> Step:
 
 
 def _kept(step: Step, scene: Scene, costs: FloatArray, wanted: int) -> IndexArray:
-    """Return the shapes that stay where ``wanted`` are to be there; all of earlier levels do."""
+    """Return the shapes to keep so that there will be ``wanted``, among them all of earlier levels."""
     settings, base = step.settings, step.state.base
     pruned = prune_mask(scene, settings.density, step.state.step / settings.iterations)
     pruned[:base] = False

@@ -32,15 +32,15 @@ class Candidates:
     centres: FloatArray
     """Shape (candidate, 2)."""
     radii: FloatArray
-    """Of a circle, for a fill."""
+    """Radius of a circle, for a fill."""
     masses: FloatArray
     """Error that a shape would cover."""
     angles: FloatArray
-    """Of a stroke [rad]."""
+    """Direction of a stroke [rad]."""
     lengths: FloatArray
-    """Of a stroke; 0 for a fill."""
+    """Length of a stroke; 0 for a fill."""
     widths: FloatArray
-    """Of a stroke."""
+    """Width of a stroke."""
 
 
 def new_shapes(

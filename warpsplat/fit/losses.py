@@ -73,7 +73,7 @@ class LossTarget:
 
 @dataclass(frozen=True)
 class LossInputs:
-    """What a loss may read."""
+    """Inputs of the losses."""
 
     renderer: Renderer
     target: LossTarget

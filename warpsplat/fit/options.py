@@ -176,7 +176,7 @@ MAX_DIGITS = 15
 
 
 def _words(value: object) -> str:
-    """Return a text itself; of anything else as much as can be right."""
+    """Return a text as it is; anything else in short."""
     return value if isinstance(value, str) else shown(value)
 
 

@@ -35,7 +35,7 @@ REDUCED_SIGMA = 128.0
 """Maximum standard deviation of its blur [px], whose cost grows with it."""
 
 COLOR_LEVELS = 32
-"""Levels of a channel by which flat colours are told apart."""
+"""Levels of a channel by which flat colours are distinguished."""
 
 FLAT_SHARE = 0.98
 """Minimum share of a flat image's pixels that have one of its few colours; the others antialias outlines."""

@@ -1,7 +1,7 @@
 """Recovery from numbers that are not finite: between steps, their shapes are reset or replaced.
 
-No step is known to turn finite numbers into such ones. Should it happen, by an overflow or a fault of the
-device, one such colour would spoil the gradients of all shapes around it, and the file.
+No step is known to produce them from finite numbers. If one did, by an overflow or a fault of the device, one
+such colour would spoil the gradients of all shapes around it, and the file.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ PRESETS: dict[Quality, dict[str, Any]] = {
     "balanced": {},
     "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
 }
-"""What each quality changes in the defaults."""
+"""Changes of the defaults by quality."""
 
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
@@ -134,7 +134,7 @@ class Density:
 
 @dataclass(frozen=True)
 class Settings:
-    """All that decides the result, besides the image. Fields without help follow from other options."""
+    """Everything but the image that decides the result. Fields without help follow from other options."""
 
     curves: int = option(
         512,
@@ -303,7 +303,7 @@ class Settings:
 
     @property
     def counting(self) -> list[str]:
-        """Names of the options given that decide the number of shapes, besides ``curves``."""
+        """Names of the options given, other than ``curves``, that decide the number of shapes."""
         given = (("levels", self.levels), ("target-psnr", self.target_psnr), ("max-bytes", self.max_bytes))
         return [name for name, value in (*given, ("time-budget", self.time_budget)) if value]
 
@@ -346,7 +346,7 @@ subject follow from ``Option.subjects``, those with a renderer from ``FitRendere
 
 
 def solid_color(background: str) -> FloatArray | None:
-    """The colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if it names none."""
+    """Return the colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if none."""
     if not re.fullmatch(COLOR, background):
         return None
     return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
@@ -356,7 +356,7 @@ LEVEL_FACTOR = 4
 """Shapes of a level over those of the one before, where only ``layered`` is asked for."""
 
 LEAST_LEVEL = 8
-"""Shapes of the first of these levels, at the least."""
+"""Least number of shapes of the first of these levels."""
 
 
 def levels_of(curves: int) -> tuple[int, ...]:

@@ -18,10 +18,10 @@ from warpsplat.errors import OutputError, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.files.packed import is_packed, pack, unpack
+from warpsplat.fit.checkpoint import INTERVAL, Checkpoint, Content
 from warpsplat.fit.options import parse_duration
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import INTERVAL, Content, Stages
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
@@ -71,8 +71,8 @@ class CheckpointFile:
                 else f"{self.path}: exists and is not a checkpoint; --overwrite replaces it"
             )
 
-    def stages(self, run: Mapping[str, Any], backend: Backend) -> Stages:
-        """Return the stages that a run saves here, and is resumed from.
+    def open(self, run: Mapping[str, Any], backend: Backend) -> Checkpoint:
+        """Return the state that a run saves here, and is resumed from.
 
         Args:
             run: everything that decides its result (``identity``).
@@ -94,10 +94,10 @@ class CheckpointFile:
             except OutputError as error:  # hours of work are not to end for it
                 log.warning("%s: continues without it", error)
 
-        stages = Stages(str(self.path), write, self.every, saved)
-        if saved and stages.is_empty:
+        checkpoint = Checkpoint(str(self.path), write, self.every, saved)
+        if saved and checkpoint.is_empty:
             log.warning("%s: nothing to resume from: starts from the beginning", self.path)
-        return stages
+        return checkpoint
 
     def _read(self, run: Mapping[str, Any], device: str) -> Content:
         header, arrays = unpack(self.path)

@@ -24,7 +24,7 @@ def check_format(path: Path) -> None:
     """Check that what makes a file of this name is installed.
 
     Raises:
-        UsageError: it is not; the message says how it is.
+        UsageError: it is not; the message names the package.
     """
     if path.suffix.lower() == ".pdf" and importlib.util.find_spec(PDF_PACKAGE) is None:
         raise UsageError(

@@ -43,7 +43,7 @@ SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 """Slots of a fit per tile, per root of tiles times shapes, and per shape."""
 
 SHAPE = 24 << 10
-"""Bytes per shape: its samples, surgery, its text."""
+"""Bytes per shape: its samples, densification, its text."""
 
 TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
@@ -71,7 +71,7 @@ LEAST_SIDE = 32
 
 
 @dataclass(frozen=True)
-class Need:
+class MemoryNeed:
     """Memory that a run at one size needs [bytes]."""
 
     reading: int
@@ -85,7 +85,9 @@ class Need:
         return PROGRAM + max(self.reading, self.working, self.scoring)
 
 
-def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None) -> Need:
+def need(
+    facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None
+) -> MemoryNeed:
     """Estimate the memory of a run from above: within a quarter for photographs, more roughly for drawings.
 
     Args:
@@ -108,7 +110,7 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
         whole = (mask.decoded + mask.kept) * mask.width * mask.height
         reading = max(reading, image + whole + (MASK_READ + MASK) * masked + STRIPS)
         working, scoring = working + MASK * masked, scoring + MASK * masked
-    return Need(*(round(x) for x in (reading, working, scoring)))
+    return MemoryNeed(*(round(x) for x in (reading, working, scoring)))
 
 
 def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:

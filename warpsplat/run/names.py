@@ -30,7 +30,7 @@ Place = Callable[[str], UsageError]
 
 
 class Found(NamedTuple):
-    """An image, and the folder under which it was looked for."""
+    """An image, and the folder under which it was found."""
 
     path: Path
     root: Path
@@ -45,9 +45,9 @@ class Wanted:
     """A folder, a name or a pattern of names (``is_pattern``); None: beside the image."""
     settings: Settings
     fields: Mapping[str, Any]
-    """Fields that names may contain, besides the image's."""
+    """Fields that names may contain, in addition to the image's."""
     place: Place
-    """Makes errors that say where the name was given."""
+    """Makes errors that name the place where the name was given."""
 
 
 def is_pattern(output: str) -> bool:

@@ -14,13 +14,13 @@ from PIL import Image
 
 from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource, held, source_name
+from warpsplat.fit.checkpoint import INTERVAL
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
-from warpsplat.fit.stages import INTERVAL
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
 from warpsplat.run.arguments import backend_on, check_keywords, takes
@@ -111,8 +111,8 @@ def refine(
     problem = Problem(load_target(pixels, image_name, settings.background), settings)
     kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     with backend_on(device, threads) as backend:
-        stages = kept.stages(identity("refine", settings, problem, text), backend) if kept else None
-        run = Run(backend, callback, stop, stages=stages)
+        saved = kept.open(identity("refine", settings, problem, text), backend) if kept else None
+        run = Run(backend, callback, stop, checkpoint=saved)
         result = refine_svg(text, problem, run, name, keep=keep)
     if output is not None:
         write_named(Path(output), result.svg)
@@ -126,7 +126,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
 
     A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
     """
-    begun, history, stages = time.monotonic(), list[Progress](), run.stages
+    begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
     run = timed(recorded(run, history), problem.settings, problem.target)
     given, view = text, None
     if OUR_VIEW.match(text):
@@ -138,8 +138,8 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     before = score_svg(text, target, eyes=False)
     settings = _settings(problem.settings, len(scene))
     made = fit(Problem(target, settings), run, Start(scene=scene))
-    if stages and made.interrupted:
-        stages.save()
+    if checkpoint and made.interrupted:
+        checkpoint.save()
     release_memory()
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:

@@ -55,7 +55,7 @@ class Result:
     levels: tuple[LevelScore, ...] = ()
     """Scores of each level of a layered file."""
     subject: Subject = "photo"
-    """What the image was taken for."""
+    """The subject that the image was taken for."""
     why: str = ""
     """The reason for the subject; empty if it was given."""
     history: tuple[Progress, ...] = field(default=(), repr=False)

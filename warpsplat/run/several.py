@@ -1,4 +1,4 @@
-"""One image with several numbers of shapes: work that does not depend on the number is done once."""
+"""Vectorize an image with several numbers of shapes, and do work that does not depend on the number once."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def check_several(settings: Settings, numbers: Sequence[int]) -> None:
     for number in numbers:
         replace(settings, curves=number, levels=())
         if numbers.count(number) > 1:
-            raise UsageError(f"curves: {number} is there twice")
+            raise UsageError(f"curves: {number} is given twice")
     if settings.counting:
         raise UsageError(f"several numbers of shapes and {settings.counting[0]} do not go together")
 
@@ -55,7 +55,7 @@ OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
 def can_share(image: FloatArray) -> bool:
     """Return whether fits to ``image`` lose nothing by continuing from fits with fewer shapes.
 
-    Those to drawings lose half a decibel and more, wherever they begin (docs/experiments.md).
+    Fits to drawings lose half a decibel or more, wherever they begin (docs/experiments.md).
     """
     return guess_subject(image).subject == "photo"
 

@@ -99,9 +99,7 @@ def check_suggesting(settings: Settings) -> None:
         UsageError: the settings decide the number of shapes.
     """
     if others := settings.counting or ([] if settings.simplify else ["curves"]):
-        raise UsageError(
-            f"suggest says how many shapes are worth it, and {others[0]} as well: give one of them"
-        )
+        raise UsageError(f"suggest and {others[0]} both decide the number of shapes: give one of them")
 
 
 @takes(Options)
@@ -210,7 +208,7 @@ def reason(worth: Worth, chosen: int, more: str) -> str:
     if chosen == worth.fewest:
         return f"{first}. From there on {more} buy less than {SEEN} dB, which can hardly be seen."
     seen = f"{more} buy {SEEN} dB at least, which can be seen"
-    return f"{first}. Up to there {seen}, beyond it less. This is the knee."
+    return f"{first}. Up to there {seen}, beyond it less."
 
 
 def rounded(number: float) -> int:

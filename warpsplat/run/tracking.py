@@ -50,4 +50,4 @@ def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
     if settings.time_budget is None:
         return run
     tail = TAIL_SECONDS + TAIL_PER_PIXEL * pixels_of(target)
-    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, stages=None)
+    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, checkpoint=None)

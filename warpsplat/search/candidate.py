@@ -105,7 +105,7 @@ def smaller(scene: Scene, removal_costs: FloatArray, sizes: npt.NDArray[np.int64
     """Remove shapes, and for what is less than a shape points of splines.
 
     Args:
-        scene: what is to become smaller.
+        scene: the shapes.
         removal_costs: growth of the error without each shape, shape (shape,).
         sizes: of the shapes [bytes], shape (shape,).
         excess: how much has to go [bytes].

@@ -28,7 +28,7 @@ SEEN = 1e-3
 
 
 def for_few(settings: Settings) -> Settings:
-    """Return the settings of a fit whose file has room for ``settings.curves`` shapes, if these are few."""
+    """Return the settings of a fit whose file can hold ``settings.curves`` shapes, if these are few."""
     if settings.curves > FEW or settings.renderer != "exact":
         return settings
     settings = replace(

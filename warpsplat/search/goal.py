@@ -21,7 +21,7 @@ from warpsplat.search.few_shapes import FEW, for_few
 from warpsplat.svg.write import GRIDS
 
 MOST_CURVES = 20_000
-"""Most shapes, unless ``--curves`` says so."""
+"""Most shapes without ``--curves``."""
 
 PROBE_CURVES = 256
 """Shapes of the first probe run."""

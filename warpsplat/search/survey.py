@@ -53,8 +53,8 @@ SLOPE = 0.79
 """Gain by a doubling of shapes in such runs, over the gain from the probe to the short fit."""
 
 STEEPEST = 2.5
-"""Largest gain by a doubling [dB]: pictures of flat areas, whose few shapes find their places late, look
-steeper to the probe.
+"""Largest gain by a doubling [dB]: the probe overestimates it for pictures of flat areas, whose few
+shapes find their places late.
 """
 
 BEND = 0.075

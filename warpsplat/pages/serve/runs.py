@@ -29,7 +29,7 @@ FIGURES = (
 
 
 @dataclass(eq=False)
-class Run:
+class ServedRun:
     """One run. ``Store`` changes it under its lock."""
 
     id: str

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from warpsplat.pages.serve.pictures import Picture
-from warpsplat.pages.serve.runs import Run
+from warpsplat.pages.serve.runs import ServedRun
 
 
 @dataclass(eq=False)
@@ -22,13 +22,13 @@ class Session:
     begun: int = 0
     """Runs so far."""
     pictures: dict[str, Picture] = field(default_factory=dict)
-    runs: dict[str, Run] = field(default_factory=dict)
+    runs: dict[str, ServedRun] = field(default_factory=dict)
 
-    def runs_of(self, image: str) -> list[Run]:
+    def runs_of(self, image: str) -> list[ServedRun]:
         """Of one image."""
         return [run for run in self.runs.values() if run.image == image]
 
-    def as_dict(self, places: Mapping[Run, int]) -> dict[str, Any]:
+    def as_dict(self, places: Mapping[ServedRun, int]) -> dict[str, Any]:
         """For JSON. ``places``: of runs that wait, how many are before them."""
         return {
             "images": [{"id": name} | picture.as_dict() for name, picture in self.pictures.items()],

@@ -13,7 +13,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.pages.serve.limits import Limits, Refused
 from warpsplat.pages.serve.live import Live
 from warpsplat.pages.serve.pictures import Picture
-from warpsplat.pages.serve.runs import Run
+from warpsplat.pages.serve.runs import ServedRun
 from warpsplat.pages.serve.session import Session
 from warpsplat.run.result import Result
 
@@ -41,7 +41,7 @@ class Store:
         self.closed = False
         self._clock = clock
         self._sessions: dict[str, Session] = {}
-        self._queue: deque[Run] = deque()
+        self._queue: deque[ServedRun] = deque()
         self._coming = 0
         """Of uploads that are on their way [bytes]."""
         self._lock = threading.Condition(threading.RLock())
@@ -168,7 +168,7 @@ class Store:
                 pass
             live = Live(lambda: self.is_attended(name), self._changed)
             session.begun += 1
-            run = Run(
+            run = ServedRun(
                 secrets.token_urlsafe(8), session.begun, image, picture, values, settings, command, live=live
             )
             session.runs[run.id] = run
@@ -176,7 +176,7 @@ class Store:
             self._changed()
             return run.id
 
-    def run(self, name: str, run: str) -> Run:
+    def run(self, name: str, run: str) -> ServedRun:
         """A run.
 
         Raises:
@@ -209,7 +209,7 @@ class Store:
 
     # The worker
 
-    def next(self) -> Run | None:
+    def next(self) -> ServedRun | None:
         """The run whose turn it is, waited for; None once the store is closed."""
         with self._lock:
             self._lock.wait_for(lambda: self.closed or self._queue)
@@ -221,7 +221,7 @@ class Store:
             self._changed()
             return run
 
-    def finish(self, run: Run, outcome: Result | str) -> None:
+    def finish(self, run: ServedRun, outcome: Result | str) -> None:
         """Take what a run made, or why it failed; the oldest results go where there is no room for it."""
         with self._lock:
             if isinstance(outcome, str):
@@ -260,7 +260,7 @@ class Store:
             self.version += 1
             self._lock.notify_all()
 
-    def _all_runs(self) -> Iterator[Run]:
+    def _all_runs(self) -> Iterator[ServedRun]:
         for session in self._sessions.values():
             yield from session.runs.values()
 
@@ -290,7 +290,7 @@ class Store:
         del session.pictures[image]
         self._changed()
 
-    def _drop_oldest_run(self, but: Run | None = None) -> bool:
+    def _drop_oldest_run(self, but: ServedRun | None = None) -> bool:
         """Forget the oldest run that is over; whether there was one."""
         for session in self._sessions.values():
             for run in session.runs.values():
@@ -299,7 +299,7 @@ class Store:
                     return True
         return False
 
-    def _forget(self, session: Session, runs: list[Run]) -> None:
+    def _forget(self, session: Session, runs: list[ServedRun]) -> None:
         for run in runs:
             run.stopping.set()
             if run in self._queue:

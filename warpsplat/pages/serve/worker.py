@@ -14,7 +14,7 @@ import warpsplat
 from warpsplat.errors import explain
 from warpsplat.native import release_memory
 from warpsplat.pages.serve.live import Live
-from warpsplat.pages.serve.runs import Run
+from warpsplat.pages.serve.runs import ServedRun
 from warpsplat.pages.serve.store import Store
 from warpsplat.run.result import Result
 
@@ -44,7 +44,7 @@ class Worker(threading.Thread):
             del run, outcome
             release_memory()
 
-    def _made(self, run: Run) -> Result | str:
+    def _made(self, run: ServedRun) -> Result | str:
         """The result, or why there is none."""
         try:
             return warpsplat.vectorize(
