@@ -84,7 +84,7 @@ REFUSED = [
     ),
     (["--curves", "5,9", "photo.png"], "matrix: {curves: [5, 9]}"),
     (["--suggest", "--curves", "5"], "--suggest and --curves do not go together"),
-    (["--suggest", "--max-bytes", "5KB"], "max-bytes as well"),
+    (["--suggest", "--max-bytes", "5KB"], "suggest and max-bytes both"),
     (["--suggest", "-o", "a.svg"], "writes nothing"),
 ]
 
@@ -222,10 +222,8 @@ def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_suggestion_in_words(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from warpsplat.cli import run as runs
-
     made = suggestion(Worth(16, 1024, 256, 26.0, 1.0, 0.0, 64.0))
-    monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
+    monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
     lines = capsys.readouterr().out.splitlines()
@@ -290,7 +288,7 @@ def test_the_command_of_a_drawing_keeps_its_settings(image: Path, capsys: pytest
 def test_an_interrupted_suggestion_says_so(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpsplat.cli.run.suggest_file", lambda *a, **k: None)
+    monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: None)
     assert run("vectorize", image, "--suggest", "--json") == 130
     said = capsys.readouterr()
     assert json.loads(said.out) == {"error": "interrupted", "exit_code": 130}

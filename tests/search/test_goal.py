@@ -16,8 +16,7 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind, Scene
-from warpsplat.search.candidate import Candidate, Change, smaller
-from warpsplat.search.few_shapes import FEW, OPACITY, fit_background, for_few
+from warpsplat.search.candidate import FEW, OPACITY, Candidate, Change, fit_background, for_few, smaller
 from warpsplat.search.goal import AIM_FULL, curves_for, next_change
 from warpsplat.svg.write import path_sizes
 

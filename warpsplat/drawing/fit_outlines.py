@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.constraints import Constraints, Drawing, Projection
+from warpsplat.fit.densification import recover
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.recover import recover
 from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -37,6 +37,13 @@ COLOR_RATE = 0.004
 
 GAIN, PATIENCE = 0.005, 40
 """A refinement ends when the error has not fallen by this share in so many steps."""
+
+
+NEAR = 6 / 255
+"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
+
+OFTEN = 0.5
+"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
 
 
 @dataclass(frozen=True)
@@ -159,13 +166,6 @@ def _evaluate(step: Step) -> tuple[Scene, float]:
     """Return the scene and its mean squared error."""
     step.render()
     return step.state.scene(), step.measured_error()
-
-
-NEAR = 6 / 255
-"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
-
-OFTEN = 0.5
-"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
 
 
 def own_colors(scene: Scene, target: FloatArray) -> FloatArray:

@@ -24,6 +24,22 @@ MAX_ITERATIONS = 20_000
 """Most steps of a fit with a deadline: more gain nothing."""
 
 
+HEAD_BYTES = 150
+"""Bytes of a file without its shapes."""
+
+STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
+"""Bytes of a shape without its coordinates."""
+
+SEPARATOR = 1.6
+"""Bytes of a number without its digits before the point."""
+
+SPARE_CURVES = 1.3
+"""Trained shapes over those expected to fit: the excess is removed with the surplus."""
+
+SHRINKAGE = 0.92
+"""Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser."""
+
+
 class Budget:
     """A deadline (``time.monotonic``), and the time of a step in each phase."""
 
@@ -60,22 +76,6 @@ class Budget:
         # Time spent and time left add up to the whole fit; the steps made so far were the cheap, coarse ones.
         iterations = int((spent + max(left, 0.0)) / mean)
         return replace(settings, iterations=min(max(iterations, done, CHECK_INTERVAL), MAX_ITERATIONS))
-
-
-HEAD_BYTES = 150
-"""Bytes of a file without its shapes."""
-
-STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
-"""Bytes of a shape without its coordinates."""
-
-SEPARATOR = 1.6
-"""Bytes of a number without its digits before the point."""
-
-SPARE_CURVES = 1.3
-"""Trained shapes over those expected to fit: the excess is removed with the surplus."""
-
-SHRINKAGE = 0.92
-"""Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser."""
 
 
 def affordable_curves(settings: Settings, width: int, height: int) -> int:

@@ -10,13 +10,12 @@ import numpy as np
 
 from warpsplat.fit.budget import Budget, affordable
 from warpsplat.fit.checkpoint import Content, real, whole
-from warpsplat.fit.densification import densify, remove_surplus
+from warpsplat.fit.densification import densify, recover, remove_surplus
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.recover import recover
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.rounding import (
     choose_grid,

@@ -18,6 +18,22 @@ from typing import Any, Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 from warpsplat.errors import UsageError, shown
 
+DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
+
+SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
+
+UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
+
+BYTES = {
+    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
+    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
+}
+
+MAX_DIGITS = 15
+"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
+
+PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
@@ -164,17 +180,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {found[0]!r}?" if found else ""
 
 
-DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
-SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
-UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
-BYTES = {
-    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
-    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
-}
-MAX_DIGITS = 15
-"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
-
-
 def _words(value: object) -> str:
     """Return a text as it is; anything else in short."""
     return value if isinstance(value, str) else shown(value)
@@ -219,9 +224,6 @@ def parse_levels(value: object) -> tuple[int, ...]:
         return tuple(int(str(part)) for part in parts)
     except ValueError as error:
         raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {shown(value)}") from error
-
-
-PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
 def parse_palette(value: object) -> tuple[str, ...]:

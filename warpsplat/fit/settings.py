@@ -61,6 +61,16 @@ FITTED: tuple[Subject, ...] = ("auto", "photo")
 """Subjects of options that only fitted shapes have a use for."""
 
 
+LEVEL_FACTOR = 4
+"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
+
+LEAST_LEVEL = 8
+"""Least number of shapes of the first of these levels."""
+
+FILL_POINT_RATE = 6.0
+"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
+
+
 def default_rates() -> dict[str, float]:
     """Return the learning rates by attribute, in the units of the table (``ATTRIBUTES``)."""
     return {attribute.name: attribute.rate for attribute in ATTRIBUTES}
@@ -352,21 +362,10 @@ def solid_color(background: str) -> FloatArray | None:
     return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
 
 
-LEVEL_FACTOR = 4
-"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
-
-LEAST_LEVEL = 8
-"""Least number of shapes of the first of these levels."""
-
-
 def levels_of(curves: int) -> tuple[int, ...]:
     """Return up to three levels, the last with all the ``curves``."""
     levels = [curves // LEVEL_FACTOR**2, curves // LEVEL_FACTOR, curves]
     return tuple(count for count in levels if count >= LEAST_LEVEL or count == curves)
-
-
-FILL_POINT_RATE = 6.0
-"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
 
 def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Settings:

@@ -28,6 +28,13 @@ from warpsplat.scene import FloatArray
 log = logging.getLogger(__name__)
 
 
+DIGESTS = ("image", "mask", "svg")
+"""Parts of ``identity`` that are digests."""
+
+SHOWN = 40
+"""Characters of a value in a message."""
+
+
 @dataclass(frozen=True)
 class CheckpointFile:
     """The file in which a run saves its state, and what becomes of a file that is there."""
@@ -137,13 +144,6 @@ def open_checkpoint(
     made = CheckpointFile(Path(path), resume, overwrite, parse_duration(every))
     made.check(*(Path(other) for other in others if isinstance(other, (str, os.PathLike))))
     return made
-
-
-DIGESTS = ("image", "mask", "svg")
-"""Parts of ``identity`` that are digests."""
-
-SHOWN = 40
-"""Characters of a value in a message."""
 
 
 def identity(

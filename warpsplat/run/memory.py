@@ -193,6 +193,11 @@ def share_machine(processes: int) -> None:
     _Process.sharers = processes
 
 
+def limit_words(settings: Settings, limit: int) -> str:
+    """Return the limit of memory, for messages."""
+    return f"{'max-memory is' if settings.max_memory else 'memory for it is'} {in_words(limit)}"
+
+
 def factor_for(
     facts: ImageFacts, settings: Settings, name: str, least: int = 1, mask: ImageFacts | None = None
 ) -> int:
@@ -208,8 +213,8 @@ def factor_for(
     while limit is not None and (wanted := need(facts, settings, factor, mask).most) > limit:
         factor *= 2
         if min(facts.width, facts.height) < LEAST_SIDE * factor:
-            given = "max-memory is" if settings.max_memory else "memory for it is"
-            raise ResourceError(f"{name}: at least {in_words(wanted)} are needed, {given} {in_words(limit)}")
+            needed = f"at least {in_words(wanted)} are needed"
+            raise ResourceError(f"{name}: {needed}, {limit_words(settings, limit)}")
     return factor
 
 
@@ -231,6 +236,6 @@ def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
         return
     wanted = need_refined(facts, settings)
     if wanted > limit:
-        given = "max-memory is" if settings.max_memory else "memory for it is"
         size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
-        raise ResourceError(f"{name}: {size}, {given} {in_words(limit)}; refine against a smaller image")
+        hint = "refine against a smaller image"
+        raise ResourceError(f"{name}: {size}, {limit_words(settings, limit)}; {hint}")

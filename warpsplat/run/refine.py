@@ -74,25 +74,13 @@ def refine(
 ) -> Result:
     """Improve the paths of any SVG against an image by gradient descent; none is added.
 
-    Args:
+    Arguments that differ from those of ``vectorize``:
         svg: a string with a ``<`` in it is the SVG's text, any other its path; or bytes, or an open file.
-        image: as for ``vectorize``.
         iterations: steps.
-        keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
-        name: of the SVG, in messages.
         max_memory: bytes, or ``"4GB"``; default: that of the machine. An image that takes more is refused, as
             all of its pixels decide whether a result is better.
-        settings: instead of all options.
-        output: as for ``vectorize``.
-        device: as for ``vectorize``.
-        threads: as for ``vectorize``.
-        callback: as for ``vectorize``.
-        stop: as for ``vectorize``.
-        checkpoint: as for ``vectorize``.
-        resume: as for ``vectorize``.
-        checkpoint_every: as for ``vectorize``.
-        overwrite: as for ``vectorize``.
-        options: see ``RefineOptions``.
+        keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
+        name: of the SVG, in messages.
 
     Returns:
         the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged if nothing better

@@ -120,16 +120,7 @@ def suggest(
     A short fit on a reduced image, whose shapes grow from few to many, estimates the result of each number;
     it takes a fraction of the time of a run.
 
-    Args:
-        image: as for ``vectorize``.
-        settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
-        importance: as for ``vectorize``, as is all that follows.
-        device: as for ``vectorize``.
-        threads: as for ``vectorize``.
-        callback: as for ``vectorize``.
-        stop: as for ``vectorize``.
-        name: as for ``vectorize``.
-        options: as for ``vectorize``.
+    Arguments are those of ``vectorize``, without ``curves`` and goals.
 
     Returns:
         the number, the reason, and the expected results of it and others at the default effort; None if the

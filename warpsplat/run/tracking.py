@@ -18,6 +18,12 @@ RELEASE_INTERVAL = 10
 """Progress reports from one release of free memory to the next: a release takes as long as a step does."""
 
 
+TAIL_SECONDS = 0.3
+
+TAIL_PER_PIXEL = 3e-7
+"""Part of a time budget that the last step, exporting and scoring take [s]."""
+
+
 def recorded(run: Run, history: list[Progress]) -> Run:
     """Return a run whose progress is recorded and never falls, and which releases memory now and then."""
 
@@ -38,11 +44,6 @@ def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
         snapshot = Snapshot(lambda: scene, lambda: render(scene, backend=run.backend))
         last = replace(history[-1], work=1.0, fine=True, psnr=made.estimated_psnr, shapes=len(scene))
         run.report(replace(last, seconds=time.monotonic() - run.started, snapshot=snapshot))
-
-
-TAIL_SECONDS = 0.3
-TAIL_PER_PIXEL = 3e-7
-"""Part of a time budget that the last step, exporting and scoring take [s]."""
 
 
 def timed(run: Run, settings: Settings, target: FloatArray) -> Run:

@@ -22,14 +22,30 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas
-from warpsplat.search.few_shapes import FEW, fit_background
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.write import path_sizes
 
 LAST_STEPS = 0.2
 """Share of a fit's steps that is repeated after shapes were removed or added."""
+
+
+FEW = 32
+"""Most shapes of such a file."""
+
+COARSE_PIXELS, FINE_PIXELS = 6_000, 24_000
+"""Image sizes that few shapes are fitted to [pixels]."""
+
+POINTS, MEAN_POINTS = 8, 6.0
+"""Points of a new fill, and their mean in the end: another shape is worth more than a finer outline."""
+
+OPACITY = 0.7
+"""Opacity of all shapes, written once for all: where they overlap there are more colours than shapes."""
+
+SEEN = 1e-3
+"""Least share of the canvas through which the background shows for its colour to be fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,3 +139,45 @@ def smaller(scene: Scene, removal_costs: FloatArray, sizes: npt.NDArray[np.int64
     scene, removal_costs = scene.take(kept), removal_costs[kept]
     worth = np.maximum(removal_costs, 0) / np.maximum(areas(scene), 1.0)
     return simplify(scene, np.asarray(worth, np.float32), math.ceil(left / max(a_point, 1.0)))[0]
+
+
+def for_few(settings: Settings) -> Settings:
+    """Return the settings of a fit whose file can hold ``settings.curves`` shapes, if these are few."""
+    if settings.curves > FEW or settings.renderer != "exact":
+        return settings
+    settings = replace(
+        settings,
+        coarse_pixels=min(settings.coarse_pixels, COARSE_PIXELS),
+        fine_pixels=min(settings.fine_pixels, FINE_PIXELS),
+        texture=0.0,
+    )
+    if settings.kind == Kind.STROKE or settings.basis != Basis.SPLINE or settings.opaque:
+        return settings
+    return replace(
+        settings,
+        spline_points=min(settings.spline_points, POINTS),
+        density=replace(settings.density, mean_points=min(settings.density.mean_points, MEAN_POINTS)),
+        opacity=OPACITY,
+        rates={**settings.rates, "opacities": 0.0},
+    )
+
+
+def fit_background(scene: Scene, image: FloatArray, backend: Backend) -> Scene:
+    """Return ``scene`` with the best background colour, by least squares where it shows.
+
+    Args:
+        scene: with a background.
+        image: sRGB in [0, 1], shape (height, width, 3).
+        backend: where to render.
+    """
+    black, white = (
+        render(replace(scene, canvas=replace(scene.canvas, background=color)), backend=backend)
+        for color in (np.zeros(3, np.float32), np.ones(3, np.float32))
+    )
+    seen = (white - black).astype(np.float64)
+    weight = (seen * seen).sum(axis=(0, 1))
+    if weight.min() < SEEN * image.shape[0] * image.shape[1]:
+        return scene
+    color = np.clip((seen * (image - black)).sum(axis=(0, 1)) / weight, 0, 1)
+    background = (np.round(color * 255) / 255).astype(np.float32)
+    return replace(scene, canvas=replace(scene.canvas, background=background))

@@ -16,8 +16,7 @@ from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import DB_PER_DOUBLING, finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary
-from warpsplat.search.candidate import LAST_STEPS, Candidate, Change, changed, measured
-from warpsplat.search.few_shapes import FEW, for_few
+from warpsplat.search.candidate import FEW, LAST_STEPS, Candidate, Change, changed, for_few, measured
 from warpsplat.svg.write import GRIDS
 
 MOST_CURVES = 20_000
