@@ -203,8 +203,8 @@ def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
 
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.search.survey.STEPS", 60)
-    monkeypatch.setattr("warpsplat.search.survey.INTERVAL", 10)
+    monkeypatch.setattr("warpsplat.search.survey.SHORT_STEPS", 60)
+    monkeypatch.setattr("warpsplat.search.survey.SHORT_INTERVAL", 10)
 
 
 @pytest.mark.usefixtures("quickly")

@@ -39,7 +39,7 @@ import os, sys
 from warpsplat.fit import checkpoint
 from warpsplat.fit.step import Step
 number, step, done = {number}, {step}, []
-checkpoint.SPARE = 0.0
+checkpoint.LEAST_SAVE_RATIO = 0.0
 def struck(owner, name):
     function = getattr(owner, name)
     def strike(*arguments, **options):

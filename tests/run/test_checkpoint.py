@@ -80,7 +80,7 @@ def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path, kind: str) -> None:
 def test_a_run_that_was_killed_goes_on_from_the_last_save(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(checkpoint, "SPARE", 0.0)
+    monkeypatch.setattr(checkpoint, "LEAST_SAVE_RATIO", 0.0)
     path = tmp_path / "run.checkpoint"
 
     def killed() -> bool:

@@ -30,7 +30,7 @@ HEAD_BYTES = 150
 STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
 """Bytes of a shape without its coordinates."""
 
-SEPARATOR = 1.6
+FRACTION_BYTES = 1.6
 """Bytes of a number without its digits before the point."""
 
 SPARE_CURVES = 1.3
@@ -64,10 +64,7 @@ class Budget:
     def fit(self, settings: Settings, done: int, slowness: float) -> Settings:
         """Return ``settings`` with as many steps as end by the deadline, after ``done`` steps.
 
-        Args:
-            settings: of the fit.
-            done: steps so far.
-            slowness: actual time of a step over the one measured.
+        ``slowness``: actual time of a step over the one measured.
         """
         coarse = settings.coarse if len(self.costs) == 2 else 0.0
         mean = coarse * self.costs[0] + (1 - coarse) * self.costs[-1]
@@ -89,7 +86,7 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
     count = float(settings.curves)
     for _ in range(8):  # settles within a shape
         digits = max(0.0, 0.5 * float(elementary.log10(width * height / max(count, 1.0))))
-        count = max(0.0, available / (STYLE_BYTES[settings.kind] + numbers * (SEPARATOR + digits)))
+        count = max(0.0, available / (STYLE_BYTES[settings.kind] + numbers * (FRACTION_BYTES + digits)))
     return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 
 

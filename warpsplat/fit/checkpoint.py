@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 from warpsplat.errors import CheckpointError
 from warpsplat.scene.arrays import Array
 
-INTERVAL = 30.0
+SAVE_INTERVAL = 30.0
 """Default time from one save to the next [s]."""
 
-SPARE = 100.0
+LEAST_SAVE_RATIO = 100.0
 """Least time from one save to the next over the duration of a save: saving costs a hundredth."""
 
 MOST_FITS = 1000
@@ -39,7 +39,7 @@ class Checkpoint:
         self,
         name: str,
         write: Callable[[Content], None],
-        every: float = INTERVAL,
+        every: float = SAVE_INTERVAL,
         saved: Content | None = None,
     ) -> None:
         """Begin a new run, or resume one.
@@ -113,7 +113,7 @@ class Checkpoint:
         self._write(_joined(self._results, self._state))
         self._is_saved = True
         now = time.monotonic()
-        self._due = now + max(self._every, SPARE * (now - began))
+        self._due = now + max(self._every, LEAST_SAVE_RATIO * (now - began))
 
 
 def whole(numbers: Mapping[str, Any], name: str, low: int, high: int) -> int:

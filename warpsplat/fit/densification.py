@@ -178,10 +178,8 @@ def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:
     These are the shapes that hold such a number, or else those whose gradients were not finite. They get the
     values that they had after the last densification step, or at the start.
 
-    Args:
-        step: after its last ``advance``.
-        replaces: whether new shapes where the error is take their place, as in densification.
-        last: check all values, frozen ones too.
+    If ``replaces``, new shapes where the error is take their place, as in densification. If ``last``, all
+    values are checked, frozen ones too.
     """
     state, parameters = step.state, step.state.parameters
     flagged = parameters.take_broken()

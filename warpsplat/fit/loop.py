@@ -302,21 +302,21 @@ def work_done(settings: Settings, plan: list[Phase], step: int, begin: int = 0) 
     return (work(step) - work(begin)) / (work(settings.iterations) - work(begin))
 
 
-MOST = 1_000_000_000
+SAVED_LIMIT = 1_000_000_000
 """Largest figure that is read from a checkpoint."""
 
-FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
+SAVED_FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
 
 
 def _fit_content(made: Fit) -> Content:
     """Return a result as numbers and arrays."""
-    numbers = {name: getattr(made, name) for name in (*FIGURES, "iterations", "renewed")}
+    numbers = {name: getattr(made, name) for name in (*SAVED_FIGURES, "iterations", "renewed")}
     return Content(numbers, to_arrays(made.scene))
 
 
 def _fit_from(content: Content, start: Scene) -> Fit:
     """Return the result of a fit that began with ``start``."""
-    figures = {name: real(content.numbers, name, -MOST, MOST) for name in FIGURES}
-    iterations, renewed = (whole(content.numbers, name, 0, MOST) for name in ("iterations", "renewed"))
+    figures = {name: real(content.numbers, name, -SAVED_LIMIT, SAVED_LIMIT) for name in SAVED_FIGURES}
+    iterations, renewed = (whole(content.numbers, name, 0, SAVED_LIMIT) for name in ("iterations", "renewed"))
     scene = from_arrays(content.arrays, start)
     return Fit(scene, iterations=iterations, interrupted=False, renewed=renewed, **figures)

@@ -18,13 +18,13 @@ from typing import Any, Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 from warpsplat.errors import UsageError, shown
 
-DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
+DURATION_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
 
-SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
+SIZE_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
 
-UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
+TIME_UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
 
-BYTES = {
+SIZE_UNITS = {
     **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
     **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
 }
@@ -125,11 +125,7 @@ class Option:
 def option(default: Any, help: str = "", limits: tuple[float, float] | None = None, **declared: Any) -> Any:
     """Declare a dataclass's field with its option.
 
-    Args:
-        default: the field's default, or the function that makes it.
-        help: see ``Option``, as for all that follows.
-        limits: see there.
-        declared: further fields of ``Option``.
+    ``default`` is the field's default, or the function that makes it; all others are fields of ``Option``.
     """
     if callable(default):
         made = Option(default=default(), shown_default="", help=help, limits=limits, **declared)
@@ -195,10 +191,10 @@ def parse_duration(value: str | float) -> float:
     Raises:
         UsageError: none of these.
     """
-    found = DURATION.fullmatch(_words(value).strip())
+    found = DURATION_PATTERN.fullmatch(_words(value).strip())
     if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
         raise UsageError(f"not a time: {shown(value)}; write 60s or 2m")
-    return float(found[1]) * UNITS[(found[2] or "s").lower()]
+    return float(found[1]) * TIME_UNITS[(found[2] or "s").lower()]
 
 
 def parse_bytes(value: str | int) -> int:
@@ -207,10 +203,10 @@ def parse_bytes(value: str | int) -> int:
     Raises:
         UsageError: none of these.
     """
-    found = SIZE.fullmatch(_words(value).strip())
+    found = SIZE_PATTERN.fullmatch(_words(value).strip())
     if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
         raise UsageError(f"not a size: {shown(value)}; write 100KB, 1MB or 1GB")
-    return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
+    return int(float(found[1]) * SIZE_UNITS[(found[2] or "b").lower()])
 
 
 def parse_levels(value: object) -> tuple[int, ...]:

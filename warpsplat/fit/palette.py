@@ -148,10 +148,7 @@ def main_colors(colors: FloatArray, weights: IndexArray, count: int) -> FloatArr
 
     A colour that makes up most of its cluster represents the cluster as it is.
 
-    Args:
-        colors: sRGB in [0, 1], shape (color, 3).
-        weights: of the colours, shape (color,).
-        count: number of colours wanted.
+    ``colors``: sRGB in [0, 1], shape (color, 3); ``weights``: of the colours, shape (color,).
 
     Returns:
         shape (count or fewer, 3).

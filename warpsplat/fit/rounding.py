@@ -75,10 +75,8 @@ def finest(settings: Settings) -> float:
 def choose_grid(step: Step, *, staged: bool, rate_distortion: bool = False) -> float:
     """Return the units per pixel of the coarsest grid that costs less than ``MAX_LOSS``.
 
-    Args:
-        step: with the scene.
-        staged: whether unrounded coordinates will be refitted.
-        rate_distortion: return the grid with the least cost instead, which counts the file's bytes too.
+    If ``staged``, unrounded coordinates will be refitted. With ``rate_distortion``, return the grid with
+    the least cost instead, which counts the file's bytes too.
     """
     state, renderer = step.state, step.renderer
 

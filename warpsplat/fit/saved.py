@@ -66,14 +66,8 @@ def step_from(
 ) -> Step:
     """Return the step that ``step_content`` saved as ``content``.
 
-    Args:
-        content: from a file; it is checked.
-        start: scene that the fit began with.
-        settings: that it began with.
-        backend: where to compute.
-        base: shapes of earlier levels.
-        begin: step that it began at.
-        target: returns what the step after a number of steps is compared with.
+    The fit began with the scene ``start`` and ``settings`` at the step ``begin``; ``base`` is the number of
+    shapes of earlier levels, and ``target`` returns the target of the step after a number of steps.
 
     Raises:
         ValueError, TypeError, KeyError, OverflowError: it is not the state of such a fit.

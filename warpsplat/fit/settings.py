@@ -51,7 +51,7 @@ DEFAULT_QUALITY: Quality = "balanced"
 
 COLOR = "#[0-9a-fA-F]{6}"
 
-MOST_COLORS = 256
+MOST_COLOR_COUNT = 256
 
 FRACTION = (0.0, 1.0)
 
@@ -64,7 +64,7 @@ FITTED: tuple[Subject, ...] = ("auto", "photo")
 LEVEL_FACTOR = 4
 """Shapes of a level over those of the one before, where only ``layered`` is asked for."""
 
-LEAST_LEVEL = 8
+LEAST_LEVEL_SHAPES = 8
 """Least number of shapes of the first of these levels."""
 
 FILL_POINT_RATE = 6.0
@@ -204,7 +204,9 @@ class Settings:
             ),
         ),
     )
-    colors: int | None = option(None, "No more than N colours; the fills are opaque then.", (1, MOST_COLORS))
+    colors: int | None = option(
+        None, "No more than N colours; the fills are opaque then.", (1, MOST_COLOR_COUNT)
+    )
     palette: tuple[str, ...] = option(
         (), "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS", parse=parse_palette
     )
@@ -339,7 +341,7 @@ class Settings:
 RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
     (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open do not go together"),
     (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and a palette do not go together"),
-    (lambda s: len(s.palette) > MOST_COLORS, f"palette has more than {MOST_COLORS} colours"),
+    (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
     (
         lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),
         "levels must be numbers of shapes that ascend, not {0.levels}",
@@ -365,7 +367,7 @@ def solid_color(background: str) -> FloatArray | None:
 def levels_of(curves: int) -> tuple[int, ...]:
     """Return up to three levels, the last with all the ``curves``."""
     levels = [curves // LEVEL_FACTOR**2, curves // LEVEL_FACTOR, curves]
-    return tuple(count for count in levels if count >= LEAST_LEVEL or count == curves)
+    return tuple(count for count in levels if count >= LEAST_LEVEL_SHAPES or count == curves)
 
 
 def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Settings:

@@ -18,7 +18,7 @@ from warpsplat.errors import OutputError, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.files.packed import is_packed, pack, unpack
-from warpsplat.fit.checkpoint import INTERVAL, Checkpoint, Content
+from warpsplat.fit.checkpoint import SAVE_INTERVAL, Checkpoint, Content
 from warpsplat.fit.options import parse_duration
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 DIGESTS = ("image", "mask", "svg")
 """Parts of ``identity`` that are digests."""
 
-SHOWN = 40
+VALUE_CHARACTERS = 40
 """Characters of a value in a message."""
 
 
@@ -44,14 +44,13 @@ class CheckpointFile:
     """Whether to resume from the checkpoint that is there; without one the run starts from the beginning."""
     overwrite: bool = False
     """Whether a run that is not resumed may replace what is there."""
-    every: float = INTERVAL
+    every: float = SAVE_INTERVAL
     """Time between two saves [s]."""
 
     def check(self, *others: Path) -> None:
         """Check before the work whether the file can be written, and may be.
 
-        Args:
-            others: files that it must not replace.
+        ``others``: files that it must not replace.
 
         Raises:
             UsageError: it cannot, is a file of another kind, or a checkpoint that was not asked for.
@@ -81,9 +80,7 @@ class CheckpointFile:
     def open(self, run: Mapping[str, Any], backend: Backend) -> Checkpoint:
         """Return the state that a run saves here, and is resumed from.
 
-        Args:
-            run: everything that decides its result (``identity``).
-            backend: where it is computed.
+        ``run``: everything that decides its result (``identity``).
 
         Raises:
             UsageError: the checkpoint is that of another run.
@@ -177,4 +174,4 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[t
         if isinstance(old, dict) and isinstance(new, dict):
             yield from differences(old, new)
         elif old != new:
-            yield name.replace("_", "-"), str(old)[:SHOWN], str(new)[:SHOWN]
+            yield name.replace("_", "-"), str(old)[:VALUE_CHARACTERS], str(new)[:VALUE_CHARACTERS]

@@ -28,7 +28,7 @@ PROGRAM = 280 << 20
 STRIPS = 96 << 20
 """Bytes of work that is done strip by strip."""
 
-DRAWN = 96 << 20
+FILE_STRIPS = 96 << 20
 """Bytes of the strips of a file that are drawn side by side."""
 
 TRAINED = 160
@@ -51,7 +51,7 @@ TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 MASK_READ, MASK = 12, 4
 """Bytes per pixel of a mask: while it is read, and afterwards."""
 
-SHOWN, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
+FILE_PICTURE, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
 """Bytes per pixel of measuring a file: its picture, both images at half size, the same if a side is odd, and
 what a file adds that is not drawn in strips."""
 
@@ -66,7 +66,7 @@ CLEARED = 150
 """Bytes per pixel of finding pixels that should be empty (``fit.clear``), where an SVG is refined against an
 image with opacity."""
 
-LEAST_SIDE = 32
+LEAST_REDUCED_SIDE = 32
 """Least side of a reduced image [px]."""
 
 
@@ -90,11 +90,7 @@ def need(
 ) -> MemoryNeed:
     """Estimate the memory of a run from above: within a quarter for photographs, more roughly for drawings.
 
-    Args:
-        facts: of the image.
-        settings: of the run.
-        factor: how many times smaller the image is read, in each direction.
-        mask: of importance.
+    ``factor``: how many times smaller the image is read, in each direction.
     """
     pixels = facts.width * facts.height
     worked = pixels / factor**2
@@ -140,11 +136,11 @@ def _fitting(facts: ImageFacts, settings: Settings, factor: int) -> float:
 def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
     """Return the bytes of measuring a picture of so many ``pixels``, without the image itself."""
     if pixels <= WHOLE_PIXELS:
-        per_pixel: float = SHOWN + 16
+        per_pixel: float = FILE_PICTURE + 16
     else:
         odd = facts.width % 2 or facts.height % 2
-        per_pixel = SHOWN + (HALVES_ODD if odd else HALVES) + (UNCUT if settings.minify else 0)
-    strips = STRIPS if pixels <= WHOLE_PIXELS else STRIPS + DRAWN
+        per_pixel = FILE_PICTURE + (HALVES_ODD if odd else HALVES) + (UNCUT if settings.minify else 0)
+    strips = STRIPS if pixels <= WHOLE_PIXELS else STRIPS + FILE_STRIPS
     return strips + per_pixel * pixels
 
 
@@ -212,7 +208,7 @@ def factor_for(
     factor = least
     while limit is not None and (wanted := need(facts, settings, factor, mask).most) > limit:
         factor *= 2
-        if min(facts.width, facts.height) < LEAST_SIDE * factor:
+        if min(facts.width, facts.height) < LEAST_REDUCED_SIDE * factor:
             needed = f"at least {in_words(wanted)} are needed"
             raise ResourceError(f"{name}: {needed}, {limit_words(settings, limit)}")
     return factor

@@ -14,7 +14,7 @@ from PIL import Image
 
 from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource, held, source_name
-from warpsplat.fit.checkpoint import INTERVAL
+from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Start, fit
@@ -68,7 +68,7 @@ def refine(
     name: str | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    checkpoint_every: float | str = INTERVAL,
+    checkpoint_every: float | str = SAVE_INTERVAL,
     overwrite: bool = False,
     **options: Unpack[RefineOptions],
 ) -> Result:

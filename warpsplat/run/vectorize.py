@@ -1,7 +1,13 @@
-"""An image becomes an SVG file: the whole way, from top to bottom.
+"""Turn an image into an SVG file, from top to bottom.
 
-``vectorize`` reads and inspects the image; ``make_result`` makes the shapes by a strategy, puts them in
-order, and writes and scores the file.
+vectorize               checks options, holds the device, opens the checkpoint
+prepare               reads the image at a size that memory allows, and finds its subject
+make_result           makes the file, and the figures about it:
+strategy.make         makes the shapes: by fitting, a search, or tracing (``STRATEGIES``)
+arranged              orders the shapes so that the file is small
+export_within         writes the SVG, within a limit of bytes
+on_paper              puts it on a sheet
+scored                measures the file as a viewer shows it
 """
 
 from __future__ import annotations
@@ -16,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.checkpoint import INTERVAL
+from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback, Progress
@@ -60,7 +66,7 @@ def vectorize(
     keyed: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    checkpoint_every: float | str = INTERVAL,
+    checkpoint_every: float | str = SAVE_INTERVAL,
     overwrite: bool = False,
     **options: Unpack[Options],
 ) -> Result:
@@ -120,11 +126,8 @@ def make_result(
 ) -> Result:
     """Vectorize a prepared image, and score the file.
 
-    Args:
-        image: the image, and the problem that it poses.
-        run: how the work is carried out.
-        write: called with the file before it is scored, so that nothing that goes wrong then can lose it.
-        start: shapes to start a plain fit from, in place of the settings' strategy.
+    ``write`` is called with the file before it is scored, so that no later failure can lose it. A ``start``
+    makes it a plain fit from these shapes, in place of the settings' strategy.
 
     Raises:
         ImageError: something about the image that only the work itself finds out.

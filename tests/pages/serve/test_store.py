@@ -10,7 +10,7 @@ import pytest
 from warpsplat.fit.settings import Settings
 from warpsplat.pages.serve.limits import Limits, Refused
 from warpsplat.pages.serve.pictures import Picture, plain_name
-from warpsplat.pages.serve.runs import Run
+from warpsplat.pages.serve.runs import ServedRun
 from warpsplat.pages.serve.store import Store
 
 
@@ -42,7 +42,7 @@ def add(store: Store, session: str, image: str) -> str:
     return store.add_run(session, image, {}, Settings(), "warpsplat")
 
 
-def do(store: Store, svg: str = "<svg/>") -> Run:
+def do(store: Store, svg: str = "<svg/>") -> ServedRun:
     """The run whose turn it is, done."""
     run = store.next()
     assert run
