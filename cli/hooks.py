@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 Mode = Literal["one file", "several images", "several numbers", "suggestion"]
-"""What a command line makes."""
+"""The output that a command line asks for."""
 
 TAKES: dict[Mode, str] = {
     "several images": "one image",
     "several numbers": "one number of shapes",
     "suggestion": "a run that makes a file",
 }
-"""For messages: what an option takes that cannot be given in a mode."""
+"""For messages: the mode that an option needs if it cannot be given in this one."""
 
 
 @dataclass(frozen=True)
 class Done:
-    """What a command did."""
+    """The outcome of a command."""
 
     request: Request
     data: bytes | Path
@@ -42,7 +42,7 @@ class Done:
     made: Sequence[tuple[Path, Result | bytes | Path]]
     """Files with their results; of ``eval``, the SVG that was measured."""
     command: str = ""
-    """A command line that does the same again."""
+    """A command line that repeats it."""
     several: bool = False
     """Whether several numbers of shapes were asked for."""
 
@@ -52,7 +52,7 @@ class RunHook:
 
     commands: ClassVar[tuple[str, ...]] = ("vectorize", "refine")
     modes: ClassVar[tuple[Mode, ...]] = ("one file",)
-    """Where its options can be given."""
+    """Modes in which its options can be given."""
     options: ClassVar[dict[str, Callable[[Any], Any]]] = {}
     """Parameter -> click decorator."""
 
@@ -80,17 +80,17 @@ class RunHook:
         return False
 
     def watch(self, on_progress: Callable[[Progress], None]) -> Callable[[Progress], None]:
-        """Return what the run calls in place of ``on_progress``, which shows the progress bar."""
+        """Return the callback of the run, in place of ``on_progress``, which shows the progress bar."""
         return on_progress
 
     def show(self, result: Result, image: bytes | Path | None) -> None:
-        """Show a result as soon as it is there; ``image`` is None if it cannot be read once more."""
+        """Show a result as soon as it is available; ``image`` is None if it cannot be read again."""
 
     def finish(self, done: Done) -> None:
-        """Write what was asked for, once the file is there and its figures are printed."""
+        """Write further output, after the file is written and its figures are printed."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what is added to the object of ``--json``."""
+        """Return further items for the object of ``--json``."""
         return {}
 
 
@@ -118,7 +118,7 @@ class HookedCommand(click.Command):
     """A command whose hooks may rewrite the words before they are parsed."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse what the hooks make of ``args``."""
+        """Parse ``args`` as the hooks rewrite them."""
         for hook in hooks_of(self.name or ""):
             args = hook.rewrite(args)
         return super().parse_args(ctx, args)

@@ -149,9 +149,7 @@ def json_stream(arguments: list[str]) -> Literal["stdout", "stderr"] | None:
 def report_error(error: BaseException, objects: Literal["stdout", "stderr"] | None = None) -> int:
     """Print an exception, and return the exit code for it.
 
-    Args:
-        error: what was raised.
-        objects: where to print it as a JSON object too.
+    ``objects``: where to print it as a JSON object too.
     """
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.format_message())

@@ -61,7 +61,7 @@ def checkpoint_options(function: Function) -> Function:
         click.option(
             "--resume",
             is_flag=True,
-            help="Go on from the checkpoint, to the same file as without a stop; where there is none, start.",
+            help="Continue from the checkpoint, to the same file as without a stop; without one, start.",
         ),
         click.option(
             "--checkpoint-every",
@@ -83,8 +83,8 @@ def verbosity_options(function: Function) -> Function:
         return value
 
     options = [
-        click.option("-v", "--verbose", count=True, callback=follow, help="Say more, on stderr."),
-        click.option("-q", "--quiet", is_flag=True, callback=follow, help="Say nothing but errors."),
+        click.option("-v", "--verbose", count=True, callback=follow, help="Print more, on stderr."),
+        click.option("-q", "--quiet", is_flag=True, callback=follow, help="Print errors only."),
     ]
     return decorated(function, options)
 
@@ -136,12 +136,12 @@ def flag(option: Option, *, several: bool = False) -> Callable[[Function], Funct
 
 
 def quality_options(function: Function, *, several: bool = False) -> Function:
-    """What decides the result; ``several``: see ``flag``."""
+    """Add the options that decide the result; ``several``: see ``flag``."""
     return decorated(function, (flag(option, several=several) for option in OPTIONS))
 
 
 def refine_options(function: Function) -> Function:
-    """Those of them that ``refine`` has."""
+    """Add those of them that ``refine`` has."""
     return decorated(function, (flag(option) for option in OPTIONS if option.refine))
 
 
@@ -197,7 +197,7 @@ class Request:
 
     @property
     def source(self) -> dict[str, Any]:
-        """Return keyword arguments for the library's functions, besides the image and the settings."""
+        """Return keyword arguments for the library's functions, in addition to the image and the settings."""
         return {
             "name": input_name(self.image),
             "importance": self.importance,
@@ -207,5 +207,5 @@ class Request:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Return the words of an equivalent command, besides those of settings."""
+        """Return the words of an equivalent command that are not settings."""
         return () if self.importance is None else ("--importance", str(self.importance))

@@ -80,7 +80,7 @@ def command(
     interrupt = Interrupt()
     with (
         interrupt.watching(),
-        progress_bar(svg, settings, quiet=request.quiet, verbose=request.verbose) as tell,
+        progress_bar(svg, settings, quiet=request.quiet, verbose=request.verbose) as report,
     ):
         result = refine(
             data,
@@ -90,7 +90,7 @@ def command(
             output=output,
             device=request.device,
             threads=request.threads,
-            callback=hooks.watch(tell),
+            callback=hooks.watch(report),
             stop=interrupt,
             name=input_name(svg),
             checkpoint=checkpoint,

@@ -6,7 +6,7 @@ import contextlib
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,6 @@ from warpsplat.fit.progress import Progress, TimeLeft
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.run.result import Result
-from warpsplat.run.several import vectorize_several
-from warpsplat.run.suggest import Suggestion, suggest
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
@@ -59,13 +57,13 @@ def progress_bar(
     """Yield a callback that shows progress: a bar if stderr is a terminal, else lines with ``-vv``."""
     if not sys.stderr.isatty() or quiet:
 
-        def tell(progress: Progress) -> None:
+        def echo_step(progress: Progress) -> None:
             if verbose > 1:
                 quality = f"{progress.psnr:.2f} dB" if progress.fine else "reduced image"
                 step = f"step {progress.step}/{progress.steps}"
                 echo(f"{source}: {step}, {quality}, {progress.seconds:.1f} s", err=True)
 
-        yield tell
+        yield echo_step
         return
     bar: Any
     state = Bar()
@@ -98,23 +96,6 @@ def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Pr
     bar = progress_bar(request.image, settings, quiet=request.quiet, verbose=request.verbose)
     with interrupt.watching(), bar as report:
         yield report, interrupt
-
-
-def run_several(
-    request: Request, outputs: Sequence[Path], numbers: Sequence[int], settings: Settings, data: bytes
-) -> tuple[Result, ...]:
-    """Vectorize an image, whose bytes are ``data``, with several numbers of shapes and one progress bar."""
-    echo_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
-    with watched(request, settings) as (report, stop):
-        return vectorize_several(
-            data, numbers, settings=settings, outputs=outputs, callback=report, stop=stop, **request.source
-        )
-
-
-def suggest_file(request: Request, settings: Settings, data: bytes) -> Suggestion | None:
-    """Suggest a number of shapes for the image, whose bytes are ``data``."""
-    with watched(request, settings) as (report, stop):
-        return suggest(data, settings=settings, callback=report, stop=stop, **request.source)
 
 
 def requested(settings: Settings) -> str:

@@ -1,4 +1,4 @@
-"""``vectorize`` with several numbers of shapes: file names, the run, a table."""
+"""``vectorize`` with several numbers of shapes: name the files, make them, and print a table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks
 from warpsplat.cli.options import Request
-from warpsplat.cli.run import echo_notes, run_several
+from warpsplat.cli.run import PLURALS, echo_notes, echo_start, watched
 from warpsplat.errors import UsageError, printable
 from warpsplat.files.inputs import STANDARD, read_input
 from warpsplat.files.output import check_output
@@ -21,7 +21,7 @@ from warpsplat.run.formats import ENDINGS
 from warpsplat.run.names import ErrorAt, FoundImage, ResultRequest, check_outputs, fields_of, name_results
 from warpsplat.run.options import settings_from
 from warpsplat.run.result import Result
-from warpsplat.run.several import check_several
+from warpsplat.run.several import check_several, vectorize_several
 
 COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
 """Columns of the table."""
@@ -43,7 +43,11 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
         if path.parent.exists():
             check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
     hooks.check(inputs, outputs, overwrite=request.overwrite)
-    results = run_several(request, outputs, numbers, settings, data)
+    echo_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
+    with watched(request, settings) as (report, stop):
+        results = vectorize_several(
+            data, numbers, settings=settings, outputs=outputs, callback=report, stop=stop, **request.source
+        )
     begun = sorted(numbers)[: len(results)]  # an interrupted run has made the smallest ones
     paths = [path for path, number in zip(outputs, numbers, strict=True) if number in begun]
     made = list(zip(paths, results, strict=True))

@@ -54,7 +54,7 @@ def command(
     checkpoint_every: str,
     **given: Any,
 ) -> None:
-    """Turn IMAGE (- is the standard input) into an SVG and say how good the file is.
+    """Turn IMAGE (- is the standard input) into an SVG and measure the file.
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
     against the image, number of paths, size. They go to stderr where the SVG
@@ -100,12 +100,7 @@ def single(
 ) -> None:
     """Make a file of one image, and whatever hooks add.
 
-    Args:
-        request: the image and options.
-        given: settings.
-        hooks: what extensions add to the run.
-        keeping: ``checkpoint``, ``resume`` and ``checkpoint_every``, see ``warpsplat.vectorize``.
-        as_uri: whether to print the file as a data URI.
+    ``keeping``: the arguments of ``warpsplat.vectorize`` for checkpoints.
 
     Raises:
         WarpsplatError: what cannot be done; found before the run, as far as possible.

@@ -84,7 +84,7 @@ def adam_update(
     """Make a step of Adam, with bounds kept by projection. One thread a number.
 
     Where the gradient, the moments or the value are not finite nothing is updated, so that they stay as they
-    are for ``fit.recover`` to find.
+    are for ``fit.densification`` to find.
     """
     i, j = wp.tid()
     row = offset + i

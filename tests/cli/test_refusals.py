@@ -93,7 +93,7 @@ USAGE = [
     ("vectorize photo.png --checkpoint -", "not the standard output"),
     ("vectorize photo.png --checkpoint a --checkpoint-every often", "not a time"),
     # Several numbers of shapes
-    ("vectorize photo.png --curves 5,5", "5 is there twice"),
+    ("vectorize photo.png --curves 5,5", "5 is given twice"),
     ("vectorize photo.png --curves 0,5", "curves must be a whole number from 1"),
     ("vectorize photo.png --curves 5,x", "not a whole number, nor several"),
     ("vectorize photo.png --curves 5,9 -o -", "several files: give -o 'NAME-{curves}.svg'"),
@@ -113,7 +113,7 @@ USAGE = [
     ("vectorize photo.png --curves 5,9 --subject pixel -o new/", "photo.png: a picture of cells has"),
     ("vectorize photo.png --curves 5,9 photo.png", "matrix: {curves: [5, 9]}"),
     ("vectorize photo.png --suggest --curves 5", "--suggest and --curves do not go together"),
-    ("vectorize photo.png --suggest --max-bytes 5KB", "max-bytes as well"),
+    ("vectorize photo.png --suggest --max-bytes 5KB", "suggest and max-bytes both"),
     ("vectorize photo.png --suggest -o a.svg", "writes nothing"),
     # Batches
     ("batch photo.png --curves 5,9", "matrix: {curves: [5, 9]}"),

@@ -141,8 +141,8 @@ def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
 
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.search.survey.STEPS", 60)
-    monkeypatch.setattr("warpsplat.search.survey.INTERVAL", 10)
+    monkeypatch.setattr("warpsplat.search.survey.SHORT_STEPS", 60)
+    monkeypatch.setattr("warpsplat.search.survey.SHORT_INTERVAL", 10)
 
 
 @pytest.mark.usefixtures("quickly")
@@ -160,10 +160,8 @@ def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_suggestion_in_words(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from warpsplat.cli import run as runs
-
     made = suggestion(Worth(16, 1024, 256, 26.0, 1.0, 0.0, 64.0))
-    monkeypatch.setattr(runs, "suggest_file", lambda *a, **k: made)
+    monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
     lines = capsys.readouterr().out.splitlines()
@@ -228,7 +226,7 @@ def test_the_command_of_a_drawing_keeps_its_settings(image: Path, capsys: pytest
 def test_an_interrupted_suggestion_says_so(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpsplat.cli.run.suggest_file", lambda *a, **k: None)
+    monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: None)
     assert run("vectorize", image, "--suggest", "--json") == 130
     said = capsys.readouterr()
     assert json.loads(said.out) == {"error": "interrupted", "exit_code": 130}

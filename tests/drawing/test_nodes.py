@@ -13,8 +13,8 @@ from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, Outline, disc, drawin
 from tests.drawing.test_fit_outlines import assert_clean, psnr
 from tests.drawing.test_merge import halves
 from warpsplat.drawing.cells import (
-    SPAN,
-    ZERO,
+    ORIGIN,
+    ROW_SPAN,
     Cells,
     by_cell,
     cells_around,
@@ -39,7 +39,7 @@ from warpsplat.svg.write import rounded, write_svg
 def cells_at(places: Sequence[tuple[int, int]]) -> Cells:
     """Those in columns and rows."""
     columns, rows = np.array(places).T
-    return np.unique((columns + ZERO) * SPAN + rows + ZERO)
+    return np.unique((columns + ORIGIN) * ROW_SPAN + rows + ORIGIN)
 
 
 def split(made: Drawing) -> Drawing:

@@ -12,7 +12,7 @@ import warpsplat
 from tests.drawing.trace.drawings import draw
 from tests.drawing.trace.line_art import drawn
 from tests.runs import scored, vectorize
-from warpsplat.drawing.draw import LEAST_SIDE, enlargement
+from warpsplat.drawing.draw import LEAST_ORIGINAL_SIDE, enlargement
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
@@ -45,7 +45,12 @@ def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> N
 
 @pytest.mark.parametrize(
     ("side", "times", "found"),
-    [(LEAST_SIDE, 2, 2), (LEAST_SIDE - 1, 2, 1), (LEAST_SIDE // 2, 6, 3), (20, 1, 1)],
+    [
+        (LEAST_ORIGINAL_SIDE, 2, 2),
+        (LEAST_ORIGINAL_SIDE - 1, 2, 1),
+        (LEAST_ORIGINAL_SIDE // 2, 6, 3),
+        (20, 1, 1),
+    ],
 )
 def test_enlargement_leaves_a_picture_to_trace(side: int, times: int, found: int) -> None:
     noise = np.random.default_rng(0).random((side, side + 1, 3)).astype(np.float32)

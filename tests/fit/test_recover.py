@@ -10,11 +10,11 @@ import pytest
 from tests.fit.pictures import picture, step_for
 from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
+from warpsplat.fit.densification import recover
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.recover import recover
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend

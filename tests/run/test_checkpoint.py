@@ -16,7 +16,7 @@ from tests.fit.pictures import picture
 from tests.scenes import random_scene
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.packed import is_packed, pack, unpack
-from warpsplat.fit import stages
+from warpsplat.fit import checkpoint
 from warpsplat.run import checkpoint as module
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata, write_svg
@@ -80,7 +80,7 @@ def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path, kind: str) -> None:
 def test_a_run_that_was_killed_goes_on_from_the_last_save(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "SPARE", 0.0)
+    monkeypatch.setattr(checkpoint, "LEAST_SAVE_RATIO", 0.0)
     path = tmp_path / "run.checkpoint"
 
     def killed() -> bool:
@@ -99,18 +99,18 @@ def test_a_run_that_was_killed_goes_on_from_the_last_save(
 
 def test_saving_costs_a_hundredth(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    monkeypatch.setattr("warpsplat.fit.stages.time.monotonic", lambda: now[0])
-    written: list[stages.Content] = []
+    monkeypatch.setattr("warpsplat.fit.checkpoint.time.monotonic", lambda: now[0])
+    written: list[checkpoint.Content] = []
 
-    def write(content: stages.Content) -> None:
+    def write(content: checkpoint.Content) -> None:
         written.append(content)
         now[0] += 2.0
 
-    kept = stages.Stages("f", write, 30.0)
-    stage = kept.begin()
+    kept = checkpoint.Checkpoint("f", write, 30.0)
+    kept.begin()
     for second in range(500):
         now[0] += 1.0
-        stage.keep(lambda second=second: stages.Content({"step": second}, {}), now=False)  # type: ignore[misc]
+        kept.keep(lambda second=second: checkpoint.Content({"step": second}, {}), now=False)  # type: ignore[misc]
     assert [content.numbers["fits"][0]["step"] for content in written] == [29, 229, 429]
 
 

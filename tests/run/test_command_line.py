@@ -69,7 +69,7 @@ def test_it_says_no_more_than_is_needed() -> None:
 
 def test_what_no_flag_says_is_told() -> None:
     assert vectorize_command(make_settings(bending=0.1), "a.png", "a.svg").endswith(
-        "# and settings that no flag says"
+        "# and settings without a flag"
     )
 
 

@@ -56,7 +56,7 @@ def bare(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only what grows with the image counts, so that a small image can be too large."""
     for name in ("PROGRAM", "STRIPS", "SHAPE"):
         monkeypatch.setattr(memory, name, 0)
-    monkeypatch.setattr(memory, "LEAST_SIDE", 4)
+    monkeypatch.setattr(memory, "LEAST_REDUCED_SIDE", 4)
 
 
 def test_a_need_grows_with_all_that_takes_memory() -> None:

@@ -16,8 +16,15 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind, Scene
-from warpsplat.search.candidate import Candidate, Change, smaller
-from warpsplat.search.few_shapes import FEW, OPACITY, fit_background, for_few
+from warpsplat.search.candidate import (
+    FEW_OPACITY,
+    FEW_SHAPES,
+    Candidate,
+    Change,
+    fit_background,
+    for_few,
+    smaller,
+)
 from warpsplat.search.goal import AIM_FULL, curves_for, next_change
 from warpsplat.svg.write import path_sizes
 
@@ -103,8 +110,8 @@ def test_sizes_of_paths_are_those_in_the_file(scene: Scene) -> None:
 
 def test_settings_of_few_shapes() -> None:
     few = for_few(make_settings(curves=10))
-    assert few.opacity == OPACITY and few.spline_points < make_settings().spline_points
-    assert for_few(make_settings(curves=FEW + 1)) == make_settings(curves=FEW + 1)
+    assert few.opacity == FEW_OPACITY and few.spline_points < make_settings().spline_points
+    assert for_few(make_settings(curves=FEW_SHAPES + 1)) == make_settings(curves=FEW_SHAPES + 1)
     strokes = for_few(make_settings(curves=10, kind=Kind.STROKE))
     assert strokes.opacity == make_settings().opacity
     assert strokes.fine_pixels == few.fine_pixels

@@ -12,7 +12,7 @@ from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
-from warpsplat.search.survey import BEND, GAIN, STEEPEST, expected, expected_gain, lost_detail, survey
+from warpsplat.search.survey import BEND, EFFORT_GAIN, STEEPEST, expected, expected_gain, lost_detail, survey
 
 
 def test_it_goes_through_what_was_measured() -> None:
@@ -48,12 +48,14 @@ def test_a_picture_without_error_has_a_ceiling() -> None:
 def test_what_is_hard_to_draw_gains_little() -> None:
     plan = [Phase(100, 100)]
     assert expected_gain(20.0, plan) == 0
-    assert 0 < expected_gain(25.0, plan) < expected_gain(30.0, plan) == expected_gain(40.0, plan) == GAIN
+    assert (
+        0 < expected_gain(25.0, plan) < expected_gain(30.0, plan) == expected_gain(40.0, plan) == EFFORT_GAIN
+    )
 
 
 def test_what_is_much_larger_than_most_steps_see_gains_little() -> None:
     gains = [expected_gain(30.0, [Phase(100, 100), Phase(side, 100)]) for side in (400, 800, 1600, 9000)]
-    assert gains == pytest.approx([GAIN, GAIN / 2, 0, 0])
+    assert gains == pytest.approx([EFFORT_GAIN, EFFORT_GAIN / 2, 0, 0])
 
 
 def test_detail_that_the_finest_size_lacks() -> None:
@@ -68,8 +70,8 @@ def test_detail_that_the_finest_size_lacks() -> None:
 
 def test_survey(monkeypatch: pytest.MonkeyPatch) -> None:
     """More shapes are better and larger; what is asked to stop stops."""
-    monkeypatch.setattr("warpsplat.search.survey.STEPS", 60)
-    monkeypatch.setattr("warpsplat.search.survey.INTERVAL", 10)
+    monkeypatch.setattr("warpsplat.search.survey.SHORT_STEPS", 60)
+    monkeypatch.setattr("warpsplat.search.survey.SHORT_INTERVAL", 10)
     backend = Backend.on("cpu", 1)
     work: list[float] = []
     problem = Problem(picture(), make_settings())

@@ -30,7 +30,7 @@ PRICE_STEP, DEAREST = 8.0, 4096.0
 PRICES = 7
 """Most prices that are tried."""
 
-FULL = 0.97
+FULL_FILE = 0.97
 """The share of the allowed bytes from which a file is full enough."""
 
 
@@ -43,14 +43,11 @@ def best_within(
 ) -> Fit:
     """Return the best drawing within ``most`` bytes, or the smallest one if none fits.
 
-    Regions go, or nodes; or, from the fewest regions that are still too large, both.
+    It removes regions, or nodes, or nodes of the drawing with the fewest regions that is still too large.
 
-    Args:
-        first: a drawing of all regions, which is too large.
-        most: bytes of the file.
-        fewer: makes a drawing of a number of regions.
-        simpler: finishes a drawing again at a price of a byte (``drawing.tidy``).
-        over: whether to take what there is.
+    ``first``, which has all regions, is too large; ``fewer`` draws a number of regions; ``simpler``
+    finishes a drawing again at a price of a byte (``drawing.tidy``); ``over`` returns whether to take the
+    best so far.
     """
     best, large = _with_fewer_regions(first, most, fewer, over)
     for sketch in [large[0], *large[1:][-1:]]:
@@ -67,7 +64,7 @@ def _with_fewer_nodes(
     best: Sketch | None = None
     low, high, price = 1.0, math.inf, PRICE_STEP
     for _ in range(PRICES):
-        if sketch.drawing is None or over() or (best and best.size > FULL * most):
+        if sketch.drawing is None or over() or (best and best.size > FULL_FILE * most):
             break
         if best is None and price > DEAREST:
             break

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.fit_outlines import matching
-from warpsplat.drawing.thin import THIN, best_of_thin, continued, cut, margins
+from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
 from warpsplat.drawing.trace.trace import trace
@@ -25,8 +25,8 @@ from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
-LEAST_SIDE = 96
-"""Least side of an image before it was enlarged [px]: what is smaller says little of outlines."""
+LEAST_ORIGINAL_SIDE = 96
+"""Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
 
 
 def draw_regions(problem: Problem, run: Run) -> Fit:
@@ -63,7 +63,7 @@ def draw_pixels(problem: Problem, run: Run) -> Fit:
 
 def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:
     """Return a drawing; of an image of few rows or columns, another one if that shows more."""
-    across, down = margins(problem.target, THIN)
+    across, down = margins(problem.target, THIN_SIDE)
     if not (across or down):
         return made
     others = [lambda: _drawn_beyond(problem, run, most)]
@@ -72,7 +72,7 @@ def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fi
 
 def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
     """Draw the image continued beyond its borders, and cut the drawing."""
-    across, down = margins(problem.target, THIN)
+    across, down = margins(problem.target, THIN_SIDE)
     wide = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
     drawing, grid = trace_regions(wide, most), finest(settings)
@@ -101,7 +101,7 @@ def enlargement(image: FloatArray) -> int:
     Its antialiasing is that of the smaller image, and the steps of its pixels are not part of what it shows.
     """
     size, side = cell_size(image), min(image.shape[:2])
-    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_SIDE)
+    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_ORIGINAL_SIDE)
     return max(fits, default=1)
 
 

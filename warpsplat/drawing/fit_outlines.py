@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.constraints import Constraints, Drawing, Projection
+from warpsplat.fit.densification import recover
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.recover import recover
 from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.fit.state import FitState
@@ -23,10 +23,10 @@ from warpsplat.scene import Canvas, FloatArray, Scene
 
 Colors = Literal["held", "fitted"]
 
-STEPS = 200
+OUTLINE_STEPS = 200
 """Most steps of a refinement."""
 
-POINT_RATE = 0.25
+OUTLINE_RATE = 0.25
 """Learning rate of points at the start [px]: outlines are traced to about a pixel."""
 
 FINAL_RATE = 0.02
@@ -35,16 +35,23 @@ FINAL_RATE = 0.02
 COLOR_RATE = 0.004
 """Learning rate of colours: one of 256 levels."""
 
-GAIN, PATIENCE = 0.005, 40
+LEAST_GAIN, GAIN_STEPS = 0.005, 40
 """A refinement ends when the error has not fallen by this share in so many steps."""
+
+
+SNAP_DISTANCE = 6 / 255
+"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
+
+SNAP_SHARE = 0.5
+"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
 
 
 @dataclass(frozen=True)
 class Refinement:
     """Options of a refinement."""
 
-    steps: int = STEPS
-    point_rate: float = POINT_RATE
+    steps: int = OUTLINE_STEPS
+    point_rate: float = OUTLINE_RATE
     """[px] at the start."""
     colors: Colors = "held"
     """Whether colours stay, or are fitted and then snapped to those of the image."""
@@ -101,13 +108,13 @@ def refine_drawing(
         if done % CHECK_INTERVAL == 0 or done == how.steps:
             recover(step, replaces=False)
             found, error = _evaluate(step)
-            if error < (1 - GAIN) * least:
+            if error < (1 - LEAST_GAIN) * least:
                 gained = done
             if error < least:
                 best, least = found, error
             if run.on_progress:
                 run.report(_progress(step, done, how.steps, time.monotonic() - run.started))
-        if done - gained >= PATIENCE or run.over():
+        if done - gained >= GAIN_STEPS or run.over():
             break
     if how.colors == "fitted":
         snapped = replace(best, colors=own_colors(best, target))
@@ -161,13 +168,6 @@ def _evaluate(step: Step) -> tuple[Scene, float]:
     return step.state.scene(), step.measured_error()
 
 
-NEAR = 6 / 255
-"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
-
-OFTEN = 0.5
-"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
-
-
 def own_colors(scene: Scene, target: FloatArray) -> FloatArray:
     """Return the colours of the shapes, snapped to the image's 8-bit colours, shape (shape, 3).
 
@@ -181,10 +181,10 @@ def own_colors(scene: Scene, target: FloatArray) -> FloatArray:
     palette = levels.astype(np.float32) / np.float32(255)
     colors = scene.colors.copy()
     for i, color in enumerate(scene.colors):
-        near = np.flatnonzero((np.abs(palette - color) <= NEAR).all(axis=1))
+        near = np.flatnonzero((np.abs(palette - color) <= SNAP_DISTANCE).all(axis=1))
         if len(near):
             most = near[counts[near].argmax()]
-            if counts[most] >= OFTEN * counts[near].sum():
+            if counts[most] >= SNAP_SHARE * counts[near].sum():
                 colors[i] = palette[most]
                 continue
         colors[i] = np.round(color * 255) / 255

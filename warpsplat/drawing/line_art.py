@@ -11,7 +11,7 @@ import numpy as np
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
 from warpsplat.drawing.strokes.tour import toured
-from warpsplat.drawing.thin import THINNEST, continued, cut, margins
+from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
@@ -22,22 +22,22 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.scene import FloatArray, IndexArray, Scene
 
-STEPS = 80
+STROKE_STEPS = 80
 """Most steps of the refinement: the strokes are traced to fractions of a pixel."""
 
-POINT_RATE = 0.12
+STROKE_POINT_RATE = 0.12
 """Learning rate of points [px]."""
 
-WIDTH_RATE = 0.06
+STROKE_WIDTH_RATE = 0.06
 """Learning rate of widths [px]."""
 
 FILLED_END, FIT_END = 0.4, 0.9
 """Shares of the progress at which filled areas, and the refinement of strokes, are done."""
 
-THIN = 1.0
+THIN_STROKE = 1.0
 """Width below which a stroke keeps it [px]: the least of a fit."""
 
-FINE_PIXELS = 1_000_000
+STROKE_PIXELS = 1_000_000
 """Largest image size of the refinement [pixels]."""
 
 
@@ -45,12 +45,12 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     """Trace line art as strokes, and refine them against its ink.
 
     What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: its filled areas, if the
-    settings say mixed, and strokes ordered to minimise pen-up travel.
+    settings are mixed, and strokes ordered to minimise pen-up travel.
 
     Raises:
         ImageError: there is no ink.
     """
-    across, down = margins(problem.target, THINNEST)
+    across, down = margins(problem.target, THINNEST_SIDE)
     problem = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
     ink = find_ink(problem.target, mixed=settings.mixed)
@@ -93,22 +93,22 @@ def _to_refine(ink: Ink, traced: TracedLines) -> tuple[Scene, FloatArray, FloatA
 def _in_order(lines: Scene, refined: Scene) -> Scene:
     """Return refined strokes in the order of a tour, with the pens of the traced ``lines``."""
     # A fit knows no strokes thinner than a pixel; their widths were measured.
-    widths = np.where(lines.widths < THIN, lines.widths, refined.widths)
+    widths = np.where(lines.widths < THIN_STROKE, lines.widths, refined.widths)
     scene = replace(refined, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
     return toured(rejoined(lines, scene))
 
 
 def line_settings(settings: Settings, count: int) -> Settings:
     """Return the settings of the refinement of ``count`` strokes: of their places and widths alone."""
-    still = dict.fromkeys(settings.rates, 0.0)
+    fixed = dict.fromkeys(settings.rates, 0.0)
     return replace(
         settings,
         curves=min(count, 100_000),
-        iterations=min(settings.iterations, STEPS),
+        iterations=min(settings.iterations, STROKE_STEPS),
         coarse=0.0,
-        fine_pixels=min(settings.fine_pixels, FINE_PIXELS),
+        fine_pixels=min(settings.fine_pixels, STROKE_PIXELS),
         density=Density(interval=0),
-        rates={**still, "points": POINT_RATE, "widths": WIDTH_RATE},
+        rates={**fixed, "points": STROKE_POINT_RATE, "widths": STROKE_WIDTH_RATE},
         mixed=False,
         renderer="exact",
         texture=0.0,
@@ -163,11 +163,7 @@ class Filled(NamedTuple):
 def filled(traced: TracedLines, run: Run, finest: float, *, tidy: bool = True) -> Filled:
     """Trace the areas of line art as a drawing, in the colours of their pens.
 
-    Args:
-        traced: line art with areas.
-        run: how the work is carried out.
-        finest: most view box units per pixel.
-        tidy: whether their outlines lose needless nodes.
+    ``finest``: most view box units per pixel.
     """
     scene, per_pixel = traced.scene.take(np.zeros(0, np.intp)), 1.0
     if traced.areas is None:

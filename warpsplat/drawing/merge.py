@@ -10,9 +10,9 @@ from warpsplat.portable import linear
 
 Floats = npt.NDArray[np.float64]
 
-SAMPLES = 12  # of each of the two cubics
-ROUNDS = 4  # of fitting handles and finding the samples' places along the cubic
-LEAST = 1e-6  # [canvas units] length below which a vector has no direction
+SAMPLES_PER_CUBIC = 12  # of each of the two cubics
+FITTING_ROUNDS = 4  # of fitting handles and finding the samples' places along the cubic
+LEAST_LENGTH = 1e-6  # [canvas units] length below which a vector has no direction
 
 
 def handles_through(first: Floats, second: Floats) -> Floats:
@@ -20,19 +20,17 @@ def handles_through(first: Floats, second: Floats) -> Floats:
 
     They begin and end where those do, in the same directions; the lengths are fitted by least squares.
 
-    Args:
-        first: Cubics, shape (..., 4, 2).
-        second: Those that begin where ``first`` end, shape (..., 4, 2).
+    ``first`` and ``second``, which begins where ``first`` ends, have shape (..., 4, 2).
     """
-    t = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    t = (np.arange(SAMPLES_PER_CUBIC) + 0.5) / SAMPLES_PER_CUBIC
     samples = np.concatenate([points_at(first, t), points_at(second, t)], axis=-2)
     start, end = first[..., :1, :], second[..., 3:, :]
     ahead, back = _direction(first), _direction(second[..., ::-1, :])
-    way = np.linalg.norm(np.diff(np.concatenate([start, samples, end], axis=-2), axis=-2), axis=-1)
-    way = way.cumsum(axis=-1)
-    u = way[..., :-1] / np.maximum(way[..., -1:], LEAST)
+    travelled = np.linalg.norm(np.diff(np.concatenate([start, samples, end], axis=-2), axis=-2), axis=-1)
+    travelled = travelled.cumsum(axis=-1)
+    u = travelled[..., :-1] / np.maximum(travelled[..., -1:], LEAST_LENGTH)
     reach = np.linalg.norm(end - start, axis=-1) / 3
-    for _ in range(ROUNDS):
+    for _ in range(FITTING_ROUNDS):
         along, against = 3 * (1 - u) ** 2 * u, 3 * (1 - u) * u**2
         missing = samples - points_at(np.concatenate([start, start, end, end], axis=-2), u)
         sides = np.stack([along[..., None] * ahead, against[..., None] * back], axis=-3)
@@ -45,15 +43,15 @@ def handles_through(first: Floats, second: Floats) -> Floats:
         cubic = np.concatenate([start, *handles, end], axis=-2)
         # A step of Newton's method towards the nearest places.
         slope, bend = distance_derivatives(cubic, samples, u)
-        is_bent = np.abs(bend) > LEAST
+        is_bent = np.abs(bend) > LEAST_LENGTH
         u = np.clip(u - np.where(is_bent, slope / np.where(is_bent, bend, 1), 0), 0, 1)
     return np.asarray(cubic[..., 1:3, :])
 
 
 def _direction(cubic: Floats) -> Floats:
     """Return unit vectors in which cubics begin; 0 for cubics without extent. Shape (..., 1, 2)."""
-    ways = cubic[..., 1:, :] - cubic[..., :1, :]
-    lengths = np.linalg.norm(ways, axis=-1)[..., None]
-    first = (lengths > LEAST).argmax(axis=-2)[..., None]
-    way, length = (np.take_along_axis(x, first, axis=-2) for x in (ways, lengths))
-    return np.where(length > LEAST, way / np.maximum(length, LEAST), 0.0)
+    offsets = cubic[..., 1:, :] - cubic[..., :1, :]
+    lengths = np.linalg.norm(offsets, axis=-1)[..., None]
+    first = (lengths > LEAST_LENGTH).argmax(axis=-2)[..., None]
+    offset, length = (np.take_along_axis(x, first, axis=-2) for x in (offsets, lengths))
+    return np.where(length > LEAST_LENGTH, offset / np.maximum(length, LEAST_LENGTH), 0.0)

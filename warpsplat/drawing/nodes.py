@@ -24,13 +24,13 @@ from warpsplat.scene.joints import Joint
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
-MOST_OFF = 0.6  # [canvas units] that a candidate may move an outline, where bytes have their usual price
-STEEP = 0.06  # slope below which a line, or a tangent, may be made level or upright
+MOST_DISTANCE = 0.6  # [canvas units] that a candidate may move an outline, where bytes have their usual price
+LEVEL_SLOPE = 0.06  # slope below which a line, or a tangent, may be made level or upright
 CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
-"""What a cubic, a line, the handles of a cubic and a number take in a file."""
+"""Bytes of a cubic, a line, the handles of a cubic and a number in a file."""
 
 Key = tuple[str, int, int]
-AT_ONCE = 512  # candidates that are measured at once, which bounds their memory to some megabytes
+CUBICS_AT_ONCE = 512  # candidates that are measured at once, which bounds their memory to some megabytes
 
 
 def key_of(kind: str, at: tuple[float, float]) -> Key:
@@ -46,7 +46,7 @@ class Edit:
     at: tuple[float, float]
     """Where it is [canvas units]."""
     cells: Cells
-    """What it may change."""
+    """Cells that it may change."""
     off: float
     """How far it moves the outline, about [canvas units]."""
     saved: int
@@ -89,7 +89,7 @@ def turned(drawing: Drawing) -> Drawing:
 class Outlines:
     """A drawing's outlines by the numbers of their points; the points of several shapes share places."""
 
-    def __init__(self, drawing: Drawing, reach: float = MOST_OFF) -> None:
+    def __init__(self, drawing: Drawing, reach: float = MOST_DISTANCE) -> None:
         """``reach``: how far a candidate may move an outline [canvas units]."""
         self._reach = reach
         self._size = (drawing.scene.canvas.width, drawing.scene.canvas.height)
@@ -159,7 +159,7 @@ class Outlines:
         return dict(zip(self._on, cells_around(cubics), strict=True))
 
     def _cells(self, *starts: int) -> Cells:
-        """Return the cells around the cubics that begin at ``starts``, and those that turn with them."""
+        """Return the cells around the cubics that begin at ``starts``, and those that change with them."""
         wide = set(starts)
         for a in starts:
             if self._is_smooth[a]:
@@ -234,10 +234,10 @@ class Outlines:
     def _sloping(self) -> dict[int, tuple[int, float]]:
         """Find the lines that are nearly level or upright: in which axis their ends differ, and how much."""
         starts = np.array([a for a in self._on if self._is_line[a]], np.intp)
-        ways = np.abs(self._points[[self._next[a] for a in starts.tolist()]] - self._points[starts])
-        off, along = ways.min(axis=1), ways.max(axis=1)
-        near = (off >= SAME_COORDINATE) & (off <= np.minimum(STEEP * along, self._reach))
-        return _by_point(near, starts, ways.argmin(axis=1), off)
+        offsets = np.abs(self._points[[self._next[a] for a in starts.tolist()]] - self._points[starts])
+        off, along = offsets.min(axis=1), offsets.max(axis=1)
+        near = (off >= SAME_COORDINATE) & (off <= np.minimum(LEVEL_SLOPE * along, self._reach))
+        return _by_point(near, starts, offsets.argmin(axis=1), off)
 
     def _level_line(self, a: int, axis: int, off: float) -> Edit | None:
         """Return the edit that makes a line level or upright; None if both of its ends are held."""
@@ -278,12 +278,12 @@ class Outlines:
         joints = np.array([p for p in smooth if not self._is_line[self._previous[p]]], np.intp)
         before = np.array([self._previous[p] for p in joints.tolist()], np.intp)
         handles = self._points[np.stack([before + 2, joints + 1], axis=1)]
-        ways = np.abs(handles - self._points[joints][:, None])
-        axes = ways.sum(axis=1).argmin(axis=1)
-        across = np.take_along_axis(ways, axes[:, None, None], axis=2)[..., 0]
-        along = np.take_along_axis(ways, 1 - axes[:, None, None], axis=2)[..., 0]
+        offsets = np.abs(handles - self._points[joints][:, None])
+        axes = offsets.sum(axis=1).argmin(axis=1)
+        across = np.take_along_axis(offsets, axes[:, None, None], axis=2)[..., 0]
+        along = np.take_along_axis(offsets, 1 - axes[:, None, None], axis=2)[..., 0]
         off = across.max(axis=1)
-        near = (off >= SAME_COORDINATE) & (across <= STEEP * along).all(axis=1)
+        near = (off >= SAME_COORDINATE) & (across <= LEVEL_SLOPE * along).all(axis=1)
         return _by_point(near, joints, axes, off)
 
     def _level_tangent(self, p: int, axis: int, off: float) -> Edit:
@@ -312,11 +312,11 @@ def _apart(made: Floats, *pieces: Floats) -> Floats:
     t = np.linspace(0, 1, 17)
     samples = np.concatenate([points_at(piece, t[1:-1:2]) for piece in pieces], axis=1)
     found = []
-    for first in range(0, len(made), AT_ONCE):
-        curve = points_at(made[first : first + AT_ONCE], t)[:, None]
-        ways = np.diff(curve, axis=2)
-        behind = samples[first : first + AT_ONCE, :, None] - curve[:, :, :-1]
-        along = (behind * ways).sum(axis=3) / np.maximum((ways**2).sum(axis=3), 1e-12)
-        apart = behind - np.clip(along, 0, 1)[..., None] * ways
+    for first in range(0, len(made), CUBICS_AT_ONCE):
+        curve = points_at(made[first : first + CUBICS_AT_ONCE], t)[:, None]
+        offsets = np.diff(curve, axis=2)
+        behind = samples[first : first + CUBICS_AT_ONCE, :, None] - curve[:, :, :-1]
+        along = (behind * offsets).sum(axis=3) / np.maximum((offsets**2).sum(axis=3), 1e-12)
+        apart = behind - np.clip(along, 0, 1)[..., None] * offsets
         found.append(np.linalg.norm(apart, axis=3).min(axis=2).max(axis=1))
     return np.concatenate(found)

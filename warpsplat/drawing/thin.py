@@ -10,16 +10,16 @@ import numpy as np
 from warpsplat.fit.loop import Fit
 from warpsplat.scene import FloatArray, Scene
 
-THIN = 16
+THIN_SIDE = 16
 """Most rows or columns of an image in which tracing may miss regions: edges take a pixel on each side."""
 
-THINNEST = 4
+THINNEST_SIDE = 4
 """Most rows or columns of an image in which tracing may miss lines too."""
 
 BEYOND = 4
-"""How far a thin image is continued [px]: regions and lines are told apart within less."""
+"""How far a thin image is continued [px]: regions and lines are distinguished within less."""
 
-SEEN = 30.0
+TRACED_PSNR = 30.0
 """PSNR from which on a thin image counts as traced [dB]; below, regions were missed."""
 
 
@@ -54,7 +54,7 @@ def best_of_thin(first: Fit, others: Sequence[Callable[[], Fit]]) -> Fit:
     """Return the first of some drawings that shows the image; the best of all if none does."""
     best = first
     for draw in others:
-        if best.render_psnr >= SEEN:
+        if best.render_psnr >= TRACED_PSNR:
             break
         made = draw()
         best = made if made.render_psnr > best.render_psnr else best

@@ -1,4 +1,4 @@
-"""Finish a traced drawing: fit it, remove nodes that nobody would miss, and round it to a cheap grid."""
+"""Finish a traced drawing: fit it, remove needless nodes, and round it to a cheap grid."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from warpsplat.alpha import squares
 from warpsplat.drawing.cells import by_cell, first_apart, sum_within
 from warpsplat.drawing.fit_outlines import Refinement, matching, refine_drawing
-from warpsplat.drawing.nodes import MOST_OFF, Edit, Key, Outlines, applied, turned
+from warpsplat.drawing.nodes import MOST_DISTANCE, Edit, Key, Outlines, applied, turned
 from warpsplat.fit.constraints import Constraints, Drawing, Projection
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import STAGED_COST, byte_worth
@@ -25,7 +25,7 @@ from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
-ROUNDS, FEWEST_ROUNDS = 16, 4
+TIDY_ROUNDS, FEWEST_ROUNDS = 16, 4
 """Most rounds in which edits are tried, and how many are left of these for large images."""
 
 ROUND_PIXELS = 26_000_000
@@ -34,14 +34,14 @@ ROUND_PIXELS = 26_000_000
 REFIT = Refinement(steps=50, point_rate=0.1)
 """Refinement after each round."""
 
-LARGE = 100_000
+LARGE_PIXELS = 100_000
 """Size from which on half of these steps suffice [pixels]."""
 
 LEAST_ERROR = 3e-5
 """Mean squared error below which differences do not count: 45 dB. A drawing can reach much less, by nodes
 that nobody would miss."""
 
-USUAL_GRID = 10.0
+DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
 FARTHEST_OFF = 4.0
@@ -93,7 +93,7 @@ def finish_drawing(
     """
     target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
-        return Finished(drawing, min(USUAL_GRID, finest))
+        return Finished(drawing, min(DRAFT_GRID, finest))
     first, second = Refinement() if price == 1 else REFIT, replace(REFIT, steps=2 * REFIT.steps)
     drawing = refine_drawing(target, drawing, run.part(0.0, FIRST_END), first)
     if tidy:
@@ -125,7 +125,7 @@ def tidied(target: FloatArray, drawing: Drawing, run: Run, price: float = 1.0) -
         edits = apart(Outlines(drawing, reach_at(price)).edits(refused))
         if not edits or run.over():
             break
-        size = len(write_svg(drawing.scene, per_pixel=USUAL_GRID))
+        size = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
         worth = price * worth_of(errors, size)
         growth = judge.errors(applied(drawing, edits)) - errors
         left = [e for e in edits if sum_within(growth, e.cells) <= RECOVERED * e.saved * worth]
@@ -149,17 +149,17 @@ def tidied(target: FloatArray, drawing: Drawing, run: Run, price: float = 1.0) -
 
 def reach_at(price: float) -> float:
     """Return how far an edit may move an outline [canvas units]: the error grows with the square of that."""
-    return min(MOST_OFF * math.sqrt(price), FARTHEST_OFF)
+    return min(MOST_DISTANCE * math.sqrt(price), FARTHEST_OFF)
 
 
 def after_round(pixels: int) -> Refinement:
     """Return how a drawing on an image of so many pixels is refitted after each round."""
-    return replace(REFIT, steps=REFIT.steps // 2) if pixels > LARGE else REFIT
+    return replace(REFIT, steps=REFIT.steps // 2) if pixels > LARGE_PIXELS else REFIT
 
 
 def rounds_for(pixels: int) -> int:
     """Return the most rounds for an image of so many pixels."""
-    return max(FEWEST_ROUNDS, min(ROUNDS, ROUND_PIXELS // pixels))
+    return max(FEWEST_ROUNDS, min(TIDY_ROUNDS, ROUND_PIXELS // pixels))
 
 
 class Judge:
@@ -170,7 +170,7 @@ class Judge:
         self._viewport = Viewport(target.shape[1], target.shape[0])
         self._target = to_tiles(target)
         self.capacity: Capacity | None = None
-        """Of a renderer into which the last drawing fits, and likely the next."""
+        """Capacity of a renderer that the last drawing fits into, and likely the next."""
 
     def errors(self, drawing: Drawing) -> Floats:
         """Return the share of each cell in the mean squared error, as ``by_cell``."""
@@ -201,7 +201,7 @@ def drawing_grid(
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     judge = Judge(target, backend)
     errors = judge.errors(drawing)
-    worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=USUAL_GRID)))
+    worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=DRAFT_GRID)))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(drawing, scene=rounded(drawing.scene, grid))

@@ -1,4 +1,4 @@
-"""Choosing the number of steps so that a fit ends at its deadline."""
+"""How many steps fit into the time of a fit, and how many shapes into the bytes of its file."""
 
 from __future__ import annotations
 
@@ -18,10 +18,26 @@ TIMED_STEPS = 4
 """Steps that are timed at each size."""
 
 BUDGET_MARGIN = 1.25
-"""Time of a step with its update and its share of surgery, over the time measured without."""
+"""Time of a step with its update and its share of densification, over the time measured without."""
 
 MAX_ITERATIONS = 20_000
 """Most steps of a fit with a deadline: more gain nothing."""
+
+
+HEAD_BYTES = 150
+"""Bytes of a file without its shapes."""
+
+STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
+"""Bytes of a shape without its coordinates."""
+
+FRACTION_BYTES = 1.6
+"""Bytes of a number without its digits before the point."""
+
+SPARE_CURVES = 1.3
+"""Trained shapes over those expected to fit: the excess is removed with the surplus."""
+
+SHRINKAGE = 0.92
+"""Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser."""
 
 
 class Budget:
@@ -46,12 +62,9 @@ class Budget:
         return self.fit(settings, 0, 1.0)
 
     def fit(self, settings: Settings, done: int, slowness: float) -> Settings:
-        """Return ``settings`` with as many steps as end by the deadline, ``done`` of which are made.
+        """Return ``settings`` with as many steps as end by the deadline, after ``done`` steps.
 
-        Args:
-            settings: of the fit.
-            done: steps so far.
-            slowness: actual time of a step over the one measured.
+        ``slowness``: actual time of a step over the one measured.
         """
         coarse = settings.coarse if len(self.costs) == 2 else 0.0
         mean = coarse * self.costs[0] + (1 - coarse) * self.costs[-1]
@@ -62,22 +75,6 @@ class Budget:
         return replace(settings, iterations=min(max(iterations, done, CHECK_INTERVAL), MAX_ITERATIONS))
 
 
-HEAD_BYTES = 150
-"""Bytes of a file besides its shapes."""
-
-STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
-"""Bytes of a shape besides its coordinates."""
-
-SEPARATOR = 1.6
-"""Bytes of a number besides the digits of whole pixels."""
-
-SPARE_CURVES = 1.3
-"""Trained shapes over those expected to fit: the excess is removed with the surplus."""
-
-LATER = 0.92
-"""Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser."""
-
-
 def affordable_curves(settings: Settings, width: int, height: int) -> int:
     """Return how many shapes fit into ``max_bytes`` on a canvas of ``width`` x ``height`` px, and a few more.
 
@@ -85,18 +82,18 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
     """
     assert settings.max_bytes
     numbers = 4 + 2 * settings.density.mean_points
-    room = settings.max_bytes - HEAD_BYTES
+    available = settings.max_bytes - HEAD_BYTES
     count = float(settings.curves)
     for _ in range(8):  # settles within a shape
         digits = max(0.0, 0.5 * float(elementary.log10(width * height / max(count, 1.0))))
-        count = max(0.0, room / (STYLE_BYTES[settings.kind] + numbers * (SEPARATOR + digits)))
+        count = max(0.0, available / (STYLE_BYTES[settings.kind] + numbers * (FRACTION_BYTES + digits)))
     return max(1, min(settings.curves, round(SPARE_CURVES * count)))
 
 
 def affordable(step: Step) -> Settings:
     """Return the settings of a fit whose surplus is being removed, with as many shapes as fit ``max_bytes``.
 
-    A shape counts by its present bytes, less those of the points that it is still to lose.
+    A shape counts by its present bytes, less those of the points that it will lose.
     """
     settings, state = step.settings, step.state
     assert settings.max_bytes
@@ -113,5 +110,5 @@ def affordable(step: Step) -> Settings:
         points = float(scene.point_counts()[splines].mean())
         lost = max(0.0, points - mean_points_at(settings, settings.iterations)) / (points + 2)
         per_shape -= lost * max(per_shape - STYLE_BYTES[settings.kind], 0.0)
-    room = round((settings.max_bytes - HEAD_BYTES) / max(LATER * per_shape, 1.0))
-    return replace(settings, curves=min(settings.curves, max(room, 1)))
+    count = round((settings.max_bytes - HEAD_BYTES) / max(SHRINKAGE * per_shape, 1.0))
+    return replace(settings, curves=min(settings.curves, max(count, 1)))

@@ -40,12 +40,8 @@ def clear_empty(
 ) -> Scene:
     """Move points so that the file shows nothing where the image is empty.
 
-    Args:
-        scene: on a transparent canvas; it is rounded as in the file.
-        target: premultiplied with opacity, shape (height, width, 4).
-        settings: of the file.
-        backend: where to compute.
-        per_pixel: units of the file's view box per pixel.
+    ``scene`` is on a transparent canvas, and is rounded as in the file; ``target`` is premultiplied with
+    opacity, shape (height, width, 4).
     """
     empty = target[..., 3] == 0
     for picture in scene.pictures:  # which are drawn as they are

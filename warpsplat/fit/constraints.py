@@ -24,7 +24,7 @@ SAME_COORDINATE = 1e-3
 """Difference [canvas units] below which coordinates are equal, like those of the ends of an upright line."""
 
 MAX_LEVERAGE = 8.0
-"""Maximum length of a handle that a line directs, in lengths of the line: rounding would turn longer ones."""
+"""Maximum length of a handle that a line directs, in lengths of the line: rounding rotates longer ones."""
 
 BEFORE, AFTER = 1, 2
 """Flags of the neighbours of a smooth joint that are free handles; another one is the far end of a line."""
@@ -287,7 +287,7 @@ class Projection:
         program.launch(kernels.lay, p.point_count, p.arrays, self._arrays)
 
     def record_adjoint(self, program: Program) -> None:
-        """Record the adjoint of the projection, which turns gradients into those of the free coordinates."""
+        """Record the adjoint of the projection, which maps gradients to those of the free coordinates."""
         p, group = self._parameters, self._parameters.groups["points"]
         program.launch(kernels.lay_backward, p.point_count, p.arrays, self._arrays)
         program.launch(kernels.spread_backward, self._ties, self._arrays, grad=group.grad)

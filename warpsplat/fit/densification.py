@@ -22,6 +22,12 @@ SURPLUS_ROUNDS = 4
 gone."""
 
 
+BoolArray = npt.NDArray[np.bool_]
+
+PAIRS_PER_CHUNK = 1 << 18
+"""Pairs of shapes that ``duplicates`` compares at once, to bound its memory."""
+
+
 def densify(step: Step, *, grows: bool) -> Step:
     """Prune, grow and, by the settings, repaint and reorder the shapes; return the step for the new ones.
 
@@ -87,7 +93,7 @@ def remove_surplus(step: Step, count: int) -> Step:
 
 
 def _kept(step: Step, scene: Scene, costs: FloatArray, wanted: int) -> IndexArray:
-    """Return the shapes that stay where ``wanted`` are to be there; all of earlier levels do."""
+    """Return the shapes to keep so that there will be ``wanted``, among them all of earlier levels."""
     settings, base = step.settings, step.state.base
     pruned = prune_mask(scene, settings.density, step.state.step / settings.iterations)
     pruned[:base] = False
@@ -114,12 +120,6 @@ def _reduce_points(step: Step, costs: FloatArray) -> None:
     worth = np.full(len(scene), np.inf, np.float32)
     worth[: len(costs)] = np.maximum(costs, 0) / np.maximum(areas(scene)[: len(costs)], 1.0)
     state.parameters.reshape(*simplify(scene, worth, excess))
-
-
-BoolArray = npt.NDArray[np.bool_]
-
-PAIRS_PER_CHUNK = 1 << 18
-"""Pairs of shapes that ``duplicates`` compares at once, to bound its memory."""
 
 
 def prune_mask(scene: Scene, density: Density, progress: float) -> BoolArray:
@@ -170,3 +170,42 @@ def choose_removed(pruned: BoolArray, count: int, costs: FloatArray) -> IndexArr
     """Return ``count`` shapes to remove: all ``pruned`` ones, then those with the least removal ``costs``."""
     rank = np.lexsort((costs, ~pruned))
     return np.asarray(rank[: max(count, int(pruned.sum()))])
+
+
+def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:
+    """Reset the shapes in which an update met a number that is not finite; return the step to continue with.
+
+    These are the shapes that hold such a number, or else those whose gradients were not finite. They get the
+    values that they had after the last densification step, or at the start.
+
+    If ``replaces``, new shapes where the error is take their place, as in densification. If ``last``, all
+    values are checked, frozen ones too.
+    """
+    state, parameters = step.state, step.state.parameters
+    flagged = parameters.take_broken()
+    if not (last or flagged.any()):
+        return step
+    invalid = parameters.invalid()
+    if not (invalid | flagged).any():
+        return step
+    scene = state.scene()
+    reset = _with_twins(scene, invalid if invalid.any() else flagged)
+    state.recovered += int(reset.sum())
+    parameters.reset(reset)
+    if state.projection:
+        state.projection.project()
+    step.render()
+    reset[: state.base] = False
+    if not (replaces and reset.any()):
+        return step
+    replace_shapes(step, scene, np.flatnonzero(~reset), scene.take(np.arange(0)), len(scene))
+    return step.rebuilt()
+
+
+def _with_twins(scene: Scene, shapes: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return ``shapes`` and those that share their points."""
+    both = shapes.copy()
+    second = np.flatnonzero(scene.twin == 1)
+    either = shapes[second] | shapes[second - 1]
+    both[second[either]] = both[second[either] - 1] = True
+    return both

@@ -25,6 +25,17 @@ RADIUS_RATIO = 1.2
 """Radius of a new shape over that of the largest circle in its component of the error."""
 
 
+MIN_ASPECT = 8.0
+"""Length over width of a component that gets a stroke: on shorter ones fills are as good
+(docs/experiments.md)."""
+
+MIN_STROKE_SHARE = 0.8
+"""Minimum share of the component that a stroke has to cover ..."""
+
+MIN_ADVANTAGE = 2.0
+"""... and minimum ratio of that share to the one that a fill covers."""
+
+
 @dataclass(frozen=True)
 class Candidates:
     """Places for new shapes, lengths in pixels; each array has shape (candidate,) but ``centres``."""
@@ -32,15 +43,15 @@ class Candidates:
     centres: FloatArray
     """Shape (candidate, 2)."""
     radii: FloatArray
-    """Of a circle, for a fill."""
+    """Radius of a circle, for a fill."""
     masses: FloatArray
     """Error that a shape would cover."""
     angles: FloatArray
-    """Of a stroke [rad]."""
+    """Direction of a stroke [rad]."""
     lengths: FloatArray
-    """Of a stroke; 0 for a fill."""
+    """Length of a stroke; 0 for a fill."""
     widths: FloatArray
-    """Of a stroke."""
+    """Width of a stroke."""
 
 
 def new_shapes(
@@ -156,17 +167,6 @@ def _without_overlap(found: Candidates, size: tuple[int, ...], count: int) -> li
         dx, dy = round(half * float(elementary.cos(angle))), round(half * float(elementary.sin(angle)))
         cv2.line(covered, (x - dx, y - dy), (x + dx, y + dy), 1, max(1, round(float(found.widths[i]))))
     return chosen
-
-
-MIN_ASPECT = 8.0
-"""Length over width of a component that gets a stroke: on shorter ones fills are as good
-(docs/experiments.md)."""
-
-MIN_STROKE_SHARE = 0.8
-"""Minimum share of the component that a stroke has to cover ..."""
-
-MIN_ADVANTAGE = 2.0
-"""... and minimum ratio of that share to the one that a fill covers."""
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.fit.budget import Budget, affordable
-from warpsplat.fit.densification import densify, remove_surplus
+from warpsplat.fit.checkpoint import Content, real, whole
+from warpsplat.fit.densification import densify, recover, remove_surplus
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.recover import recover
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.rounding import (
     choose_grid,
@@ -36,7 +36,6 @@ from warpsplat.fit.schedule import (
     shapes_at,
 )
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import Content, real, whole
 from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
 from warpsplat.scene import Scene
@@ -51,9 +50,9 @@ class Fit:
     per_pixel: float
     """View box units per pixel that the scene is rounded to, or may be."""
     render_psnr: float
-    """Of the last training render, at its size [dB]."""
+    """PSNR of the last training render, at its size [dB]."""
     estimated_psnr: float
-    """PSNR by the last step's loss [dB]: once the file is inspected, an estimate of the file's."""
+    """PSNR by the last step's loss [dB]: once the file is evaluated, an estimate of the file's."""
     iterations: int
     """Steps done."""
     interrupted: bool
@@ -63,7 +62,7 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What a fit starts from; by default new shapes, as many as the settings ask for."""
+    """Shapes that a fit starts from; by default new ones, as many as the settings ask for."""
 
     scene: Scene | None = None
     """Shapes whose number stays, unless they have a ``past``."""
@@ -92,12 +91,12 @@ def fit(
 
     Args:
         problem: the image and settings.
-        run: how the work is carried out. Where its ``stages`` hold this fit, it continues from there.
+        run: how the work is carried out. If its ``checkpoint`` holds this fit, it continues from there.
         start: shapes to start from.
         rounding: how coordinates are rounded; None: no file is made of the result, nothing is rounded.
 
     Raises:
-        CheckpointError: the run's ``stages`` hold what cannot be the state of this fit.
+        CheckpointError: the run's ``checkpoint`` holds something else than the state of this fit.
     """
     start = start or Start()
     settings, image = problem.settings, problem.target
@@ -106,27 +105,29 @@ def fit(
     palette = Palette.of(settings, image)
     if palette:
         scene = replace(scene, canvas=palette.canvas(scene.canvas))
-    stage = run.stages.begin() if run.stages else None
-    if stage and stage.result:
-        with stage.reading():
-            return _fit_from(stage.result, scene)
+    checkpoint = run.checkpoint
+    if checkpoint:
+        checkpoint.begin()
+        if checkpoint.result:
+            with checkpoint.reading():
+                return _fit_from(checkpoint.result, scene)
     training = _Training(problem, run, start, rounding, palette)
-    if stage and stage.state:
-        with stage.reading():
-            training.resume(stage.state, scene)
+    if checkpoint and checkpoint.state:
+        with checkpoint.reading():
+            training.resume(checkpoint.state, scene)
     else:
         training.begin(scene, rng)
     while True:
         interrupted = run.stopped()
-        if stage and not training.is_over():
-            stage.keep(lambda: step_content(training.step), now=interrupted)
+        if checkpoint and not training.is_over():
+            checkpoint.keep(lambda: step_content(training.step), now=interrupted)
         if interrupted or training.is_over():
             break
         training.adjust()
         training.advance()
     made = training.result()
-    if stage and training.is_over():
-        stage.finish(_fit_content(made))
+    if checkpoint and training.is_over():
+        checkpoint.finish(_fit_content(made))
     return replace(made, interrupted=interrupted)
 
 
@@ -143,7 +144,7 @@ class _Training:
         self.plan = phases(self.settings, *problem.size)
         finest = Target(self.image, self.plan[-1]).image
         self.weights = pixel_weights(finest, problem.importance, self.settings.texture)
-        """Of the pixels at the finest size."""
+        """Weights of the pixels at the finest size."""
         self.grows = start.scene is None or start.past is not None
         """Whether the number of shapes follows the schedule."""
         self.base = len(start.below) if start.below else 0
@@ -195,11 +196,11 @@ class _Training:
         """Find numbers that are not finite before the values are used."""
         step, settings, done = self.step, self.step.settings, self.step.state.step
         if self._is_due() or done % CHECK_INTERVAL == 0 or stage_at(settings, done) is not None:
-            surgical = done < settings.density.stop * settings.iterations
-            self.step = recover(step, replaces=self.grows and surgical)
+            densifies = done < settings.density.stop * settings.iterations
+            self.step = recover(step, replaces=self.grows and densifies)
 
     def _is_due(self) -> bool:
-        """Return whether it is time for surgery."""
+        """Return whether a densification step is due."""
         interval = self.step.settings.density.interval
         return interval > 0 and self.step.state.step % interval == 0
 
@@ -216,24 +217,24 @@ class _Training:
         return Progress(done, settings.iterations, step.psnr(), seconds, work, fine, shapes, snapshot)
 
     def adjust(self) -> None:
-        """Do what is due after the steps so far: rounding, an inspection of the file, surgery."""
+        """Do what is due after the steps so far: rounding, an evaluation of the file, densification."""
         step = self.step
         state, settings, done = step.state, step.settings, step.state.step
         if self.rounding:
             self._round(self.rounding)
-        # Kept elements may look different in the viewer from the start: they blend with what lies below.
+        # A viewer may show kept elements differently from the start: they blend with what lies below.
         blends = bool(self.start.scene and self.start.scene.pictures)
         late = blends or done >= EVALUATE_FROM * settings.iterations
-        inspects = settings.viewer and self.rounding and step.target.phase is self.plan[-1] and late
-        if inspects and not state.rounding and done % EVALUATE_INTERVAL == 0:
+        evaluates = settings.viewer and self.rounding and step.target.phase is self.plan[-1] and late
+        if evaluates and not state.rounding and done % EVALUATE_INTERVAL == 0:
             evaluate_file(step)
         due = self._is_due()
         if due:
             self._fit_goals()
         settings = step.settings
         missing = self.grows and state.parameters.shape_count != state.base + settings.curves
-        surgical = missing or done < settings.density.stop * settings.iterations
-        if due and done < settings.iterations and surgical:
+        densifies = missing or done < settings.density.stop * settings.iterations
+        if due and done < settings.iterations and densifies:
             self.step = densify(step, grows=self.grows)
 
     def _round(self, rounding: Rounding) -> None:
@@ -301,21 +302,21 @@ def work_done(settings: Settings, plan: list[Phase], step: int, begin: int = 0) 
     return (work(step) - work(begin)) / (work(settings.iterations) - work(begin))
 
 
-MOST = 1_000_000_000
+SAVED_LIMIT = 1_000_000_000
 """Largest figure that is read from a checkpoint."""
 
-FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
+SAVED_FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
 
 
 def _fit_content(made: Fit) -> Content:
     """Return a result as numbers and arrays."""
-    numbers = {name: getattr(made, name) for name in (*FIGURES, "iterations", "renewed")}
+    numbers = {name: getattr(made, name) for name in (*SAVED_FIGURES, "iterations", "renewed")}
     return Content(numbers, to_arrays(made.scene))
 
 
 def _fit_from(content: Content, start: Scene) -> Fit:
     """Return the result of a fit that began with ``start``."""
-    figures = {name: real(content.numbers, name, -MOST, MOST) for name in FIGURES}
-    iterations, renewed = (whole(content.numbers, name, 0, MOST) for name in ("iterations", "renewed"))
+    figures = {name: real(content.numbers, name, -SAVED_LIMIT, SAVED_LIMIT) for name in SAVED_FIGURES}
+    iterations, renewed = (whole(content.numbers, name, 0, SAVED_LIMIT) for name in ("iterations", "renewed"))
     scene = from_arrays(content.arrays, start)
     return Fit(scene, iterations=iterations, interrupted=False, renewed=renewed, **figures)

@@ -73,7 +73,7 @@ class LossTarget:
 
 @dataclass(frozen=True)
 class LossInputs:
-    """What a loss may read."""
+    """Inputs of the losses."""
 
     renderer: Renderer
     target: LossTarget
@@ -167,9 +167,7 @@ def image_program(inputs: LossInputs) -> Program:
 def level_programs(inputs: LossInputs, whole: Parameters) -> tuple[Program, ...]:
     """Return programs that render a level, compare, back-propagate and add the gradients to the scene's.
 
-    Args:
-        inputs: of the level, its renderer that of the first shapes.
-        whole: all shapes.
+    ``inputs`` are those of the level, with a renderer of the first shapes; ``whole`` are all shapes.
     """
     renderer = inputs.renderer
     add = renderer.backend.program("levels")

@@ -18,6 +18,22 @@ from typing import Any, Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 from warpsplat.errors import UsageError, shown
 
+DURATION_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
+
+SIZE_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
+
+TIME_UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
+
+SIZE_UNITS = {
+    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
+    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
+}
+
+MAX_DIGITS = 15
+"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
+
+PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
@@ -109,11 +125,7 @@ class Option:
 def option(default: Any, help: str = "", limits: tuple[float, float] | None = None, **declared: Any) -> Any:
     """Declare a dataclass's field with its option.
 
-    Args:
-        default: the field's default, or the function that makes it.
-        help: see ``Option``, as for all that follows.
-        limits: see there.
-        declared: further fields of ``Option``.
+    ``default`` is the field's default, or the function that makes it; all others are fields of ``Option``.
     """
     if callable(default):
         made = Option(default=default(), shown_default="", help=help, limits=limits, **declared)
@@ -164,19 +176,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {found[0]!r}?" if found else ""
 
 
-DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
-SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
-UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
-BYTES = {
-    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
-    **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
-}
-MAX_DIGITS = 15
-"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
-
-
 def _words(value: object) -> str:
-    """Return a text itself; of anything else as much as can be right."""
+    """Return a text as it is; anything else in short."""
     return value if isinstance(value, str) else shown(value)
 
 
@@ -190,10 +191,10 @@ def parse_duration(value: str | float) -> float:
     Raises:
         UsageError: none of these.
     """
-    found = DURATION.fullmatch(_words(value).strip())
+    found = DURATION_PATTERN.fullmatch(_words(value).strip())
     if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
         raise UsageError(f"not a time: {shown(value)}; write 60s or 2m")
-    return float(found[1]) * UNITS[(found[2] or "s").lower()]
+    return float(found[1]) * TIME_UNITS[(found[2] or "s").lower()]
 
 
 def parse_bytes(value: str | int) -> int:
@@ -202,10 +203,10 @@ def parse_bytes(value: str | int) -> int:
     Raises:
         UsageError: none of these.
     """
-    found = SIZE.fullmatch(_words(value).strip())
+    found = SIZE_PATTERN.fullmatch(_words(value).strip())
     if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
         raise UsageError(f"not a size: {shown(value)}; write 100KB, 1MB or 1GB")
-    return int(float(found[1]) * BYTES[(found[2] or "b").lower()])
+    return int(float(found[1]) * SIZE_UNITS[(found[2] or "b").lower()])
 
 
 def parse_levels(value: object) -> tuple[int, ...]:
@@ -219,9 +220,6 @@ def parse_levels(value: object) -> tuple[int, ...]:
         return tuple(int(str(part)) for part in parts)
     except ValueError as error:
         raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {shown(value)}") from error
-
-
-PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
 def parse_palette(value: object) -> tuple[str, ...]:

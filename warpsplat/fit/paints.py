@@ -33,7 +33,7 @@ SAME_COLOR = 2 / 255
 
 
 def choose_paints(step: Step) -> None:
-    """Give shapes gradients and take them back as the settings say, right after ``forward_complete``.
+    """Give shapes gradients, or flat colours again, by the settings; call right after ``forward_complete``.
 
     The state's arrays are replaced; the step's buffers stay as they are.
     """

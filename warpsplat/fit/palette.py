@@ -1,4 +1,4 @@
-"""Palettes: shapes that have few colours, each the one with the least error."""
+"""Limit shapes to a palette of few colours, and choose for each the one with the least error."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from warpsplat.scene.geometry import areas
 KMEANS_ROUNDS = 20
 
 CHOICE_INTERVAL = 5
-"""Steps between two choices of colours, each of which takes as long as a step."""
+"""Steps between two choices of colours; a choice takes as long as a step."""
 
 MIN_VISIBLE = 1e-6
 """Minimum sum of a shape's squared visibility [pixels] at which it chooses a colour."""
@@ -130,7 +130,7 @@ def mean_colors(scene: Scene) -> FloatArray:
 
 
 def solid_shapes(scene: Scene) -> IndexArray:
-    """Return the shapes that are more opaque than not, gradients in the mean of their stops."""
+    """Return the shapes of at least ``SOLID_OPACITY``; gradients have the mean of their stops."""
     stops = scene.stop_opacities * np.repeat(scene.opacities, np.diff(scene.stop_first))
     return np.flatnonzero(_mean(scene, scene.opacities, stops) >= SOLID_OPACITY)
 
@@ -148,10 +148,7 @@ def main_colors(colors: FloatArray, weights: IndexArray, count: int) -> FloatArr
 
     A colour that makes up most of its cluster represents the cluster as it is.
 
-    Args:
-        colors: sRGB in [0, 1], shape (color, 3).
-        weights: of the colours, shape (color,).
-        count: number of colours wanted.
+    ``colors``: sRGB in [0, 1], shape (color, 3); ``weights``: of the colours, shape (color,).
 
     Returns:
         shape (count or fewer, 3).

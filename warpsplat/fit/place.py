@@ -16,7 +16,7 @@ from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scen
 GRID_COVER = 1.3
 """Area of the first shapes over that of the canvas: circles on a grid then leave few gaps."""
 
-JITTER = 0.25
+GRID_JITTER = 0.25
 """Maximum offset of a first shape along each axis, in cells of the grid."""
 
 STROKE_CUBICS = 3
@@ -35,7 +35,7 @@ REDUCED_SIGMA = 128.0
 """Maximum standard deviation of its blur [px], whose cost grows with it."""
 
 COLOR_LEVELS = 32
-"""Levels of a channel by which flat colours are told apart."""
+"""Levels of a channel by which flat colours are distinguished."""
 
 FLAT_SHARE = 0.98
 """Minimum share of a flat image's pixels that have one of its few colours; the others antialias outlines."""
@@ -76,7 +76,7 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
     y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
     cell = np.sqrt(width * height / count)
-    centres = np.stack([x, y], axis=1) + rng.uniform(-JITTER, JITTER, (count, 2)) * cell
+    centres = np.stack([x, y], axis=1) + rng.uniform(-GRID_JITTER, GRID_JITTER, (count, 2)) * cell
     centres = np.clip(centres, 0, [width, height])
     small, span = reduced(target, cell / 2)
     blurred = filters.gaussian_blur(small, max(cell / span / 4, 0.5))

@@ -1,4 +1,4 @@
-"""The two things that every fit takes: what is fitted, and how the work is carried out."""
+"""The two arguments of every fit: the problem to solve, and the run, which carries out the work."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from warpsplat.fit.checkpoint import Checkpoint
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import Stages
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is fitted: everything that decides the result."""
+    """An image to fit and the settings: everything that decides the result."""
 
     target: FloatArray
     """The image, sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
@@ -41,10 +41,10 @@ class Problem:
 
 @dataclass(eq=False)
 class Run:
-    """How a problem is worked on: where, who is told of the progress, and when it ends.
+    """How a problem is worked on: the device, the callbacks, and when to end.
 
-    Work that consists of several fits gives each of them a run of its own, made by one of the methods below;
-    whatever such a run is told reaches the run that it was made from.
+    Work that consists of several fits gives each of them a run of its own, made by one of the methods below,
+    which passes its progress reports on to the run that it was made from.
     """
 
     backend: Backend
@@ -52,10 +52,10 @@ class Run:
     stop: Callable[[], bool] | None = None
     """Asked after every step; once true, the shapes as they are make the result."""
     deadline: float = math.inf
-    """When a fit has to end (``time.monotonic``): it takes as many steps as there is time for."""
-    stages: Stages | None = None
-    """Where the state is kept, for the run to be resumed; None with a deadline, which no two runs reach by
-    the same steps.
+    """Time at which a fit has to end (``time.monotonic``): it takes as many steps as there is time for."""
+    checkpoint: Checkpoint | None = None
+    """Keeps the state, so that the run can be resumed; None with a deadline, which no two runs reach in the
+    same number of steps.
     """
     started: float = field(default_factory=time.monotonic)
     _ended: bool = field(default=False, init=False)

@@ -1,4 +1,4 @@
-"""Progress of a run, as it is reported to people and programs."""
+"""Progress of a run, for people and programs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Progress:
     steps: int
     """Steps in all."""
     psnr: float
-    """Of the internal render at the current training size [dB]."""
+    """PSNR of the internal render at the current training size [dB]."""
     seconds: float
     """Since the run began."""
     work: float

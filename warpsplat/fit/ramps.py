@@ -62,9 +62,11 @@ class Slots:
     shape: npt.NDArray[np.int32]
     """Shape (slot,)."""
     x: Floats
-    """Of the columns, from the middle of the shape's box in halves of its longer side, shape (slot, TILE)."""
+    """Positions of the columns, from the middle of the shape's box in halves of its longer side, shape
+    (slot, TILE).
+    """
     y: Floats
-    """Of the rows, likewise."""
+    """Positions of the rows, likewise."""
     weight: FloatArray
     """Importance x visibility^2, shape (slot, TILE, TILE)."""
     pull: FloatArray

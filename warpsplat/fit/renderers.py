@@ -1,4 +1,4 @@
-"""What a fit asks of its renderer; the exact one, and those that extensions register."""
+"""Renderers as a fit uses them: the exact one, and those that extensions register."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ class FitRenderer:
     therefore given as well, and shapes cannot be sorted by where their outlines overlap."""
     opacity_scale: float = 1.0
     """Opacity of a path in the file over that of its shape."""
-    step_cost: tuple[float, float, float, float] | None = None
-    """Arguments of ``fit.costs.Law``; None: those of the exact renderer."""
     default_model: Model = EXACT_MODEL
     """The model for rendering only."""
     cannot_draw_files: str = ""
@@ -50,7 +48,7 @@ class FitRenderer:
         """Return any scene in a form that this renderer can draw.
 
         Raises:
-            ValueError: there is none; the message says what it has.
+            ValueError: there is none; the message names what it cannot draw.
         """
         return scene
 

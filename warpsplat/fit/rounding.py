@@ -43,6 +43,10 @@ OPAQUE_COST = 0.5
 """Cost of making a shape opaque after the others are refitted, over the cost at first."""
 
 
+DB_PER_DOUBLING = 1.8
+"""Gain from twice the shapes, and so twice the bytes, on photographs [dB] (docs/experiments.md)."""
+
+
 def stage_steps(settings: Settings) -> int:
     """Return the number of steps after each stage."""
     return max(1, round(STAGE_SHARE * settings.iterations))
@@ -71,10 +75,8 @@ def finest(settings: Settings) -> float:
 def choose_grid(step: Step, *, staged: bool, rate_distortion: bool = False) -> float:
     """Return the units per pixel of the coarsest grid that costs less than ``MAX_LOSS``.
 
-    Args:
-        step: with the scene.
-        staged: whether unrounded coordinates will be refitted.
-        rate_distortion: return the grid with the least cost instead, which counts the file's bytes too.
+    If ``staged``, unrounded coordinates will be refitted. With ``rate_distortion``, return the grid with
+    the least cost instead, which counts the file's bytes too.
     """
     state, renderer = step.state, step.renderer
 
@@ -142,10 +144,6 @@ def freeze_stage(step: Step, stage: int) -> None:
     parameters.assign(replace(scene, points=points, widths=low.widths))
     parameters.hold("points", frozen)
     parameters.hold("widths", np.ones(len(scene), np.bool_))
-
-
-DB_PER_DOUBLING = 1.8
-"""Gain from twice the shapes, and so twice the bytes, on photographs [dB] (docs/experiments.md)."""
 
 
 def byte_worth(square_error: float, size: int) -> float:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from warpsplat.fit.checkpoint import Content, flag, real, whole
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import Content, flag, real, whole
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.rendering.backend import Backend
@@ -20,7 +20,7 @@ from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.arrays import Array, between, typed
 
-SPARE_ROOM = 64
+SPARE_CAPACITY = 64
 """Largest capacity over what the shapes need: more than any run keeps from times when it had more shapes."""
 
 FINEST = 1e7
@@ -46,7 +46,7 @@ def step_content(step: Step) -> Content:
         "renewed": state.recovered,
         "colored": state.colored == state.parameters.revision,
         "generator": state.rng.bit_generator.state,
-        "room": [_room(renderer) for renderer in step.renderers],
+        "room": [_capacity(renderer) for renderer in step.renderers],
     }
     arrays = parameter_arrays(state.parameters)
     if step.loss_target.changed:
@@ -64,16 +64,10 @@ def step_from(
     begin: int,
     target: Callable[[Settings, int], Target],
 ) -> Step:
-    """Return the step of which ``step_content`` made ``content``.
+    """Return the step that ``step_content`` saved as ``content``.
 
-    Args:
-        content: from a file; it is checked.
-        start: scene that the fit began with.
-        settings: that it began with.
-        backend: where to compute.
-        base: shapes of earlier levels.
-        begin: step that it began at.
-        target: returns what the step after a number of steps is compared with.
+    The fit began with the scene ``start`` and ``settings`` at the step ``begin``; ``base`` is the number of
+    shapes of earlier levels, and ``target`` returns the target of the step after a number of steps.
 
     Raises:
         ValueError, TypeError, KeyError, OverflowError: it is not the state of such a fit.
@@ -99,18 +93,18 @@ def step_from(
         colored=parameters.revision if flag(numbers, "colored") else -1,
     )
     step = Step(state, settings, target(settings, done - 1), began=whole(numbers, "began", 0, done))
-    rooms = numbers["room"]
-    if not isinstance(rooms, list) or len(rooms) != len(step.renderers):
-        raise ValueError("room is not that of the renderers")
-    for renderer, room in zip(step.renderers, rooms, strict=True):
-        _take_room(renderer, room)
+    capacities = numbers["room"]
+    if not isinstance(capacities, list) or len(capacities) != len(step.renderers):
+        raise ValueError("room does not match the renderers")
+    for renderer, capacity in zip(step.renderers, capacities, strict=True):
+        _restore_capacity(renderer, capacity)
     if "target" in content.arrays:
         step.loss_target.assign(_target(content.arrays, step.target.image))
     step.record()
     return step
 
 
-def _room(renderer: Renderer) -> dict[str, int]:
+def _capacity(renderer: Renderer) -> dict[str, int]:
     capacity, needed = renderer.capacity_and_need()
     return {
         "samples": capacity.samples,
@@ -120,15 +114,15 @@ def _room(renderer: Renderer) -> dict[str, int]:
     }
 
 
-def _take_room(renderer: Renderer, room: Any) -> None:
+def _restore_capacity(renderer: Renderer, saved: Any) -> None:
     """Set the capacity: what does not fit is left out until the next check, as in the fit that was saved."""
-    if not isinstance(room, dict):
-        raise TypeError("room is no table")
+    if not isinstance(saved, dict):
+        raise TypeError("room is not a table")
     now, _ = renderer.capacity_and_need()
-    samples, slots = SPARE_ROOM * now.samples, SPARE_ROOM * now.slots
+    samples, slots = SPARE_CAPACITY * now.samples, SPARE_CAPACITY * now.slots
     renderer.restore_capacity(
-        Capacity(whole(room, "samples", 1, samples), whole(room, "slots", 1, slots)),
-        Capacity(whole(room, "needed samples", 0, samples), whole(room, "needed slots", 0, slots)),
+        Capacity(whole(saved, "samples", 1, samples), whole(saved, "slots", 1, slots)),
+        Capacity(whole(saved, "needed samples", 0, samples), whole(saved, "needed slots", 0, slots)),
     )
 
 

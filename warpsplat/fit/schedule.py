@@ -12,7 +12,7 @@ SIZE_CHOICES = 12
 """Lengths of the shorter side that are tried for a reduced image."""
 
 TRAINING_SLACK = 2.0
-"""``Phase.slack`` of a run: saves a fifth of the edges; 0.08 px is no more than what a viewer rounds."""
+"""``Phase.slack`` of a run: saves a fifth of the edges; a viewer rounds by 0.08 px as well."""
 
 CHECK_INTERVAL = 10
 """Steps between two reads of the loss and of the device's counters."""

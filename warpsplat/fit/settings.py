@@ -43,7 +43,7 @@ PRESETS: dict[Quality, dict[str, Any]] = {
     "balanced": {},
     "high": {"iterations": 4000, "coarse_pixels": 200_000, "fine_pixels": 3_000_000},
 }
-"""What each quality changes in the defaults."""
+"""Changes of the defaults by quality."""
 
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
@@ -51,7 +51,7 @@ DEFAULT_QUALITY: Quality = "balanced"
 
 COLOR = "#[0-9a-fA-F]{6}"
 
-MOST_COLORS = 256
+MOST_COLOR_COUNT = 256
 
 FRACTION = (0.0, 1.0)
 
@@ -59,6 +59,16 @@ WEIGHT = (0.0, 1e6)
 
 FITTED: tuple[Subject, ...] = ("auto", "photo")
 """Subjects of options that only fitted shapes have a use for."""
+
+
+LEVEL_FACTOR = 4
+"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
+
+LEAST_LEVEL_SHAPES = 8
+"""Least number of shapes of the first of these levels."""
+
+FILL_POINT_RATE = 6.0
+"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
 
 def default_rates() -> dict[str, float]:
@@ -134,7 +144,7 @@ class Density:
 
 @dataclass(frozen=True)
 class Settings:
-    """All that decides the result, besides the image. Fields without help follow from other options."""
+    """Everything but the image that decides the result. Fields without help follow from other options."""
 
     curves: int = option(
         512,
@@ -194,7 +204,9 @@ class Settings:
             ),
         ),
     )
-    colors: int | None = option(None, "No more than N colours; the fills are opaque then.", (1, MOST_COLORS))
+    colors: int | None = option(
+        None, "No more than N colours; the fills are opaque then.", (1, MOST_COLOR_COUNT)
+    )
     palette: tuple[str, ...] = option(
         (), "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS", parse=parse_palette
     )
@@ -303,7 +315,7 @@ class Settings:
 
     @property
     def counting(self) -> list[str]:
-        """Names of the options given that decide the number of shapes, besides ``curves``."""
+        """Names of the options given, other than ``curves``, that decide the number of shapes."""
         given = (("levels", self.levels), ("target-psnr", self.target_psnr), ("max-bytes", self.max_bytes))
         return [name for name, value in (*given, ("time-budget", self.time_budget)) if value]
 
@@ -329,7 +341,7 @@ class Settings:
 RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
     (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open do not go together"),
     (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and a palette do not go together"),
-    (lambda s: len(s.palette) > MOST_COLORS, f"palette has more than {MOST_COLORS} colours"),
+    (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
     (
         lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),
         "levels must be numbers of shapes that ascend, not {0.levels}",
@@ -346,27 +358,16 @@ subject follow from ``Option.subjects``, those with a renderer from ``FitRendere
 
 
 def solid_color(background: str) -> FloatArray | None:
-    """The colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if it names none."""
+    """Return the colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if none."""
     if not re.fullmatch(COLOR, background):
         return None
     return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
 
 
-LEVEL_FACTOR = 4
-"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
-
-LEAST_LEVEL = 8
-"""Shapes of the first of these levels, at the least."""
-
-
 def levels_of(curves: int) -> tuple[int, ...]:
     """Return up to three levels, the last with all the ``curves``."""
     levels = [curves // LEVEL_FACTOR**2, curves // LEVEL_FACTOR, curves]
-    return tuple(count for count in levels if count >= LEAST_LEVEL or count == curves)
-
-
-FILL_POINT_RATE = 6.0
-"""Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
+    return tuple(count for count in levels if count >= LEAST_LEVEL_SHAPES or count == curves)
 
 
 def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Settings:

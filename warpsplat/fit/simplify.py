@@ -58,9 +58,7 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
 def without(points: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
     """Compute splines without one of their points each.
 
-    Args:
-        points: shape (shape, point, 2).
-        closed: whether they are rings; the ends of chains stay where they are.
+    ``points``: shape (shape, point, 2). The ends of splines that are not ``closed`` stay where they are.
 
     Returns:
         for every point of every spline, where its two neighbours go if it is removed, shape

@@ -1,4 +1,4 @@
-"""Everything that a fit carries from step to step."""
+"""The state that a fit carries from step to step."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Past:
     """
 
     moments: Moments
-    """Of Adam."""
+    """First and second moments of Adam."""
     ages: npt.NDArray[np.int32]
     """Steps since each shape was placed, shape (shape,)."""
 
@@ -51,7 +51,7 @@ class FitState:
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: none so far."""
     recovered: int = 0
-    """How often a shape was reset because of a number that was not finite (``fit.recover``)."""
+    """How often a shape was reset because of a number that was not finite (``fit.densification``)."""
 
     @staticmethod
     def start(
@@ -62,7 +62,7 @@ class FitState:
         base: int = 0,
         past: Past | None = None,
     ) -> FitState:
-        """Return the state before the first step, ``step`` of which count as done."""
+        """Return the state before the first step, when ``step`` steps count as done."""
         clock = backend.array(wp.int32, 1)
         clock.fill_(step)
         known = (past.moments, past.ages) if past else (None, None)

@@ -208,7 +208,7 @@ class Step:
         return _decibels(difference.mean(dtype="float64") / 3)
 
     def snapshot(self) -> Snapshot:
-        """Return the current shapes and render, for people to look at."""
+        """Return the current shapes and render, for callbacks."""
         return Snapshot(self.state.scene, self.renderer.read_image, self.state.past)
 
 

@@ -33,7 +33,6 @@ class Splat(FitRenderer):
 
     exact = False
     opacity_scale = constants.PLATEAU
-    step_cost = (38.0, 0.59, 0.052, 0.85)
     default_model: Model = SplatModel()
 
     def preset(self, preset: Settings) -> Settings:
@@ -61,7 +60,6 @@ class Gaussian(Splat):
 
     soft = True
     opacity_scale = 1.0
-    step_cost = (14.0, 1.1, 0.075, 1.0)
     default_model = GaussianModel()
     cannot_draw_files = (
         "no SVG holds what the gaussian renderer draws: its paths have lost the opacity and softness of each "

@@ -18,14 +18,21 @@ from warpsplat.errors import OutputError, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output, write_atomically
 from warpsplat.files.packed import is_packed, pack, unpack
+from warpsplat.fit.checkpoint import SAVE_INTERVAL, Checkpoint, Content
 from warpsplat.fit.options import parse_duration
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import INTERVAL, Content, Stages
 from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 log = logging.getLogger(__name__)
+
+
+DIGESTS = ("image", "mask", "svg")
+"""Parts of ``identity`` that are digests."""
+
+VALUE_CHARACTERS = 40
+"""Characters of a value in a message."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +44,13 @@ class CheckpointFile:
     """Whether to resume from the checkpoint that is there; without one the run starts from the beginning."""
     overwrite: bool = False
     """Whether a run that is not resumed may replace what is there."""
-    every: float = INTERVAL
+    every: float = SAVE_INTERVAL
     """Time between two saves [s]."""
 
     def check(self, *others: Path) -> None:
         """Check before the work whether the file can be written, and may be.
 
-        Args:
-            others: files that it must not replace.
+        ``others``: files that it must not replace.
 
         Raises:
             UsageError: it cannot, is a file of another kind, or a checkpoint that was not asked for.
@@ -71,12 +77,10 @@ class CheckpointFile:
                 else f"{self.path}: exists and is not a checkpoint; --overwrite replaces it"
             )
 
-    def stages(self, run: Mapping[str, Any], backend: Backend) -> Stages:
-        """Return the stages that a run saves here, and is resumed from.
+    def open(self, run: Mapping[str, Any], backend: Backend) -> Checkpoint:
+        """Return the state that a run saves here, and is resumed from.
 
-        Args:
-            run: everything that decides its result (``identity``).
-            backend: where it is computed.
+        ``run``: everything that decides its result (``identity``).
 
         Raises:
             UsageError: the checkpoint is that of another run.
@@ -94,10 +98,10 @@ class CheckpointFile:
             except OutputError as error:  # hours of work are not to end for it
                 log.warning("%s: continues without it", error)
 
-        stages = Stages(str(self.path), write, self.every, saved)
-        if saved and stages.is_empty:
+        checkpoint = Checkpoint(str(self.path), write, self.every, saved)
+        if saved and checkpoint.is_empty:
             log.warning("%s: nothing to resume from: starts from the beginning", self.path)
-        return stages
+        return checkpoint
 
     def _read(self, run: Mapping[str, Any], device: str) -> Content:
         header, arrays = unpack(self.path)
@@ -139,13 +143,6 @@ def open_checkpoint(
     return made
 
 
-DIGESTS = ("image", "mask", "svg")
-"""Parts of ``identity`` that are digests."""
-
-SHOWN = 40
-"""Characters of a value in a message."""
-
-
 def identity(
     command: str,
     settings: Settings,
@@ -177,4 +174,4 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[t
         if isinstance(old, dict) and isinstance(new, dict):
             yield from differences(old, new)
         elif old != new:
-            yield name.replace("_", "-"), str(old)[:SHOWN], str(new)[:SHOWN]
+            yield name.replace("_", "-"), str(old)[:VALUE_CHARACTERS], str(new)[:VALUE_CHARACTERS]

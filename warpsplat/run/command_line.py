@@ -18,15 +18,15 @@ REFINE_ITERATIONS = 200
 
 
 def vectorize_command(settings: Settings, image: str, output: str, *further: str) -> str:
-    """Return the command that makes ``output`` of ``image`` with ``settings``; ``further``: words to add.
+    """Return the command that makes ``output`` of ``image`` with ``settings``; ``further``: further words.
 
-    If flags cannot express them, as for settings that only batch files have, a comment says so.
+    A comment follows if flags cannot express them, as with settings that only batch files have.
     """
     quality, given = flags_of(settings)
     line = shlex.join(
         ["warpsplat", "vectorize", as_path(image), *_words(quality, given), *further, "-o", output]
     )
-    return line if _settings(quality, given) == settings else f"{line}  # and settings that no flag says"
+    return line if _settings(quality, given) == settings else f"{line}  # and settings without a flag"
 
 
 def several_command(

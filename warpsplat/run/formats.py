@@ -24,7 +24,7 @@ def check_format(path: Path) -> None:
     """Check that what makes a file of this name is installed.
 
     Raises:
-        UsageError: it is not; the message says how it is.
+        UsageError: it is not; the message names the package.
     """
     if path.suffix.lower() == ".pdf" and importlib.util.find_spec(PDF_PACKAGE) is None:
         raise UsageError(
@@ -41,11 +41,7 @@ def is_picture(path: Path) -> bool:
 def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> bytes:
     """Return the bytes of a result's file, in the format of the name.
 
-    Args:
-        path: the file.
-        text: the SVG.
-        key: of the job that made it, for pictures; an SVG's text contains its own.
-        zoom: magnification of a picture.
+    ``key``: of the job that made it, for pictures, as an SVG's text contains its own; ``zoom``: of a picture.
 
     Raises:
         UsageError: see ``check_format``.

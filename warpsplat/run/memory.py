@@ -28,7 +28,7 @@ PROGRAM = 280 << 20
 STRIPS = 96 << 20
 """Bytes of work that is done strip by strip."""
 
-DRAWN = 96 << 20
+FILE_STRIPS = 96 << 20
 """Bytes of the strips of a file that are drawn side by side."""
 
 TRAINED = 160
@@ -43,7 +43,7 @@ SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 """Slots of a fit per tile, per root of tiles times shapes, and per shape."""
 
 SHAPE = 24 << 10
-"""Bytes per shape: its samples, surgery, its text."""
+"""Bytes per shape: its samples, densification, its text."""
 
 TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
@@ -51,7 +51,7 @@ TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 MASK_READ, MASK = 12, 4
 """Bytes per pixel of a mask: while it is read, and afterwards."""
 
-SHOWN, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
+FILE_PICTURE, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
 """Bytes per pixel of measuring a file: its picture, both images at half size, the same if a side is odd, and
 what a file adds that is not drawn in strips."""
 
@@ -66,12 +66,12 @@ CLEARED = 150
 """Bytes per pixel of finding pixels that should be empty (``fit.clear``), where an SVG is refined against an
 image with opacity."""
 
-LEAST_SIDE = 32
+LEAST_REDUCED_SIDE = 32
 """Least side of a reduced image [px]."""
 
 
 @dataclass(frozen=True)
-class Need:
+class MemoryNeed:
     """Memory that a run at one size needs [bytes]."""
 
     reading: int
@@ -85,14 +85,12 @@ class Need:
         return PROGRAM + max(self.reading, self.working, self.scoring)
 
 
-def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None) -> Need:
+def need(
+    facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None
+) -> MemoryNeed:
     """Estimate the memory of a run from above: within a quarter for photographs, more roughly for drawings.
 
-    Args:
-        facts: of the image.
-        settings: of the run.
-        factor: how many times smaller the image is read, in each direction.
-        mask: of importance.
+    ``factor``: how many times smaller the image is read, in each direction.
     """
     pixels = facts.width * facts.height
     worked = pixels / factor**2
@@ -108,7 +106,7 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
         whole = (mask.decoded + mask.kept) * mask.width * mask.height
         reading = max(reading, image + whole + (MASK_READ + MASK) * masked + STRIPS)
         working, scoring = working + MASK * masked, scoring + MASK * masked
-    return Need(*(round(x) for x in (reading, working, scoring)))
+    return MemoryNeed(*(round(x) for x in (reading, working, scoring)))
 
 
 def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
@@ -138,11 +136,11 @@ def _fitting(facts: ImageFacts, settings: Settings, factor: int) -> float:
 def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
     """Return the bytes of measuring a picture of so many ``pixels``, without the image itself."""
     if pixels <= WHOLE_PIXELS:
-        per_pixel: float = SHOWN + 16
+        per_pixel: float = FILE_PICTURE + 16
     else:
         odd = facts.width % 2 or facts.height % 2
-        per_pixel = SHOWN + (HALVES_ODD if odd else HALVES) + (UNCUT if settings.minify else 0)
-    strips = STRIPS if pixels <= WHOLE_PIXELS else STRIPS + DRAWN
+        per_pixel = FILE_PICTURE + (HALVES_ODD if odd else HALVES) + (UNCUT if settings.minify else 0)
+    strips = STRIPS if pixels <= WHOLE_PIXELS else STRIPS + FILE_STRIPS
     return strips + per_pixel * pixels
 
 
@@ -191,6 +189,11 @@ def share_machine(processes: int) -> None:
     _Process.sharers = processes
 
 
+def limit_words(settings: Settings, limit: int) -> str:
+    """Return the limit of memory, for messages."""
+    return f"{'max-memory is' if settings.max_memory else 'memory for it is'} {in_words(limit)}"
+
+
 def factor_for(
     facts: ImageFacts, settings: Settings, name: str, least: int = 1, mask: ImageFacts | None = None
 ) -> int:
@@ -205,9 +208,9 @@ def factor_for(
     factor = least
     while limit is not None and (wanted := need(facts, settings, factor, mask).most) > limit:
         factor *= 2
-        if min(facts.width, facts.height) < LEAST_SIDE * factor:
-            given = "max-memory is" if settings.max_memory else "memory for it is"
-            raise ResourceError(f"{name}: at least {in_words(wanted)} are needed, {given} {in_words(limit)}")
+        if min(facts.width, facts.height) < LEAST_REDUCED_SIDE * factor:
+            needed = f"at least {in_words(wanted)} are needed"
+            raise ResourceError(f"{name}: {needed}, {limit_words(settings, limit)}")
     return factor
 
 
@@ -229,6 +232,6 @@ def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
         return
     wanted = need_refined(facts, settings)
     if wanted > limit:
-        given = "max-memory is" if settings.max_memory else "memory for it is"
         size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
-        raise ResourceError(f"{name}: {size}, {given} {in_words(limit)}; refine against a smaller image")
+        hint = "refine against a smaller image"
+        raise ResourceError(f"{name}: {size}, {limit_words(settings, limit)}; {hint}")

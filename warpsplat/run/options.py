@@ -38,7 +38,7 @@ def read_palette(path: Path) -> str:
     """Read the colours in a text file.
 
     Raises:
-        UsageError: it cannot be read, or has no end, as some devices.
+        UsageError: it cannot be read, or is too long.
     """
     try:
         with path.open("rb") as file:

@@ -45,13 +45,8 @@ def prepare(
 ) -> PreparedImage:
     """Read an image and its mask, at a size that memory allows, and find out what it shows.
 
-    Args:
-        source: the image.
-        settings: everything that decides the result.
-        name: of the image in messages; default: its file's name.
-        importance: a mask, see ``load_importance``.
-        keyed: whether the file names the job that made it (``job_key``), by which batches know it; image and
-            mask are files then.
+    If ``keyed``, the file names the job that made it (``job_key``), by which batches recognise it: the
+    source and the mask are files then. Other arguments are those of ``vectorize``.
 
     Raises:
         ImageError: the image or the mask cannot be read, or their proportions differ.
@@ -97,9 +92,6 @@ def load_target(source: ImageSource, name: str | None, background: str, factor: 
 def load_image(image: ImageSource) -> FloatArray:
     """Read an image as it is fitted: upright, sRGB in [0, 1], shape (height, width, 3), float32; with opacity
     premultiplied, shape (height, width, 4).
-
-    Args:
-        image: as for ``vectorize``.
 
     Raises:
         ImageError: it cannot be read.

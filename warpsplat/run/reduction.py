@@ -16,6 +16,7 @@ from warpsplat.rendering.memory import in_words
 from warpsplat.run.memory import (
     factor_for,
     facts_of,
+    limit_words,
     mask_factor,
     memory_limit,
     need,
@@ -74,7 +75,7 @@ class Memory:
     """None if they are unknown: then the image is not reduced."""
     source: ImageSource
     mask: ImageFacts | None = None
-    """ImageFacts of the mask, if there is one."""
+    """Facts of the mask, if there is one."""
 
     @staticmethod
     def of(source: ImageSource, settings: Settings, importance: ImageSource | None = None) -> Memory:
@@ -113,7 +114,6 @@ class Memory:
         whole = None
         if isinstance(source, bytes) and not facts.deep and whole_score(facts, settings, factor) <= limit:
             whole = functools.partial(load_rows, source, paper, channels)
-        given = "max-memory is" if settings.max_memory else "memory for it is"
         takes = in_words(need(facts, settings, mask=self.mask).most)
-        why = f"{facts.width}x{facts.height} pixels take about {takes}, {given} {in_words(limit)}"
+        why = f"{facts.width}x{facts.height} pixels take about {takes}, {limit_words(settings, limit)}"
         return Reduction(factor, facts.width, facts.height, whole, why)

@@ -14,13 +14,13 @@ from PIL import Image
 
 from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource, held, source_name
+from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
-from warpsplat.fit.stages import INTERVAL
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
 from warpsplat.run.arguments import backend_on, check_keywords, takes
@@ -68,31 +68,19 @@ def refine(
     name: str | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    checkpoint_every: float | str = INTERVAL,
+    checkpoint_every: float | str = SAVE_INTERVAL,
     overwrite: bool = False,
     **options: Unpack[RefineOptions],
 ) -> Result:
     """Improve the paths of any SVG against an image by gradient descent; none is added.
 
-    Args:
+    Arguments that differ from those of ``vectorize``:
         svg: a string with a ``<`` in it is the SVG's text, any other its path; or bytes, or an open file.
-        image: as for ``vectorize``.
         iterations: steps.
-        keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
-        name: of the SVG, in messages.
         max_memory: bytes, or ``"4GB"``; default: that of the machine. An image that takes more is refused, as
             all of its pixels decide whether a result is better.
-        settings: instead of all options.
-        output: as for ``vectorize``.
-        device: as for ``vectorize``.
-        threads: as for ``vectorize``.
-        callback: as for ``vectorize``.
-        stop: as for ``vectorize``.
-        checkpoint: as for ``vectorize``.
-        resume: as for ``vectorize``.
-        checkpoint_every: as for ``vectorize``.
-        overwrite: as for ``vectorize``.
-        options: see ``RefineOptions``.
+        keep: keep text, images, filters ... as they are, in their place, instead of refusing them.
+        name: of the SVG, in messages.
 
     Returns:
         the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged if nothing better
@@ -111,8 +99,8 @@ def refine(
     problem = Problem(load_target(pixels, image_name, settings.background), settings)
     kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     with backend_on(device, threads) as backend:
-        stages = kept.stages(identity("refine", settings, problem, text), backend) if kept else None
-        run = Run(backend, callback, stop, stages=stages)
+        saved = kept.open(identity("refine", settings, problem, text), backend) if kept else None
+        run = Run(backend, callback, stop, checkpoint=saved)
         result = refine_svg(text, problem, run, name, keep=keep)
     if output is not None:
         write_named(Path(output), result.svg)
@@ -126,7 +114,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
 
     A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
     """
-    begun, history, stages = time.monotonic(), list[Progress](), run.stages
+    begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
     run = timed(recorded(run, history), problem.settings, problem.target)
     given, view = text, None
     if OUR_VIEW.match(text):
@@ -138,8 +126,8 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     before = score_svg(text, target, eyes=False)
     settings = _settings(problem.settings, len(scene))
     made = fit(Problem(target, settings), run, Start(scene=scene))
-    if stages and made.interrupted:
-        stages.save()
+    if checkpoint and made.interrupted:
+        checkpoint.save()
     release_memory()
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:

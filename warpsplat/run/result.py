@@ -16,6 +16,12 @@ from warpsplat.metrics import Score
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
 
+KEY_BYTES = 6
+"""Bytes of a key: two jobs have the same one by a chance of one in 2^48."""
+
+STOPPED = "stopped"
+"""Key of a result that was cut short."""
+
 
 @dataclass(frozen=True)
 class LevelScore:
@@ -55,7 +61,7 @@ class Result:
     levels: tuple[LevelScore, ...] = ()
     """Scores of each level of a layered file."""
     subject: Subject = "photo"
-    """What the image was taken for."""
+    """The subject that the image was taken for."""
     why: str = ""
     """The reason for the subject; empty if it was given."""
     history: tuple[Progress, ...] = field(default=(), repr=False)
@@ -110,11 +116,3 @@ def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str
     masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
     digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
     return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
-
-
-KEY_BYTES = 6
-"""Bytes of a key: two jobs have the same one by a chance of one in 2^48."""
-
-
-STOPPED = "stopped"
-"""Key of a result that was cut short."""

@@ -1,4 +1,4 @@
-"""One image with several numbers of shapes: work that does not depend on the number is done once."""
+"""Vectorize an image with several numbers of shapes, and do work that does not depend on the number once."""
 
 from __future__ import annotations
 
@@ -32,6 +32,10 @@ MOST_NUMBERS = 16
 """Most numbers of shapes in one run."""
 
 
+OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
+"""Subjects whose images decide how many shapes there are, as messages call them."""
+
+
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
     """Check that there can be a run with several numbers of shapes.
 
@@ -43,19 +47,15 @@ def check_several(settings: Settings, numbers: Sequence[int]) -> None:
     for number in numbers:
         replace(settings, curves=number, levels=())
         if numbers.count(number) > 1:
-            raise UsageError(f"curves: {number} is there twice")
+            raise UsageError(f"curves: {number} is given twice")
     if settings.counting:
         raise UsageError(f"several numbers of shapes and {settings.counting[0]} do not go together")
-
-
-OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
-"""Subjects whose images decide how many shapes there are, as messages call them."""
 
 
 def can_share(image: FloatArray) -> bool:
     """Return whether fits to ``image`` lose nothing by continuing from fits with fewer shapes.
 
-    Those to drawings lose half a decibel and more, wherever they begin (docs/experiments.md).
+    Fits to drawings lose half a decibel or more, wherever they begin (docs/experiments.md).
     """
     return guess_subject(image).subject == "photo"
 
@@ -78,20 +78,11 @@ def vectorize_several(
 ) -> tuple[Result, ...]:
     """Turn an image into SVGs of several numbers of shapes, which share as much work as they can.
 
-    Args:
-        image: as for ``vectorize``.
+    Arguments that differ from those of ``vectorize``:
         curves: numbers of shapes; of a drawing, the most. They are made from few to many.
-        settings: everything that decides the results but their numbers, made by ``make_settings``; instead of
-            ``options``.
-        importance: as for ``vectorize``.
         outputs: a file for each number, written as soon as it is made; missing folders are made.
-        device: as for ``vectorize``.
-        threads: as for ``vectorize``.
-        callback: as for ``vectorize``; ``Progress.work`` is the share of the work for all numbers.
-        stop: as for ``vectorize``.
-        ready: called with each result as soon as there is one.
-        name: see ``vectorize``.
-        options: as for ``vectorize``.
+        callback: ``Progress.work`` is the share of the work for all numbers.
+        ready: called with each result as soon as it is available.
 
     Returns:
         a result for each number, in the order of ``curves``; if the run was stopped, only of the smallest

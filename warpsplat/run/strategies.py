@@ -21,7 +21,7 @@ from warpsplat.svg.order import by_color, by_opacity
 
 
 class Strategy(NamedTuple):
-    """A way to make shapes."""
+    """A function that makes shapes, and what its shapes are like."""
 
     make: Callable[[Problem, Run], Fit]
     sorts: bool = False

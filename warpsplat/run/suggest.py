@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 CALLED = {"drawing": "drawing", **OWN_NUMBER}
 """Subjects that are traced, as messages call them."""
 
-TABLE = (0.25, 0.5, 1.0, 2.0, 4.0)
+ROW_RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Shapes of the rows of a table, over the suggested number."""
 
-SAMPLES = 513
+GAIN_SAMPLES = 513
 """Numbers of shapes at which the gain is evaluated."""
 
-SEEN = 0.5
+VISIBLE_GAIN = 0.5
 """Least gain that can be seen [dB]: a rule of thumb of image coding."""
 
 MORE_SHAPES, MORE_BYTES = 100, 10_000
@@ -43,10 +43,10 @@ about evenly with doublings, so by the mean slope of each one's curve (Satopää
 same number.
 """
 
-EXACT = 58.0
+EXACT_PSNR = 58.0
 """PSNR at which an image of 8 bits a channel has no error but that of rounding [dB]."""
 
-FINE = 0.05
+ROUNDING_SHARE = 0.05
 """Largest step to which a suggestion is rounded, as a share of it: it is no more exact than that."""
 
 
@@ -99,9 +99,7 @@ def check_suggesting(settings: Settings) -> None:
         UsageError: the settings decide the number of shapes.
     """
     if others := settings.counting or ([] if settings.simplify else ["curves"]):
-        raise UsageError(
-            f"suggest says how many shapes are worth it, and {others[0]} as well: give one of them"
-        )
+        raise UsageError(f"suggest and {others[0]} both decide the number of shapes: give one of them")
 
 
 @takes(Options)
@@ -122,16 +120,7 @@ def suggest(
     A short fit on a reduced image, whose shapes grow from few to many, estimates the result of each number;
     it takes a fraction of the time of a run.
 
-    Args:
-        image: as for ``vectorize``.
-        settings: of the runs that it is about, made by ``make_settings`` without ``curves`` or a goal.
-        importance: as for ``vectorize``, as is all that follows.
-        device: as for ``vectorize``.
-        threads: as for ``vectorize``.
-        callback: as for ``vectorize``.
-        stop: as for ``vectorize``.
-        name: as for ``vectorize``.
-        options: as for ``vectorize``.
+    Arguments are those of ``vectorize``, without ``curves`` and goals.
 
     Returns:
         the number, the reason, and the expected results of it and others at the default effort; None if the
@@ -170,20 +159,20 @@ def suggestion(worth: Worth) -> Suggestion:
     by_shapes, by_bytes = most_worth(worth, MORE_SHAPES), most_worth(worth, MORE_BYTES / worth.bytes_each)
     chosen = min(by_shapes, by_bytes)
     why = reason(worth, chosen, "100 more" if by_shapes <= by_bytes else "10 kB more")
-    rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in TABLE})
+    rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in ROW_RATIOS})
     expected = tuple(expect(worth, row) for row in rows)
     return Suggestion(chosen, "photo", why, expected, by_shapes, by_bytes, 0.0)
 
 
 def most_worth(worth: Worth, more: float) -> int:
-    """Return the most shapes at which ``more`` of them gain ``SEEN``; the fewest if none do."""
+    """Return the most shapes at which ``more`` of them gain ``VISIBLE_GAIN``; the fewest if none do."""
     low, high = elementary.log([worth.fewest, worth.most])
-    shapes = elementary.exp(np.linspace(low, high, SAMPLES))
+    shapes = elementary.exp(np.linspace(low, high, GAIN_SAMPLES))
     shapes[[0, -1]] = worth.fewest, worth.most
     if worth.fewest == worth.most:
         return worth.most
-    rate = np.gradient(np.minimum(worth.psnr(shapes), EXACT), shapes)
-    at = np.flatnonzero(more * rate >= SEEN)
+    rate = np.gradient(np.minimum(worth.psnr(shapes), EXACT_PSNR), shapes)
+    at = np.flatnonzero(more * rate >= VISIBLE_GAIN)
     return min(rounded(float(shapes[at[-1]])), worth.most) if len(at) else worth.fewest
 
 
@@ -197,25 +186,23 @@ def reason(worth: Worth, chosen: int, more: str) -> str:
     if worth.fewest == worth.most:
         return f"The picture is so small that there is no room for more than {worth.most} shapes."
     one, two = expect(worth, chosen), expect(worth, 2 * chosen)
-    if one.psnr > EXACT:
+    if one.psnr > EXACT_PSNR:
         return f"{one}; more are expected to add nothing that can be seen."
     first = str(one)
     if 2 * chosen <= worth.most:
         size = (two.bytes - one.bytes) / 1000
         first += f", and twice as many {two.psnr - one.psnr:.1f} dB more for {size:.0f} kB more"
+    seen = f"{more} buy {VISIBLE_GAIN} dB at least, which can be seen"
     if chosen >= worth.most:
-        return (
-            f"{first}. All the way to {worth.most:,} shapes {more} buy {SEEN} dB at least, which can be seen."
-        )
+        return f"{first}. All the way to {worth.most:,} shapes {seen}."
     if chosen == worth.fewest:
-        return f"{first}. From there on {more} buy less than {SEEN} dB, which can hardly be seen."
-    seen = f"{more} buy {SEEN} dB at least, which can be seen"
-    return f"{first}. Up to there {seen}, beyond it less. This is the knee."
+        return f"{first}. From there on {more} buy less than {VISIBLE_GAIN} dB, which can hardly be seen."
+    return f"{first}. Up to there {seen}, beyond it less."
 
 
 def rounded(number: float) -> int:
     """Return a round number near another one."""
-    most = max(FINE * number, 1.0)
+    most = max(ROUNDING_SHARE * number, 1.0)
     unit = elementary.power_of_ten(len(str(int(most))) - 1)
     step = max(unit * factor for factor in (1, 2, 5) if unit * factor <= most)
     return max(1, round(step * round(number / step)))

@@ -127,5 +127,5 @@ def size_of(text: str, name: str) -> tuple[float, float]:
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
     if size is None:
-        raise ImageError(f"{name}: says neither its size nor a viewBox")
+        raise ImageError(f"{name}: has neither a size nor a viewBox")
     return size

@@ -18,6 +18,12 @@ RELEASE_INTERVAL = 10
 """Progress reports from one release of free memory to the next: a release takes as long as a step does."""
 
 
+TAIL_SECONDS = 0.3
+
+TAIL_PER_PIXEL = 3e-7
+"""Part of a time budget that the last step, exporting and scoring take [s]."""
+
+
 def recorded(run: Run, history: list[Progress]) -> Run:
     """Return a run whose progress is recorded and never falls, and which releases memory now and then."""
 
@@ -40,14 +46,9 @@ def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
         run.report(replace(last, seconds=time.monotonic() - run.started, snapshot=snapshot))
 
 
-TAIL_SECONDS = 0.3
-TAIL_PER_PIXEL = 3e-7
-"""Part of a time budget that the last step, exporting and scoring take [s]."""
-
-
 def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
     """Return the run with the deadline that ``time_budget`` sets, which leaves time to write and score."""
     if settings.time_budget is None:
         return run
     tail = TAIL_SECONDS + TAIL_PER_PIXEL * pixels_of(target)
-    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, stages=None)
+    return run.derived(deadline=time.monotonic() + settings.time_budget - tail, checkpoint=None)

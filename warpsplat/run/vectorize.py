@@ -1,7 +1,13 @@
-"""An image becomes an SVG file: the whole way, from top to bottom.
+"""Turn an image into an SVG file, from top to bottom.
 
-``vectorize`` reads and inspects the image; ``make_result`` makes the shapes by a strategy, puts them in
-order, and writes and scores the file.
+vectorize               checks options, holds the device, opens the checkpoint
+prepare               reads the image at a size that memory allows, and finds its subject
+make_result           makes the file, and the figures about it:
+strategy.make         makes the shapes: by fitting, a search, or tracing (``STRATEGIES``)
+arranged              orders the shapes so that the file is small
+export_within         writes the SVG, within a limit of bytes
+on_paper              puts it on a sheet
+scored                measures the file as a viewer shows it
 """
 
 from __future__ import annotations
@@ -16,11 +22,11 @@ from typing import TYPE_CHECKING
 
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.sources import ImageSource
+from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.stages import INTERVAL
 from warpsplat.native import release_memory
 from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
@@ -60,7 +66,7 @@ def vectorize(
     keyed: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    checkpoint_every: float | str = INTERVAL,
+    checkpoint_every: float | str = SAVE_INTERVAL,
     overwrite: bool = False,
     **options: Unpack[Options],
 ) -> Result:
@@ -72,21 +78,21 @@ def vectorize(
         image: a path, the bytes of an image file, a file open for reading, a Pillow image, or an array of
             shape (height, width[, channels]) of uint8, uint16, bool, or floats in [0, 1].
         curves: number of shapes; of drawings and with a goal, the most.
-        settings: all options at once, made by ``make_settings``; none may be given besides.
+        settings: all options at once, made by ``make_settings``; no further ones may be given then.
         importance: mask of the image's proportions, in any of the image's forms: how much errors count.
         output: file to write the SVG to, before it is measured, or what its name ends with (``Result.save``);
             ``-`` is the standard output.
         device: ``auto``, ``cpu``, ``cuda`` or ``cuda:N``.
         threads: of a CPU, default one a core; they do not change the result.
         callback: see ``Callback``.
-        stop: asked after every step; once true, the shapes as they are make the file.
+        stop: called after every step; once it returns true, the current shapes make the file.
         name: how messages call the image; default: its file's name.
-        keyed: mark the file with what it was made of, by which batches know it.
-        checkpoint: file in which the state of the run is kept until it is done, every ``checkpoint_every``
-            and when it is stopped.
-        resume: go on from the checkpoint, to the bytes of an uninterrupted run; where there is none, start.
+        keyed: add a key of image and settings to the file, by which batches recognise it.
+        checkpoint: file that the state of the run is saved to every ``checkpoint_every`` and when it is
+            stopped; removed when the run is done.
+        resume: continue from the checkpoint, to the bytes of an uninterrupted run; without one, start.
         checkpoint_every: seconds, or ``"2m"``.
-        overwrite: let a run that starts anew replace a checkpoint, or any other file, of that name.
+        overwrite: let a run that starts from the beginning replace a checkpoint, or any other file, there.
         options: see ``Options`` and the documentation's table.
 
     Returns:
@@ -108,8 +114,8 @@ def vectorize(
     write = None if output is None else functools.partial(write_named, Path(output))
     with backend_on(device, threads) as backend:
         prepared = prepare(image, settings, name=name, importance=importance, keyed=keyed)
-        stages = kept.stages(identity("vectorize", settings, prepared.problem), backend) if kept else None
-        result = make_result(prepared, Run(backend, callback, stop, stages=stages), write)
+        saved = kept.open(identity("vectorize", settings, prepared.problem), backend) if kept else None
+        result = make_result(prepared, Run(backend, callback, stop, checkpoint=saved), write)
     if kept and not result.stopped:
         kept.remove()
     return result
@@ -120,16 +126,13 @@ def make_result(
 ) -> Result:
     """Vectorize a prepared image, and score the file.
 
-    Args:
-        image: the image, and the problem that it poses.
-        run: how the work is carried out.
-        write: called with the file before it is scored, so that nothing that goes wrong then can lose it.
-        start: shapes to start a plain fit from, in place of the settings' strategy.
+    ``write`` is called with the file before it is scored, so that no later failure can lose it. A ``start``
+    makes it a plain fit from these shapes, in place of the settings' strategy.
 
     Raises:
         ImageError: something about the image that only the work itself finds out.
     """
-    begun, history, stages = time.monotonic(), list[Progress](), run.stages
+    begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
     problem, reduction = image.problem, image.reduction
     target, settings = problem.target, problem.settings
     run = timed(recorded(run, history), settings, target)
@@ -137,8 +140,8 @@ def make_result(
     with naming(image.name):
         made = strategy.make(problem, run) if start is None else fit(problem, run, start)
         report_end(made, run, history)
-        if stages and made.interrupted:
-            stages.save()
+        if checkpoint and made.interrupted:
+            checkpoint.save()
         made = arranged(made, problem, strategy, run.backend)
         if reduction:
             made, settings = reduction.enlarged(made), reduction.settings(settings)

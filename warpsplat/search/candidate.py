@@ -22,14 +22,30 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 from warpsplat.scene.geometry import areas
-from warpsplat.search.few_shapes import FEW, fit_background
 from warpsplat.svg.order import by_opacity
 from warpsplat.svg.write import path_sizes
 
 LAST_STEPS = 0.2
 """Share of a fit's steps that is repeated after shapes were removed or added."""
+
+
+FEW_SHAPES = 32
+"""Most shapes of such a file."""
+
+FEW_COARSE_PIXELS, FEW_FINE_PIXELS = 6_000, 24_000
+"""Image sizes that few shapes are fitted to [pixels]."""
+
+FEW_POINTS, FEW_MEAN_POINTS = 8, 6.0
+"""Points of a new fill, and their mean in the end: another shape is worth more than a finer outline."""
+
+FEW_OPACITY = 0.7
+"""Opacity of all shapes, written once for all: where they overlap there are more colours than shapes."""
+
+LEAST_BACKGROUND_SHARE = 1e-3
+"""Least share of the canvas through which the background shows for its colour to be fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +112,7 @@ def resized_scene(problem: Problem, change: Change, backend: Backend) -> Scene:
             image = step.renderer.read_image()
             scene = scene.append(new_shapes(settings, scene, target.image, image, count, rng, weights))
     may_choose_background = settings.background == "auto" and not settings.is_limited
-    if len(scene) <= FEW and problem.target.shape[2] == 3 and may_choose_background:
+    if len(scene) <= FEW_SHAPES and problem.target.shape[2] == 3 and may_choose_background:
         scene = fit_background(scene, problem.target, backend)
     return scene
 
@@ -104,11 +120,8 @@ def resized_scene(problem: Problem, change: Change, backend: Backend) -> Scene:
 def smaller(scene: Scene, removal_costs: FloatArray, sizes: npt.NDArray[np.int64], excess: float) -> Scene:
     """Remove shapes, and for what is less than a shape points of splines.
 
-    Args:
-        scene: what is to become smaller.
-        removal_costs: growth of the error without each shape, shape (shape,).
-        sizes: of the shapes [bytes], shape (shape,).
-        excess: how much has to go [bytes].
+    ``excess`` and the ``sizes`` of the shapes are in bytes; ``removal_costs`` are the growth of the error
+    without each shape.
     """
     order = np.argsort(removal_costs / sizes, kind="stable")
     removed = np.cumsum(sizes[order])
@@ -123,3 +136,42 @@ def smaller(scene: Scene, removal_costs: FloatArray, sizes: npt.NDArray[np.int64
     scene, removal_costs = scene.take(kept), removal_costs[kept]
     worth = np.maximum(removal_costs, 0) / np.maximum(areas(scene), 1.0)
     return simplify(scene, np.asarray(worth, np.float32), math.ceil(left / max(a_point, 1.0)))[0]
+
+
+def for_few(settings: Settings) -> Settings:
+    """Return the settings of a fit whose file can hold ``settings.curves`` shapes, if these are few."""
+    if settings.curves > FEW_SHAPES or settings.renderer != "exact":
+        return settings
+    settings = replace(
+        settings,
+        coarse_pixels=min(settings.coarse_pixels, FEW_COARSE_PIXELS),
+        fine_pixels=min(settings.fine_pixels, FEW_FINE_PIXELS),
+        texture=0.0,
+    )
+    if settings.kind == Kind.STROKE or settings.basis != Basis.SPLINE or settings.opaque:
+        return settings
+    return replace(
+        settings,
+        spline_points=min(settings.spline_points, FEW_POINTS),
+        density=replace(settings.density, mean_points=min(settings.density.mean_points, FEW_MEAN_POINTS)),
+        opacity=FEW_OPACITY,
+        rates={**settings.rates, "opacities": 0.0},
+    )
+
+
+def fit_background(scene: Scene, image: FloatArray, backend: Backend) -> Scene:
+    """Return ``scene`` with the best background colour, by least squares where it shows.
+
+    ``image``: sRGB in [0, 1], shape (height, width, 3).
+    """
+    black, white = (
+        render(replace(scene, canvas=replace(scene.canvas, background=color)), backend=backend)
+        for color in (np.zeros(3, np.float32), np.ones(3, np.float32))
+    )
+    seen = (white - black).astype(np.float64)
+    weight = (seen * seen).sum(axis=(0, 1))
+    if weight.min() < LEAST_BACKGROUND_SHARE * image.shape[0] * image.shape[1]:
+        return scene
+    color = np.clip((seen * (image - black)).sum(axis=(0, 1)) / weight, 0, 1)
+    background = (np.round(color * 255) / 255).astype(np.float32)
+    return replace(scene, canvas=replace(scene.canvas, background=background))

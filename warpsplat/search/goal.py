@@ -16,12 +16,11 @@ from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import DB_PER_DOUBLING, finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary
-from warpsplat.search.candidate import LAST_STEPS, Candidate, Change, changed, measured
-from warpsplat.search.few_shapes import FEW, for_few
+from warpsplat.search.candidate import FEW_SHAPES, LAST_STEPS, Candidate, Change, changed, for_few, measured
 from warpsplat.svg.write import GRIDS
 
 MOST_CURVES = 20_000
-"""Most shapes, unless ``--curves`` says so."""
+"""Most shapes without ``--curves``."""
 
 PROBE_CURVES = 256
 """Shapes of the first probe run."""
@@ -45,10 +44,10 @@ PROBE_TIME = 0.15
 FIRST_TIME = 0.7
 """Share of the remaining time for the first fit; the rest is for the rounds."""
 
-TRIES = 3
+FIRST_FITS = 3
 """First fits of a file of few shapes, with different seeds: by chance they differ by tenths of a decibel."""
 
-ROUNDS = 6
+SEARCH_ROUNDS = 6
 """Most times that shapes are removed or added."""
 
 LIKELY_PROBES, LIKELY_ROUNDS = 2, 3
@@ -63,13 +62,13 @@ AIM_DB = 0.01
 CUT_DB = 1.3
 """Loss by halving the number of shapes, at the rate of the first to be removed, the others refitted [dB]."""
 
-NEAR = 0.005
+NEAR_SIZE = 0.005
 """Least relative difference in size to a smaller file that missed the target for a candidate in between."""
 
 LEAST_LACK = 0.05
 """A file that misses the target gets shapes for at least so much [dB]."""
 
-FULL = 0.98
+FULL_SHARE = 0.98
 """Share of the size limit from which a file is large enough."""
 
 AIM_FULL = 0.996
@@ -106,7 +105,7 @@ def search_goal(problem: Problem, run: Run) -> Fit:
     if first.interrupted:
         return replace(first, iterations=done)
     tried, parts = [measured(problem, first)], run.open_parts(fitted, 1 / LIKELY_ROUNDS)
-    for _ in range(ROUNDS):
+    for _ in range(SEARCH_ROUNDS):
         change = next_change(tried, settings)
         if change is None or run.over():
             break
@@ -186,7 +185,7 @@ def curves_for(aim: float, seen: dict[int, float], most: int) -> int:
 def fit_first(problem: Problem, run: Run) -> tuple[Fit, int]:
     """Fit ``settings.curves`` shapes, several times if these are few; return the best, and all steps."""
     settings = problem.settings
-    tries = TRIES if settings.max_bytes and settings.curves <= FEW else 1
+    tries = FIRST_FITS if settings.max_bytes and settings.curves <= FEW_SHAPES else 1
     results: list[Fit] = []
     for number in range(tries):
         seeded = problem.having(seed=(settings.seed + number) % 2**32, target_psnr=None)
@@ -231,7 +230,7 @@ def next_change(tried: list[Candidate], settings: Settings) -> Change | None:
     limit = settings.max_bytes or math.inf
     if _reaches(best, settings) and _fits(best, settings):
         return _cut(best, tried, settings)
-    if best.size > FULL * limit and _fits(best, settings):
+    if best.size > FULL_SHARE * limit and _fits(best, settings):
         return None
     large = [candidate for candidate in tried if not _fits(candidate, settings)]
     if large:
@@ -250,7 +249,7 @@ def _cut(best: Candidate, tried: list[Candidate], settings: Settings) -> Change 
         nearest = max(failed, key=lambda candidate: candidate.size)
         slope = (best.psnr - nearest.psnr) / float(elementary.log2(best.size / nearest.size))
         least = (2 * nearest.size + best.size) / 3
-    if surplus <= ENOUGH_DB or best.size - least < NEAR * best.size:
+    if surplus <= ENOUGH_DB or best.size - least < NEAR_SIZE * best.size:
         return None
     wanted = best.size * float(elementary.power(2, (AIM_DB - surplus) / slope))
     return Change(best, max(wanted, least), best.fit.per_pixel)

@@ -1,4 +1,4 @@
-"""Fits to one image with ascending numbers of shapes, each of which continues from the one before.
+"""Fits to one image with ascending numbers of shapes, each continued from the one before.
 
 A fit grows to a surplus of shapes, trains it, and thins it. Before thinning, its shapes and the optimizer's
 state are kept: from there the next fit grows on, and leaves out the beginning of its own schedule.
@@ -36,7 +36,7 @@ class Series:
         """Begin a series.
 
         Args:
-            settings: of all fits, but for the number of shapes.
+            settings: of all fits, except for the number of shapes.
             numbers: of shapes.
             shares: whether fits continue from one another.
         """

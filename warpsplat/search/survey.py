@@ -21,7 +21,7 @@ from warpsplat.fit.state import Past
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import FloatArray, Scene
 
-FEWEST, MOST = 16, 1024
+FEWEST_SHAPES, MOST_SHAPES = 16, 1024
 """Range of the number of shapes: fewer show no likeness, more make a file larger than many a JPEG of the same
 photograph.
 """
@@ -29,7 +29,7 @@ photograph.
 MEASURED = 256
 """Most shapes of the short fit: about as many as are suggested for photographs."""
 
-STEPS, COARSE, INTERVAL = 400, 0.9, 20
+SHORT_STEPS, SHORT_COARSE, SHORT_INTERVAL = 400, 0.9, 20
 """Steps of the short fit, the share of them on the reduced image, and those between densification steps."""
 
 SHORT_END = 0.9
@@ -41,7 +41,7 @@ FEWER = 4
 PROBE, PROBE_RUN = 30, 200
 """Steps of the probe at the finest size: the last ones, which are small, of a schedule of so many."""
 
-GAIN, GAIN_FROM, GAIN_WHOLE = 0.42, 22.0, 27.0
+EFFORT_GAIN, GAIN_FROM, GAIN_WHOLE = 0.42, 22.0, 27.0
 """Gain of a run of the default effort over the short fit [dB] if that reaches ``GAIN_WHOLE`` dB; none up to
 ``GAIN_FROM`` dB, and in between a part of it. What is hard to draw gains little (docs/experiments.md).
 """
@@ -53,8 +53,8 @@ SLOPE = 0.79
 """Gain by a doubling of shapes in such runs, over the gain from the probe to the short fit."""
 
 STEEPEST = 2.5
-"""Largest gain by a doubling [dB]: pictures of flat areas, whose few shapes find their places late, look
-steeper to the probe.
+"""Largest gain by a doubling [dB]: the probe overestimates it for pictures of flat areas, whose few
+shapes find their places late.
 """
 
 BEND = 0.075
@@ -106,14 +106,14 @@ class Worth:
 def survey(problem: Problem, run: Run) -> Worth | None:
     """Estimate what numbers of shapes give on an image; None if the run was stopped."""
     image, settings = problem.target, problem.settings
-    most = min(MOST, simple_curves(image))
+    most = min(MOST_SHAPES, simple_curves(image))
     measured = min(MEASURED, most)
-    few = max(min(FEWEST, most), measured // FEWER)
+    few = max(min(FEWEST_SHAPES, most), measured // FEWER)
     short, probing = _short(settings, measured), _probing(settings, few)
     start = list[tuple[Scene, Past]]()
 
     def keep(now: Progress) -> Progress:
-        settled = now.step % INTERVAL == 0 and now.shapes >= few
+        settled = now.step % SHORT_INTERVAL == 0 and now.shapes >= few
         if settled and not start and now.snapshot and now.snapshot.past:
             start.append((now.snapshot.scene(), now.snapshot.past()))
         return now
@@ -136,22 +136,18 @@ def survey(problem: Problem, run: Run) -> Worth | None:
 def expected(most: int, short: tuple[int, float], probe: tuple[int, float], gain: float, size: int) -> Worth:
     """Estimate quality and size up to ``most`` shapes.
 
-    Args:
-        most: largest number of shapes.
-        short: shapes and PSNR of the short fit.
-        probe: shapes and PSNR of the probe.
-        gain: of a run over the short fit [dB].
-        size: bytes of the short fit's file.
+    ``short`` and ``probe`` are the shapes and PSNR of these fits, ``size`` the bytes of the short one's
+    file, and ``gain`` that of a run over the short fit [dB].
     """
     shapes, psnr = short
     doublings = float(elementary.log2(shapes / probe[0])) if shapes > probe[0] else 0.0
     below = (min(psnr, CEILING) - min(probe[1], CEILING)) / doublings if doublings else 0.0
     below = min(max(SLOPE * below, 0.0), STEEPEST)
     # The rise from the probe to the short fit is as measured, and the curve falls nowhere.
-    bend = min(BEND, below / (float(2 * elementary.log2(MEASURED / FEWEST) - elementary.log2(FEWER))))
+    bend = min(BEND, below / (float(2 * elementary.log2(MEASURED / FEWEST_SHAPES) - elementary.log2(FEWER))))
     slope = below + bend * float(elementary.log2(FEWER))
     there, each = min(psnr, CEILING) + gain, LATER_BYTES * size / shapes
-    return Worth(min(FEWEST, most), most, shapes, there, slope, bend, each)
+    return Worth(min(FEWEST_SHAPES, most), most, shapes, there, slope, bend, each)
 
 
 def expected_gain(psnr: float, plan: Sequence[Phase]) -> float:
@@ -159,13 +155,15 @@ def expected_gain(psnr: float, plan: Sequence[Phase]) -> float:
     first, last = (phase.width * phase.height for phase in (plan[0], plan[-1]))
     low, high = map(elementary.log, GAIN_SIZES)
     seen = min(max(float((high - elementary.log(last / first)) / (high - low)), 0.0), 1.0)
-    return GAIN * seen * min(max((psnr - GAIN_FROM) / (GAIN_WHOLE - GAIN_FROM), 0.0), 1.0)
+    return EFFORT_GAIN * seen * min(max((psnr - GAIN_FROM) / (GAIN_WHOLE - GAIN_FROM), 0.0), 1.0)
 
 
 def _short(settings: Settings, shapes: int) -> Settings:
     """Return the settings of the short fit, which grows from the fewest shapes to ``shapes``."""
-    density = replace(settings.density, start=min(FEWEST / shapes, 1.0), interval=INTERVAL)
-    return replace(settings, curves=shapes, simplify=False, iterations=STEPS, coarse=COARSE, density=density)
+    density = replace(settings.density, start=min(FEWEST_SHAPES / shapes, 1.0), interval=SHORT_INTERVAL)
+    return replace(
+        settings, curves=shapes, simplify=False, iterations=SHORT_STEPS, coarse=SHORT_COARSE, density=density
+    )
 
 
 def _probing(settings: Settings, shapes: int) -> Settings:

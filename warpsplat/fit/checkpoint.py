@@ -1,8 +1,7 @@
-"""State of a run for checkpoints: the results of fits that are done, and the state of the next one.
+"""The state of a run for checkpoints: the results of its finished fits, and the state of the next one.
 
-A run consists of one fit or several in a row (``search``, ``fit.layered``), numbered as they begin. A resumed
-run repeats the same sequence: of a fit that was done it takes the result, and the next one continues from the
-state.
+A run consists of one fit or several in a row (``search``, ``fit.layered``). A resumed run repeats the same
+sequence: it takes the results of the fits that were finished, and continues the next one from its state.
 """
 
 from __future__ import annotations
@@ -15,10 +14,10 @@ from typing import Any, NamedTuple
 from warpsplat.errors import CheckpointError
 from warpsplat.scene.arrays import Array
 
-INTERVAL = 30.0
+SAVE_INTERVAL = 30.0
 """Default time from one save to the next [s]."""
 
-SPARE = 100.0
+LEAST_SAVE_RATIO = 100.0
 """Least time from one save to the next over the duration of a save: saving costs a hundredth."""
 
 MOST_FITS = 1000
@@ -29,18 +28,18 @@ class Content(NamedTuple):
     """Numbers and arrays by name."""
 
     numbers: dict[str, Any]
-    """Of types that JSON knows."""
+    """Values of JSON's types."""
     arrays: dict[str, Array]
 
 
-class Stages:
-    """The fits of a run."""
+class Checkpoint:
+    """The fits of a run so far, from which it can be resumed."""
 
     def __init__(
         self,
         name: str,
         write: Callable[[Content], None],
-        every: float = INTERVAL,
+        every: float = SAVE_INTERVAL,
         saved: Content | None = None,
     ) -> None:
         """Begin a new run, or resume one.
@@ -60,7 +59,7 @@ class Stages:
         if saved:
             with self.reading():
                 self._results, self._state = _split(saved)
-        self._begun = 0
+        self._number = -1
         self._due = time.monotonic() + every
         self._is_saved = saved is not None
 
@@ -81,29 +80,30 @@ class Stages:
         except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
             raise CheckpointError(f"{self._name}: the checkpoint is damaged: {error}") from error
 
-    def begin(self) -> Stage:
-        """Return the next fit."""
-        self._begun += 1
-        return Stage(self, self._begun - 1)
+    def begin(self) -> None:
+        """Continue with the next fit."""
+        self._number += 1
 
-    def result(self, number: int) -> Content | None:
-        """Return the result of a fit; None if it is not done."""
-        return self._results[number] if number < len(self._results) else None
+    @property
+    def result(self) -> Content | None:
+        """The result of the current fit, if an earlier run finished it."""
+        return self._results[self._number] if self._number < len(self._results) else None
 
-    def state(self, number: int) -> Content | None:
-        """Return the state of a fit; None if it was not begun, or is done."""
-        return self._state if number == len(self._results) else None
+    @property
+    def state(self) -> Content | None:
+        """The state of the current fit, if an earlier run began it."""
+        return self._state if self._number == len(self._results) else None
 
-    def is_due(self) -> bool:
-        """Return whether it is time to save."""
-        return time.monotonic() >= self._due
+    def keep(self, state: Callable[[], Content], *, now: bool) -> None:
+        """Save the state of the current fit if it is time, or ``now``."""
+        if now or time.monotonic() >= self._due:
+            self._state, self._is_saved = state(), False
+            self.save()
 
-    def keep(self, state: Content | None, result: Content | None = None) -> None:
-        """Set the state that is saved next, and add the result of the current fit."""
-        if result:
-            self._results.append(result)
-        self._state = state
-        self._is_saved = False
+    def finish(self, result: Content) -> None:
+        """Keep the result of the current fit; it is saved with the next state, or when the run ends."""
+        self._results.append(result)
+        self._state, self._is_saved = None, False
 
     def save(self) -> None:
         """Save the state, if it is new."""
@@ -113,35 +113,7 @@ class Stages:
         self._write(_joined(self._results, self._state))
         self._is_saved = True
         now = time.monotonic()
-        self._due = now + max(self._every, SPARE * (now - began))
-
-
-class Stage:
-    """A fit of a run."""
-
-    def __init__(self, stages: Stages, number: int) -> None:
-        self._stages, self._number = stages, number
-        self.reading = stages.reading
-
-    @property
-    def result(self) -> Content | None:
-        """The result, if an earlier run finished the fit."""
-        return self._stages.result(self._number)
-
-    @property
-    def state(self) -> Content | None:
-        """The state, if an earlier run began the fit."""
-        return self._stages.state(self._number)
-
-    def keep(self, state: Callable[[], Content], *, now: bool) -> None:
-        """Save the state if it is time, or ``now``."""
-        if now or self._stages.is_due():
-            self._stages.keep(state())
-            self._stages.save()
-
-    def finish(self, result: Content) -> None:
-        """Keep the result; it is saved with the next state, or when the run ends."""
-        self._stages.keep(None, result)
+        self._due = now + max(self._every, LEAST_SAVE_RATIO * (now - began))
 
 
 def whole(numbers: Mapping[str, Any], name: str, low: int, high: int) -> int:
@@ -188,6 +160,6 @@ def _split(content: Content) -> tuple[list[Content], Content | None]:
     for name, array in content.arrays.items():
         number, _, rest = name.partition("/")
         if not number.isdecimal() or int(number) >= len(parts):
-            raise ValueError("an array is of no fit")
+            raise ValueError("an array belongs to no fit")
         parts[int(number)].arrays[rest] = array
     return (parts[:-1], parts[-1]) if flag(content.numbers, "under way") and parts else (parts, None)
