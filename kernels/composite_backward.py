@@ -17,6 +17,16 @@ STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
 
 
+@wp.func
+def slope_of(mapping: wp.int32, signed: column) -> column:
+    """Return d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves."""
+    slope = column(1.0) - wp.abs(signed)
+    if mapping == constants.AREA:
+        slope = wp.min(STEEP * slope, column(1.0))
+        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, column(-1.0)), column(1.0)))
+    return slope
+
+
 def make_backward(name: str, *, painted: bool) -> wp.Kernel:
     """Return the adjoint for opacities below 1.
 
@@ -104,12 +114,7 @@ def make_backward(name: str, *, painted: bool) -> wp.Kernel:
                 alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
                 transmittance = transmittance - seen
                 if not full:
-                    # d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves.
-                    slope = one - covered
-                    if mapping == constants.AREA:
-                        slope = wp.min(STEEP * slope, one)
-                        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
-                    slope = opacity * wp.cw_mul(slope, alpha_grad)
+                    slope = opacity * wp.cw_mul(slope_of(mapping, signed), alpha_grad)
                     if painted:
                         if gradient:
                             slope = wp.cw_mul(slope, paint_columns[slot, 3, x])

@@ -11,6 +11,7 @@ its opacity is worth.
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.composite_backward import slope_of
 from warpsplat.kernels.paint.flat import paint_against
 from warpsplat.kernels.tile import column, total
 
@@ -21,13 +22,30 @@ TINY = wp.constant(1.0e-9)
 
 
 @wp.func
-def slope_of(mapping: wp.int32, signed: column) -> column:
-    """Return d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves."""
-    slope = column(1.0) - wp.abs(signed)
-    if mapping == constants.AREA:
-        slope = wp.min(STEEP * slope, column(1.0))
-        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, column(-1.0)), column(1.0)))
-    return slope
+def premultiplied_grads(
+    image: wp.array3d[column],
+    hit: wp.array2d[column],
+    image_grad: wp.array3d[column],
+    tile: wp.int32,
+    x: wp.int32,
+):
+    """Return the factor from gradients of straight colours to those of premultiplied ones, and the gradients
+    of the opacity and of hit, in a column of pixels.
+
+    Opacities that are no longer divided by, and pixels that are hit throughout, have none.
+    """
+    one = column(1.0)
+    along = wp.cw_mul(image[tile, 0, x], image_grad[tile, 0, x])
+    along = along + wp.cw_mul(image[tile, 1, x], image_grad[tile, 1, x])
+    along = along + wp.cw_mul(image[tile, 2, x], image_grad[tile, 2, x])
+    touched = hit[tile, x]
+    opaque = image[tile, 3, x]
+    divisor = wp.max(opaque, constants.NOTHING * one)
+    above = wp.min(wp.max(STEEP * (opaque - constants.NOTHING * one), column(0.0)), one)
+    opacity_grad = image_grad[tile, 3, x] - wp.cw_mul(wp.cw_div(along, divisor), above)
+    partly = wp.min(STEEP * (one - touched), one)
+    hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, TINY * one)), partly)
+    return wp.cw_div(touched, divisor), opacity_grad, hit_grad
 
 
 def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Kernel:
@@ -74,19 +92,7 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
             green = image_grad[tile, 1, x]
             blue = image_grad[tile, 2, x]
             if straight:
-                # Gradients of the premultiplied colours, and of hit. Opacities that are no longer divided by,
-                # and pixels that are hit throughout, have none.
-                along = wp.cw_mul(image[tile, 0, x], red)
-                along = along + wp.cw_mul(image[tile, 1, x], green)
-                along = along + wp.cw_mul(image[tile, 2, x], blue)
-                touched = hit[tile, x]
-                opaque = image[tile, 3, x]
-                divisor = wp.max(opaque, constants.NOTHING * one)
-                factor = wp.cw_div(touched, divisor)
-                above = wp.min(wp.max(STEEP * (opaque - constants.NOTHING * one), zero), one)
-                opaque = image_grad[tile, 3, x] - wp.cw_mul(wp.cw_div(along, divisor), above)
-                partly = wp.min(STEEP * (one - touched), one)
-                hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, TINY * one)), partly)
+                factor, opaque, hit_grad = premultiplied_grads(image, hit, image_grad, tile, x)
                 red = wp.cw_mul(red, factor)
                 green = wp.cw_mul(green, factor)
                 blue = wp.cw_mul(blue, factor)

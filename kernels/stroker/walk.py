@@ -28,7 +28,8 @@ class Line:
 class Walk:
     """State of a walk along a contour.
 
-    A piece is drawn when its neighbour is known; until then it is pending.
+    A piece is drawn when its neighbour is known; until then it is pending. Within branches only its fields
+    are assigned: for a struct assigned in a branch Warp copies all of it after the branch.
     """
 
     corner: wp.int32  # number of the next corner of the polygons
@@ -72,16 +73,19 @@ def join_piece(
     line: Line,
     style: Style,
     out: Polygons,
-) -> Walk:
-    """Draw the pending piece and its join with one of ``segment``; ``shared`` is that of the latter then."""
+) -> wp.vec3i:
+    """Draw the pending piece and its join with one of ``segment``.
+
+    Return the number of the next corner, and whether the latter piece shares its first corners.
+    """
     turn = turn_between(w.direction, direction)
     join = wp.where(w.between_beziers != 0, style.join, constants.ROUND)
     plan = plan_join(turn, wp.min(w.length, length), join, style.half, style.miter_limit)
-    shared = wp.vec2i(plan[0], plan[1])
+    n = w.corner
     if w.first_segment != constants.NONE or w.ring == 0:
-        w.corner = draw_pending(w, segment, shared, out)
+        n = draw_pending(w, segment, wp.vec2i(plan[0], plan[1]), out)
     if plan[2] != NO_GAP:
-        w.corner = put_wedge(w.corner, w.segment, segment, turn, style.half, plan[2], out)
+        n = put_wedge(n, w.segment, segment, turn, style.half, plan[2], out)
     if join == constants.MITER and out.write != 0:
         reach = style.half * miter_ratio(turn)
         if reach <= style.half * style.miter_limit:
@@ -89,8 +93,7 @@ def join_piece(
             joint = line.next[w.segment]
             line.extent[joint] = wp.max(line.extent[joint], extent)
             line.extent[segment] = wp.max(line.extent[segment], extent)
-    w.shared = shared
-    return w
+    return wp.vec3i(n, plan[0], plan[1])
 
 
 @wp.func
@@ -117,7 +120,9 @@ def walk_segment(
                 if ends:
                     stop = wp.clamp((gone + step) / length, INSIDE, 1.0 - INSIDE)
                 if w.segment != constants.NONE:
-                    w = join_piece(w, segment, direction, step, line, style, out)
+                    joined = join_piece(w, segment, direction, step, line, style, out)
+                    w.corner = joined[0]
+                    w.shared = wp.vec2i(joined[1], joined[2])
                 else:
                     w.corner = put_cap(w.corner, segment, start, PI, style, out)
                     w.shared = wp.vec2i(0, 0)

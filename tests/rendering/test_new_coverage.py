@@ -21,8 +21,9 @@ from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import make_settings
 from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend, buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.coverage import Coverage, CoverageBuffers
-from warpsplat.rendering.models import Geometry, Job
+from warpsplat.rendering.models import Geometry
 from warpsplat.rendering.program import Program
 from warpsplat.scene import Kind, Scene
 
@@ -38,10 +39,10 @@ class BoxBuffers:
 class BoxGeometry:
     """The corners by which a shape's tiles are found."""
 
-    def __init__(self, job: Job) -> None:
-        self._job = job
-        count = job.parameters.shape_count
-        self.buffers = job.backend.allocate(BoxBuffers, {"shapes": count, "corners": 2 * count})
+    def __init__(self, inputs: StageInputs) -> None:
+        self._inputs = inputs
+        count = inputs.parameters.shape_count
+        self.buffers = inputs.backend.allocate(BoxBuffers, {"shapes": count, "corners": 2 * count})
 
     def samples(self) -> dict[str, wp.array]:
         b = self.buffers
@@ -53,12 +54,12 @@ class BoxGeometry:
         }
 
     def forward(self, program: Program) -> None:
-        parameters = self._job.parameters
+        parameters = self._inputs.parameters
         program.launch(
             trials.corners,
             parameters.shape_count,
             parameters.arrays,
-            self._job.viewport,
+            self._inputs.viewport,
             self.buffers,
             split=True,
         )
@@ -69,19 +70,19 @@ class BoxCoverage:
 
     mapping = constants.AREA
 
-    def __init__(self, job: Job, geometry: BoxGeometry) -> None:
-        self._job = job
-        self.buffers = job.backend.allocate(CoverageBuffers, {"slots": job.slots})
-        self._sources = (job.bins.buffers, geometry.buffers, job.viewport)
+    def __init__(self, inputs: StageInputs, geometry: BoxGeometry) -> None:
+        self._inputs = inputs
+        self.buffers = inputs.backend.allocate(CoverageBuffers, {"slots": inputs.slots})
+        self._sources = (inputs.bins.buffers, geometry.buffers, inputs.viewport)
 
     def states(self, program: Program) -> None:
-        program.launch(trials.boxes_forward, self._job.slots, *self._sources, self.buffers, split=True)
+        program.launch(trials.boxes_forward, self._inputs.slots, *self._sources, self.buffers, split=True)
 
     def values(self, program: Program) -> None:
         """All are there."""
 
     def backward(self, program: Program) -> None:
-        parameters = self._job.parameters
+        parameters = self._inputs.parameters
         program.launch(
             trials.boxes_backward,
             parameters.shape_count,
@@ -96,9 +97,9 @@ class BoxCoverage:
 class BoxModel:
     samples_per_shape: int = 2
 
-    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
-        geometry = BoxGeometry(job)
-        return geometry, BoxCoverage(job, geometry)
+    def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
+        geometry = BoxGeometry(inputs)
+        return geometry, BoxCoverage(inputs, geometry)
 
 
 def expected(scene: Scene, scale: float) -> np.ndarray:

@@ -9,8 +9,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.paper.grid import Grid
 from warpsplat.paper.kernels import splat_coverage
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.coverage import CoverageBuffers
 from warpsplat.rendering.program import Program
 
@@ -25,18 +24,18 @@ class SplatCoverage:
     )
     """Gaussians -> coverages, and its adjoint."""
 
-    def __init__(self, backend: Backend, grid: Grid, bins: Bins, slots: int) -> None:
-        self._backend, self._grid, self._slots = backend, grid, slots
-        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
-        self._sources = (self.buffers, bins.buffers, grid.buffers)
+    def __init__(self, inputs: StageInputs, grid: Grid) -> None:
+        self._inputs, self._grid = inputs, grid
+        self.buffers = inputs.backend.allocate(CoverageBuffers, {"slots": inputs.slots})
+        self._sources = (self.buffers, inputs.bins.buffers, grid.buffers)
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
         program.launch(
             self.kernels[0],
-            (self._slots, self._backend.lanes),
+            (self._inputs.slots, self._inputs.backend.lanes),
             *self._sources,
-            lanes=self._backend.lanes,
+            lanes=self._inputs.backend.lanes,
             split=True,
         )
 

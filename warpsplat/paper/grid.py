@@ -8,8 +8,8 @@ import warp as wp
 
 from warpsplat.paper.chains import check_chains
 from warpsplat.paper.kernels import fill, gaussians, stroke
-from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.ranges import record_ranges
 from warpsplat.scene import Kind
@@ -85,27 +85,18 @@ class Grid:
     owned: type[GridBuffers] = GridBuffers
     """Class of its buffers."""
 
-    def __init__(
-        self,
-        backend: Backend,
-        parameters: Parameters,
-        viewport: Viewport,
-        capacity: int,
-        needed: wp.array,
-        *,
-        through_scales: bool,
-        fold: float,
-    ) -> None:
+    def __init__(self, inputs: StageInputs, *, through_scales: bool, fold: float) -> None:
         """Allocate.
 
         Raises:
             ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
         """
-        self._parameters, self._viewport = parameters, viewport
+        self._parameters, self._viewport = inputs.parameters, inputs.viewport
         self._through_scales, self._fold = through_scales, fold
-        self._capacity, self._needed = capacity, needed
-        check_chains(parameters.structure)
-        self.buffers = backend.allocate(self.owned, {"shapes": parameters.shape_count, "gaussians": capacity})
+        self._capacity, self._needed = inputs.samples, inputs.needed
+        check_chains(inputs.parameters.structure)
+        sizes = {"shapes": inputs.parameters.shape_count, "gaussians": inputs.samples}
+        self.buffers = inputs.backend.allocate(self.owned, sizes)
 
     def samples(self) -> dict[str, wp.array]:
         """Return the parameters of ``bins.rectangles``."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from warpsplat.paper.coverage import GaussianCoverage, SplatCoverage
 from warpsplat.paper.grid import Grid
 from warpsplat.paper.soft import SoftGrid
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.coverage import Coverage
-from warpsplat.rendering.models import Geometry, Job
+from warpsplat.rendering.models import Geometry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,22 +27,14 @@ class GridModel:
 class SplatModel(GridModel):
     """The paper's Gaussians, so placed that they cover what the path covers."""
 
-    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+    def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
         """See ``Model``.
 
         Raises:
             ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
         """
-        grid = Grid(
-            job.backend,
-            job.parameters,
-            job.viewport,
-            job.samples,
-            job.needed,
-            through_scales=self.through_scales,
-            fold=self.fold,
-        )
-        return grid, SplatCoverage(job.backend, grid, job.bins, job.slots)
+        grid = Grid(inputs, through_scales=self.through_scales, fold=self.fold)
+        return grid, SplatCoverage(inputs, grid)
 
 
 @dataclass(frozen=True)
@@ -53,22 +46,18 @@ class GaussianModel(GridModel):
     density: float = 0.5
     """Gaussians along and across a shape over their usual number."""
 
-    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+    def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
         """See ``Model``.
 
         Raises:
             ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
         """
         grid = SoftGrid(
-            job.backend,
-            job.parameters,
-            job.viewport,
-            job.samples,
-            job.needed,
+            inputs,
             softness=self.softness,
             density=self.density,
             through_scales=self.through_scales,
             fold=self.fold,
         )
-        job.bins.paint["opacities"] = grid.buffers.paint_opacities
-        return grid, GaussianCoverage(job.backend, grid, job.bins, job.slots)
+        inputs.bins.paint["opacities"] = grid.buffers.paint_opacities
+        return grid, GaussianCoverage(inputs, grid)

@@ -8,8 +8,8 @@ import warp as wp
 
 from warpsplat.paper.grid import Grid, GridBuffers
 from warpsplat.paper.kernels import fill, gaussians, soft
-from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
 from warpsplat.scene import GRADIENTS, Kind
 
@@ -32,17 +32,7 @@ class SoftGrid(Grid):
     owned = SoftBuffers
 
     def __init__(
-        self,
-        backend: Backend,
-        parameters: Parameters,
-        viewport: Viewport,
-        capacity: int,
-        needed: wp.array,
-        *,
-        softness: float,
-        density: float,
-        through_scales: bool,
-        fold: float,
+        self, inputs: StageInputs, *, softness: float, density: float, through_scales: bool, fold: float
     ) -> None:
         """Allocate.
 
@@ -50,11 +40,9 @@ class SoftGrid(Grid):
             ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2); or a
                 gradient, whose opacities would count besides the Gaussians'.
         """
-        if parameters.paints & set(GRADIENTS):
+        if inputs.parameters.paints & set(GRADIENTS):
             raise ValueError("soft Gaussians have flat colours, no gradients")
-        super().__init__(
-            backend, parameters, viewport, capacity, needed, through_scales=through_scales, fold=fold
-        )
+        super().__init__(inputs, through_scales=through_scales, fold=fold)
         self._softness, self._density = softness, density
         self.buffers.paint_opacities.fill_(1.0)
 

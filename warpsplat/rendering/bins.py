@@ -74,16 +74,8 @@ class Bins:
         """Record samples -> slots, and each tile's range of them."""
         b, shapes, tiles = self.buffers, self._parameters.shape_count, self._viewport.tile_count
         program.launch(bins.rectangles, shapes, b, samples, self._viewport, split=True)
-        record_ranges(
-            program,
-            b.front_slots,
-            b.front_ends,
-            b.slot_first,
-            b.slot_last,
-            self._needed,
-            capacity=self._capacity,
-            reverse=True,
-        )
+        ranges = (b.front_slots, b.front_ends, b.slot_first, b.slot_last)
+        record_ranges(program, *ranges, self._needed, capacity=self._capacity, reverse=True)
         program.launch(bins.fill_slots, self._capacity, b, self._viewport, split=True)
         program.call(wp.utils.radix_sort_pairs, b.sort_keys, b.sort_slots, self._capacity)
         program.launch(bins.clear_ranges, tiles, b)
@@ -101,3 +93,19 @@ class Bins:
             split=True,
             **self.paint,
         )
+
+
+@dataclass(frozen=True)
+class StageInputs:
+    """Inputs and capacities of the stages of a coverage model."""
+
+    backend: Backend
+    parameters: Parameters
+    viewport: Viewport
+    bins: Bins
+    samples: int
+    """Capacity for samples."""
+    slots: int
+    """Capacity for slots."""
+    needed: wp.array
+    """Counter of the need for samples, shape (1,)."""

@@ -9,6 +9,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 
 from warpsplat.native import messages_hidden
 
@@ -21,15 +22,6 @@ MESSAGE_INTERVAL = 1.0
 """Seconds between two such messages."""
 
 
-class _Task:
-    """Work for the compiler, and its result."""
-
-    def __init__(self, work: Callable[[], None]) -> None:
-        self.work = work
-        self.error: BaseException | None = None
-        self.done = threading.Event()
-
-
 class _Compiler:
     """One thread for all modules of a process.
 
@@ -40,28 +32,29 @@ class _Compiler:
     def __init__(self) -> None:
         self.seconds = 0.0
         """Time that the process has waited for all modules so far."""
-        self._latest: _Task | None = None
-        self._tasks: queue.SimpleQueue[_Task] = queue.SimpleQueue()
+        self._latest: Future[None] | None = None
+        self._tasks: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
         threading.Thread(target=self._serve, name="warpsplat compiler", daemon=True).start()
 
     def _serve(self) -> None:
         while True:
-            task = self._tasks.get()
+            work, future = self._tasks.get()
             try:
-                task.work()
+                work()
             except BaseException as error:  # raised again where it is waited for
-                task.error = error
-            task.done.set()
+                future.set_exception(error)
+            else:
+                future.set_result(None)
 
-    def ask(self, work: Callable[[], None]) -> _Task:
+    def ask(self, work: Callable[[], None]) -> Future[None]:
         """Queue ``work`` behind earlier requests."""
-        self._latest = task = _Task(work)
-        self._tasks.put(task)
-        return task
+        self._latest = future = Future[None]()
+        self._tasks.put((work, future))
+        return future
 
     def is_busy(self) -> bool:
         """Return whether work is left, e.g. that of a caller who was interrupted."""
-        return self._latest is not None and not self._latest.done.is_set()
+        return self._latest is not None and not self._latest.done()
 
 
 @functools.cache
@@ -86,14 +79,13 @@ def compile_by(work: Callable[[], None]) -> None:
     compiler = _compiler()
     with messages_hidden():
         started = time.monotonic()
-        task = compiler.ask(work)
-        while not task.done.wait(MESSAGE_INTERVAL):
+        future = compiler.ask(work)
+        while not wait([future], MESSAGE_INTERVAL).done:
             seconds = compiler.seconds + time.monotonic() - started
             log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
         compiler.seconds += time.monotonic() - started
     log.info("", extra={PASSING: True})
-    if task.error:
-        raise task.error
+    future.result()
 
 
 def compiling() -> bool:

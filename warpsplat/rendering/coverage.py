@@ -10,10 +10,9 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.coverage import fill, stroke
 from warpsplat.kernels.tile import column
-from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.outline import Outline
-from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 
 
@@ -63,22 +62,18 @@ class Coverage(Protocol):
 
 
 @dataclass(frozen=True)
-class Stages:
-    """Stages that the parts of a coverage read and write."""
+class ExactStages:
+    """Stages that the parts of exact coverage read and write."""
 
-    backend: Backend
-    parameters: Parameters
-    viewport: Viewport
+    inputs: StageInputs
     outline: Outline
-    bins: Bins
     coverage: CoverageBuffers
-    slots: int
 
     @property
     def sources(self) -> tuple[object, ...]:
         """Return the objects in which launches find their arrays."""
-        arrays = self.coverage, self.bins.buffers, self.outline.buffers, self.parameters.arrays
-        return (*arrays, self.viewport)
+        i = self.inputs
+        return self.coverage, i.bins.buffers, self.outline.buffers, i.parameters.arrays, i.viewport
 
 
 class FillCoverage:
@@ -86,22 +81,24 @@ class FillCoverage:
 
     part = constants.FILL
 
-    def __init__(self, stages: Stages) -> None:
+    def __init__(self, stages: ExactStages) -> None:
         self._stages = stages
-        self.buffers = stages.backend.allocate(FillBuffers, {"slots": stages.slots})
+        self.buffers = stages.inputs.backend.allocate(FillBuffers, {"slots": stages.inputs.slots})
         self._sources = (*stages.sources, self.buffers)
         self._edges = stages.outline.buffers.vertex.shape[0]
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
-        program.launch(fill.fill_states, self._stages.slots, *self._sources, own_part=self.part, split=True)
+        program.launch(
+            fill.fill_states, self._stages.inputs.slots, *self._sources, own_part=self.part, split=True
+        )
 
     def values(self, program: Program) -> None:
         """See ``Coverage``."""
-        backend = self._stages.backend
+        backend = self._stages.inputs.backend
         program.launch(
             fill.fill_forward,
-            (self._stages.slots, backend.lanes),
+            (self._stages.inputs.slots, backend.lanes),
             *self._sources,
             own_part=self.part,
             lane_rows=backend.lane_size,
@@ -125,19 +122,19 @@ class StyledCoverage(FillCoverage):
 
     part = constants.STYLED
 
-    def __init__(self, stages: Stages) -> None:
+    def __init__(self, stages: ExactStages) -> None:
         super().__init__(stages)
         stroker = stages.outline.stroker
         assert stroker
         self._stroker = stroker
-        nonzero = stages.backend.array(wp.int32, stages.parameters.shape_count)
-        shapes = stages.parameters.arrays | {"rule": nonzero}
+        nonzero = stages.inputs.backend.array(wp.int32, stages.inputs.parameters.shape_count)
+        shapes = stages.inputs.parameters.arrays | {"rule": nonzero}
         self._sources = (
             stages.coverage,
-            stages.bins.buffers,
+            stages.inputs.bins.buffers,
             stroker.edges(),
             shapes,
-            stages.viewport,
+            stages.inputs.viewport,
             self.buffers,
         )
 
@@ -150,17 +147,17 @@ class StyledCoverage(FillCoverage):
 class StrokeCoverage:
     """Round strokes by distance: states and coverages in one go."""
 
-    def __init__(self, stages: Stages) -> None:
+    def __init__(self, stages: ExactStages) -> None:
         self._stages = stages
-        sizes = {"slots": stages.slots, "lanes": stages.backend.lanes}
-        self.buffers = stages.backend.allocate(StrokeBuffers, sizes)
+        sizes = {"slots": stages.inputs.slots, "lanes": stages.inputs.backend.lanes}
+        self.buffers = stages.inputs.backend.allocate(StrokeBuffers, sizes)
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
-        backend = self._stages.backend
+        backend = self._stages.inputs.backend
         program.launch(
             stroke.stroke_forward,
-            (self._stages.slots, backend.lanes),
+            (self._stages.inputs.slots, backend.lanes),
             *self._stages.sources,
             self.buffers,
             lane_rows=backend.lane_size,
@@ -181,7 +178,7 @@ class StrokeCoverage:
             sum_grad=stages.coverage.coverage_pixels,
             split=True,
         )
-        program.launch(stroke.widths_backward, stages.parameters.shape_count, *stages.sources)
+        program.launch(stroke.widths_backward, stages.inputs.parameters.shape_count, *stages.sources)
 
 
 EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
@@ -197,19 +194,11 @@ class ExactCoverage:
 
     mapping = constants.AREA
 
-    def __init__(
-        self,
-        backend: Backend,
-        parameters: Parameters,
-        viewport: Viewport,
-        outline: Outline,
-        bins: Bins,
-        slots: int,
-    ) -> None:
-        self.buffers = backend.allocate(CoverageBuffers, {"slots": slots})
+    def __init__(self, inputs: StageInputs, outline: Outline) -> None:
+        self.buffers = inputs.backend.allocate(CoverageBuffers, {"slots": inputs.slots})
         self._outline = outline
-        stages = Stages(backend, parameters, viewport, outline, bins, self.buffers, slots)
-        self.parts = [EXACT_PARTS[part](stages) for part in parameters.parts]
+        stages = ExactStages(inputs, outline, self.buffers)
+        self.parts = [EXACT_PARTS[part](stages) for part in inputs.parameters.parts]
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""

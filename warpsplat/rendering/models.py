@@ -7,11 +7,9 @@ from typing import Protocol
 
 import warp as wp
 
-from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.coverage import Coverage, ExactCoverage
 from warpsplat.rendering.outline import Outline
-from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 
 
@@ -25,22 +23,6 @@ class Geometry(Protocol):
         """Record attributes -> samples."""
 
 
-@dataclass(frozen=True)
-class Job:
-    """Inputs and capacities of a model's stages."""
-
-    backend: Backend
-    parameters: Parameters
-    viewport: Viewport
-    bins: Bins
-    samples: int
-    """Capacity for samples."""
-    slots: int
-    """Capacity for slots."""
-    needed: wp.array
-    """Counter of the need for samples, shape (1,)."""
-
-
 class Model(Protocol):
     """Interface of a model of coverage."""
 
@@ -48,7 +30,7 @@ class Model(Protocol):
     def samples_per_shape(self) -> int:
         """First guess of the need."""
 
-    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+    def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
         """Allocate the two stages."""
 
 
@@ -60,13 +42,10 @@ class ExactModel:
     slack: float = 1.0
     """How much further from the curves the polylines may be than ``constants.FLATNESS``."""
 
-    def stages(self, job: Job) -> tuple[Geometry, Coverage]:
+    def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
         """See ``Model``."""
-        outline = Outline(
-            job.backend, job.parameters, job.viewport, job.samples, job.needed, slack=self.slack
-        )
-        coverage = ExactCoverage(job.backend, job.parameters, job.viewport, outline, job.bins, job.slots)
-        return outline, coverage
+        outline = Outline(inputs, slack=self.slack)
+        return outline, ExactCoverage(inputs, outline)
 
 
 EXACT = ExactModel()

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants, outline
-from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.ranges import record_ranges
 from warpsplat.rendering.stroker import Stroker
@@ -44,27 +44,21 @@ class OutlineBuffers:
 class Outline:
     """Flattens curves as finely as their size in pixels asks for."""
 
-    def __init__(
-        self,
-        backend: Backend,
-        parameters: Parameters,
-        viewport: Viewport,
-        capacity: int,
-        needed: wp.array,
-        *,
-        slack: float = 1.0,
-    ) -> None:
+    def __init__(self, inputs: StageInputs, *, slack: float = 1.0) -> None:
         """``slack``: how much further from the curves the polylines may be than ``constants.FLATNESS``."""
-        self._parameters, self._viewport = parameters, viewport
-        self._capacity, self._needed, self._slack = capacity, needed, slack
-        self.buffers = backend.allocate(
+        parameters = inputs.parameters
+        self._parameters, self._viewport = parameters, inputs.viewport
+        self._capacity, self._needed, self._slack = inputs.samples, inputs.needed, slack
+        self.buffers = inputs.backend.allocate(
             OutlineBuffers,
-            {"beziers": parameters.bezier_count, "shapes": parameters.shape_count, "vertices": capacity},
+            {
+                "beziers": parameters.bezier_count,
+                "shapes": parameters.shape_count,
+                "vertices": inputs.samples,
+            },
         )
-        self.stroker: Stroker | None = None
+        self.stroker = Stroker(inputs, self.buffers) if constants.STYLED in parameters.parts else None
         """Stage of the strokes that are drawn as polygons."""
-        if constants.STYLED in parameters.parts:
-            self.stroker = Stroker(backend, parameters, viewport, self.buffers, capacity, needed)
 
     def samples(self) -> dict[str, wp.array]:
         """Return the samples that tiles are found from, as ``bins.rectangles`` takes them."""
@@ -81,15 +75,8 @@ class Outline:
         b, p = self.buffers, self._parameters
         sources = (b, p.arrays, self._viewport)
         program.launch(outline.plan_outline, p.shape_count, *sources, slack=self._slack)
-        record_ranges(
-            program,
-            b.vertex_count,
-            b.vertex_ends,
-            b.vertex_first,
-            b.vertex_last,
-            self._needed,
-            capacity=self._capacity,
-        )
+        ranges = (b.vertex_count, b.vertex_ends, b.vertex_first, b.vertex_last)
+        record_ranges(program, *ranges, self._needed, capacity=self._capacity)
         program.launch(outline.outline_forward, p.bezier_count, *sources, split=True)
         if self.stroker:
             self.stroker.forward(program)

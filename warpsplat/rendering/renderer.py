@@ -12,10 +12,10 @@ from warpsplat.errors import CapacityError
 from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.bins import Bins
+from warpsplat.rendering.bins import Bins, StageInputs
 from warpsplat.rendering.film import Film
 from warpsplat.rendering.memory import check_memory
-from warpsplat.rendering.models import EXACT, Job, Model
+from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -107,8 +107,8 @@ class Renderer:
         self.capacity = capacity
         limit = OPACITY_RANGE[1] if self._opaque else 1.0
         self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, opacity_limit=limit)
-        job = Job(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
-        self.geometry, self.coverage = self.model.stages(job)
+        inputs = StageInputs(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
+        self.geometry, self.coverage = self.model.stages(inputs)
         self.paint = Painting(backend, p, v, self.bins, capacity.slots)
         self.forward_program = backend.program()
         self._record_forward(self.forward_program)

@@ -8,8 +8,8 @@ import warp as wp
 
 from warpsplat.kernels import corners
 from warpsplat.kernels.stroker.walk import walk_strokes
-from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.ranges import record_ranges
 
@@ -41,21 +41,12 @@ class StrokerBuffers:
 class Stroker:
     """Polygons of the strokes that are not round throughout."""
 
-    def __init__(
-        self,
-        backend: Backend,
-        parameters: Parameters,
-        viewport: Viewport,
-        lines: object,
-        capacity: int,
-        needed: wp.array,
-    ) -> None:
-        """``lines``: buffers of the outline stage, of the same ``capacity``."""
-        self._parameters, self._needed, self._capacity = parameters, needed, capacity
-        self.buffers = backend.allocate(
-            StrokerBuffers, {"shapes": parameters.shape_count, "corners": capacity}
-        )
-        self._sources = (self.buffers, lines, parameters.arrays, viewport)
+    def __init__(self, inputs: StageInputs, lines: object) -> None:
+        """``lines``: buffers of the outline stage."""
+        self._inputs = inputs
+        sizes = {"shapes": inputs.parameters.shape_count, "corners": inputs.samples}
+        self.buffers = inputs.backend.allocate(StrokerBuffers, sizes)
+        self._sources = (self.buffers, lines, inputs.parameters.arrays, inputs.viewport)
 
     def edges(self) -> dict[str, wp.array]:
         """Return the polygons as the kernels of fills take outlines."""
@@ -73,21 +64,14 @@ class Stroker:
 
     def forward(self, program: Program) -> None:
         """Record centre lines, widths -> corners; and how far these reach."""
-        b, shapes = self.buffers, self._parameters.shape_count
+        b, shapes = self.buffers, self._inputs.parameters.shape_count
         program.launch(walk_strokes, shapes, *self._sources, write=0, split=True)
-        record_ranges(
-            program,
-            b.corner_count,
-            b.corner_ends,
-            b.corner_first,
-            b.corner_last,
-            self._needed,
-            capacity=self._capacity,
-        )
+        ranges = (b.corner_count, b.corner_ends, b.corner_first, b.corner_last)
+        record_ranges(program, *ranges, self._inputs.needed, capacity=self._inputs.samples)
         program.launch(walk_strokes, shapes, *self._sources, write=1, split=True)
-        program.launch(corners.place_corners, self._capacity, *self._sources, split=True)
+        program.launch(corners.place_corners, self._inputs.samples, *self._sources, split=True)
 
     def backward(self, program: Program) -> None:
         """Record gradients of the polygons' edges -> of the segments' ends and of the widths."""
-        shapes = self._parameters.shape_count
+        shapes = self._inputs.parameters.shape_count
         program.launch(corners.corners_backward, shapes, *self._sources, split=True)

@@ -152,10 +152,10 @@ def make_backward(name: str, *, soft: bool) -> wp.Kernel:
         cut: wp.array[wp.float32],  # [gaussian_capacity] of q
         strength: wp.array[wp.float32],  # [gaussian_capacity] soft only
         sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
-        # Out, written:
-        mean_grad: wp.array[wp.vec2],  # [gaussian_capacity]
-        conic_grad: wp.array[wp.vec3],  # [gaussian_capacity]
-        strength_grad: wp.array[wp.float32],  # [gaussian_capacity] soft only
+        # Out:
+        mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
+        conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] written
+        strength_grad: wp.array[wp.float32],  # [gaussian_capacity] written; soft only
     ):
         """A gather, one thread a Gaussian, over the pixels it reaches.
 
