@@ -1,4 +1,4 @@
-"""What a run of a batch does: made, skipped, failed, goals."""
+"""Runs of batches: made, skipped, failed, goals."""
 
 from __future__ import annotations
 
