@@ -1,11 +1,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.batch.helpers import Answers, answers
+from tests.cli.helpers import run
 from tests.files.memory_store import store  # noqa: F401
 
 
@@ -17,3 +20,13 @@ def folder(tmp_path: Path) -> Path:
         Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(tmp_path / name)
     (tmp_path / "in" / "broken.png").write_bytes(b"no image")
     return tmp_path
+
+
+@pytest.fixture
+def batch(capsys: pytest.CaptureFixture[str]) -> Answers:
+    def answered(*arguments: object, code: int = 0) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+        capsys.readouterr()
+        assert run(*arguments, "--json") == code
+        return answers(capsys.readouterr().out)
+
+    return answered

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,16 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
+Answers = Callable[..., tuple[list[dict[str, Any]], dict[str, Any]]]
+"""Runs a command with ``--json`` and returns its lines about images and the last one; see ``conftest``."""
+
+
 def load_jobs(path: Path, command: Layer | None = None) -> list[BatchJob]:
-    """Of a batch file."""
+    """Return the jobs of a batch file."""
     return plan_jobs([str(path)], command)
 
 
 def answers(out: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """What ``batch --json`` said of each image, and of all."""
+    """Return what ``batch --json`` printed: for each image, and for all."""
     values = [json.loads(line) for line in out.splitlines()]
     return values[:-1], values[-1]

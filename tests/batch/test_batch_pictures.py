@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.batch.helpers import answers, load_jobs, write
+from tests.batch.helpers import Answers, load_jobs, write
 from tests.cli.helpers import run
 from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.tasks import Stop
@@ -26,7 +26,7 @@ def kept(folder: Path) -> dict[str, tuple[bytes, int]]:
 
 
 def test_pictures_are_made_once_with_and_without_a_manifest(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str], batch: Answers
 ) -> None:
     pytest.importorskip("typst")
     images = [folder / "in" / name for name in ("a.png", "b.png")]
@@ -52,20 +52,17 @@ def test_pictures_are_made_once_with_and_without_a_manifest(
     notes.write_bytes(
         b"".join(line for line in lines if b'"writing"' in line)
     )  # killed before that was noted
-    assert run(*arguments, "--json") == 0
-    found, totals = answers(capsys.readouterr().out)
+    found, totals = batch(*arguments)
     assert totals["skipped"] == 2
     assert all(image["psnr"] > 5 for image in found)
 
     notes.unlink()
-    assert run(*arguments, "--json") == 0
-    assert answers(capsys.readouterr().out)[1]["skipped"] == 2, "they say themselves what they were made of"
+    assert batch(*arguments)[1]["skipped"] == 2, "they say themselves what they were made of"
     assert kept(folder / "out") == made
 
     torn = folder / "out" / "a.png"
     torn.write_bytes(torn.read_bytes()[:-10])
-    assert run(*arguments, "--json", "--seed", "1") == 0, "ours, but whole or torn of another job"
-    assert answers(capsys.readouterr().out)[1]["made"] == 2
+    assert batch(*arguments, "--json", "--seed", "1")[1]["made"] == 2
 
 
 def test_pictures_of_others_stay(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,7 +93,7 @@ def test_no_result_replaces_an_input(folder: Path, capsys: pytest.CaptureFixture
         assert "would be overwritten by" in capsys.readouterr().err
 
 
-def test_results_beside_the_images_are_no_images(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_beside_the_images_are_no_images(folder: Path, batch: Answers) -> None:
     (folder / "in" / "broken.png").unlink()
     arguments = (
         "batch",
@@ -108,8 +105,7 @@ def test_results_beside_the_images_are_no_images(folder: Path, capsys: pytest.Ca
         "--json",
     )
     for status in ("made", "skipped"):
-        assert run(*arguments) == 0
-        assert answers(capsys.readouterr().out)[1][status] == 2
+        assert batch(*arguments)[1][status] == 2
     assert sorted(path.name for path in (folder / "in").glob("*.png")) == [
         "a-3.png",
         "a.png",

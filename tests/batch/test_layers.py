@@ -95,32 +95,6 @@ def test_names_of_results(folder: Path, output: str, made: str) -> None:
     assert names(load_jobs(write(folder, text)), folder) == [made]
 
 
-WRONG = [
-    ("jobs:\n  - {images: in/a.png, preset: fine}\n", 2, "there is no 'fine'; known are: none"),
-    ("presets: [fine]\njobs: [{images: in/a.png}]\n", 1, "presets: must be a mapping"),
-    ("presets:\n  fine: {curvs: 3}\njobs: [{images: in/a.png}]\n", 2, "unknown key 'curvs' in preset 'fine'"),
-    ("presets:\n  fine:\n    curves: 0\njobs: [{images: in/a.png}]\n", 3, "curves"),
-    ("jobs:\n  - images: in/a.png\n    matrix: {curves: 3}\n", 3, "must be a list"),
-    ("jobs:\n  - images: in/a.png\n    matrix: {curves: []}\n", 3, "must be a list"),
-    ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, x]}\n", 3, "curves"),
-    ("jobs:\n  - images: in/a.png\n    matrix: {rates: [3]}\n", 3, "unknown key 'rates' in matrix"),
-    ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, 4]}\n", 2, "2 results would be"),
-    ("jobs:\n  - images: in/a.png\n    output: '{curvs}.svg'\n", 3, "'{curvs}' is no field"),
-    ("jobs:\n  - images: in/a.png\n    output: '{.svg'\n", 3, "'{' is no field"),
-    ("jobs:\n  - images: in/a.png\n    output: '{stem}'\n", 3, "names of results end with .svg"),
-    (f"jobs:\n  - images: in/a.png\n    matrix: {{curves: {[*range(1, 1002)]}}}\n", 3, "combinations"),
-]
-
-
-@pytest.mark.parametrize(("text", "line", "words"), WRONG)
-def test_errors_name_their_line(folder: Path, text: str, line: int, words: str) -> None:
-    path = write(folder, text)
-    with pytest.raises(UsageError) as caught:
-        load_jobs(path)
-    assert str(caught.value).startswith(f"{path}:{line}: ")
-    assert words in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -101,6 +101,7 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    closed: true\n    open: true\n", 4, "open"),
     ("jobs:\n  - images: in/a.png\n    open: no\n", 3, "open"),
     ("jobs:\n  - images: in/a.png\n    output: 3\n", 3, "output"),
+    ("jobs:\n  - images: in/a.png\n    importance: 3\n", 3, "importance: must be text, not 3"),
     ("jobs:\n  - images: nothing/*.png\n", 2, "nothing/*.png"),
     ("jobs:\n  - images: 7\n", 2, "images"),
     ("jobs:\n  - images: in/a.png\n    curves: 1\n    curves: 2\n", 4, "twice"),
@@ -140,6 +141,19 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    renderer: splat\n    basis: spline\n", 2, "needs the basis cubic"),
     ("? &a [*a]\n: 1\n", 1, "unknown key"),
     ("jobs:\n  - \x01\n", 2, "not allowed"),
+    ("jobs:\n  - {images: in/a.png, preset: fine}\n", 2, "there is no 'fine'; known are: none"),
+    ("presets: [fine]\njobs: [{images: in/a.png}]\n", 1, "presets: must be a mapping"),
+    ("presets:\n  fine: {curvs: 3}\njobs: [{images: in/a.png}]\n", 2, "unknown key 'curvs' in preset 'fine'"),
+    ("presets:\n  fine:\n    curves: 0\njobs: [{images: in/a.png}]\n", 3, "curves"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: 3}\n", 3, "must be a list"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: []}\n", 3, "must be a list"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, x]}\n", 3, "curves"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {rates: [3]}\n", 3, "unknown key 'rates' in matrix"),
+    ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, 4]}\n", 2, "2 results would be"),
+    ("jobs:\n  - images: in/a.png\n    output: '{curvs}.svg'\n", 3, "'{curvs}' is no field"),
+    ("jobs:\n  - images: in/a.png\n    output: '{.svg'\n", 3, "'{' is no field"),
+    ("jobs:\n  - images: in/a.png\n    output: '{stem}'\n", 3, "names of results end with .svg"),
+    (f"jobs:\n  - images: in/a.png\n    matrix: {{curves: {[*range(1, 1002)]}}}\n", 3, "combinations"),
 ]
 
 

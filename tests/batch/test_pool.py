@@ -62,7 +62,7 @@ def test_workers_that_never_begin_end_the_batch(tmp_path: Path) -> None:
 
 
 def test_no_more_is_taken_than_there_are_workers_and_nothing_after_a_stop(tmp_path: Path) -> None:
-    """What has begun ends by itself."""
+    """Tasks in progress end by themselves."""
     taken: list[int] = []
     begun: list[int] = []
 

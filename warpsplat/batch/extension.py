@@ -1,4 +1,4 @@
-"""What batches add to the core."""
+"""The extension ``batch``: its command, and ``vectorize`` with several images."""
 
 from warpsplat.extensions import Command, Extension
 

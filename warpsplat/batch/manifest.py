@@ -81,11 +81,7 @@ def entry_of(line: bytes) -> Entry | None:
             return None
         texts = {name: values.get(name, "") for name in ("output", "key", "digest", "image", "error")}
         figures = {name: value for name, value in values.get("figures", {}).items() if _is_valid(name, value)}
-        if (
-            not all(isinstance(text, str) for text in texts.values())
-            or not texts["output"]
-            or not texts["key"]
-        ):
+        if not (all(isinstance(text, str) for text in texts.values()) and texts["output"] and texts["key"]):
             return None
         texts["error"] = printable(texts["error"])  # it is shown, whoever wrote it
         return Entry(event=values["event"], figures=figures, **texts)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, ReportRequest, Stop, Task
+from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, Stop, Task
 from warpsplat.batch.executors.work import failure
 from warpsplat.batch.manifest import Entry, Event, Manifest
 from warpsplat.batch.plan import BatchJob
@@ -170,9 +170,6 @@ class Batch:
 
     def _task(self, number: int, inputs: JobInputs, *, measure: bool) -> Task:
         job, entry = self.jobs[number], self._claims[number].entry
-        report = None
-        if self._reports:
-            report = ReportRequest(self._reports.link_back(job.output), entry.figures if entry else {})
         return Task(
             number,
             inputs.key,
@@ -188,7 +185,8 @@ class Batch:
             # picture is drawn once, for both.
             bring=is_remote(job.output) or job.settings.minify or is_picture(job.output),
             result=read_result(job.output) if measure else None,
-            report=report,
+            report_back=self._reports.link_back(job.output) if self._reports else "",
+            figures=entry.figures if entry else {},
         )
 
     def _settle(self, outcome: Outcome) -> None:

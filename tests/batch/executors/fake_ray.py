@@ -60,7 +60,7 @@ class FakeRay:
         self.doom: Counter[Any] = Counter()
         """How often an actor dies when it is given this task, by its number, or at this method."""
         self.words = "The actor died unexpectedly.\nmore of it"
-        """Of Ray's error then."""
+        """Message of Ray's error then."""
         self.between: Callable[[str], None] = lambda method: None
         """Called before each call that is done."""
         self.connected = False

@@ -16,16 +16,6 @@ OnProgress = Callable[[int, float], None]
 
 
 @dataclass(frozen=True)
-class ReportRequest:
-    """Contents of a report besides what its task says."""
-
-    back: str
-    """Relative path of the page that the report links back to."""
-    figures: Mapping[str, Any] = field(default_factory=dict)
-    """Figures of a result that was made earlier."""
-
-
-@dataclass(frozen=True)
 class Task:
     """An image to vectorize, or a result to measure."""
 
@@ -50,8 +40,10 @@ class Task:
     """Whether the worker returns the result's bytes (``Outcome.data``) instead of writing ``output``."""
     result: bytes | None = field(default=None, repr=False)
     """The result if it exists already, and only its figures are wanted."""
-    report: ReportRequest | None = None
-    """The report to return as well; None: none."""
+    report_back: str = ""
+    """Relative path that the report to return links back to; empty: no report is requested."""
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    """Figures of the ``result``, as far as they are known."""
 
 
 @dataclass(frozen=True)

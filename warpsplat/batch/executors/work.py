@@ -86,7 +86,7 @@ def _measured(task: Task, data: bytes) -> Outcome:
     svg = svg_text(data, task.output)
     score = score_svg(svg, load_target(task.image, task.name, task.settings.background), eyes=False)
     outcome = Outcome(task.number, "measured", task.key, digest(data), figures=score.as_dict())
-    if not task.report:
+    if not task.report_back:
         return outcome
     backend = _backend(task)
     with device_lock(backend.device):
@@ -105,12 +105,12 @@ def _with_report(
 
     ``result``: the result of the run just done; None: it was made earlier.
     """
-    if task.report is None:
+    if not task.report_back:
         return outcome
     from warpsplat.pages.reports.single import Facts, report_page
 
     line = vectorize_command(task.settings, task.name, task.output)
-    figures = task.report.figures or outcome.figures
+    figures = task.figures or outcome.figures
     try:
         page = report_page(
             svg,
@@ -120,7 +120,7 @@ def _with_report(
             name=os.path.basename(task.name),
             svg_name=f"{os.path.basename(task.output).rpartition('.')[0]}.svg",
             own=result is not None,
-            back=task.report.back,
+            back=task.report_back,
         )
     except (WarpsplatError, OSError, MemoryError) as error:
         return replace(outcome, report_error=failure(error, task.name, task.output))
