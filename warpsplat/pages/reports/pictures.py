@@ -132,28 +132,20 @@ def _bytes_on_white(drawn: Bytes) -> FloatArray:
 def encoded(pixels: FloatArray, capacity: float) -> str:
     """Return an image as a data URI of a WebP of at most ``capacity`` bytes, drawings without loss."""
     levels = to_bytes(pixels)
-    image = Image.fromarray(levels)
     if _has_few_colors(levels):
-        data = _webp(image, lossless=True)
+        data = _webp(Image.fromarray(levels), lossless=True)
         if len(data) <= capacity:
             return webp_uri(data)
-    return webp_uri(_first_that_fits(image, QUALITIES, capacity))
+    return first_that_fits(Image.fromarray(levels), QUALITIES, capacity)
 
 
-def encoded_map(pixels: Bytes, capacity: float) -> str:
-    """Return an error map as a data URI."""
-    return webp_uri(_first_that_fits(Image.fromarray(pixels), MAP_QUALITIES, capacity))
-
-
-def _first_that_fits(image: Image.Image, qualities: Sequence[int], capacity: float) -> bytes:
-    """Return a WebP of the first quality that fits, of a smaller copy if none does."""
+def first_that_fits(image: Image.Image, qualities: Sequence[int], capacity: float) -> str:
+    """Return a WebP of the first quality that fits as a data URI, of a smaller copy if none does."""
     for quality in qualities:
         data = _webp(image, quality=quality)
-        if len(data) <= capacity:
-            return data
-    if min(image.size) < 2:
-        return data
-    return _first_that_fits(image.reduce(2), qualities[-2:], capacity)
+        if len(data) <= capacity or (quality == qualities[-1] and min(image.size) < 2):
+            return webp_uri(data)
+    return first_that_fits(image.reduce(2), qualities[-2:], capacity)
 
 
 def _webp(image: Image.Image, *, lossless: bool = False, quality: int = 80) -> bytes:

@@ -28,7 +28,7 @@ from warpsplat.pages.serve.guard import line
 from warpsplat.pages.serve.limits import Refused
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.uploads import DEFAULT_NAME, plain_name, read_upload
-from warpsplat.pages.serve.worker import Machine, RunThread
+from warpsplat.pages.serve.worker import Machine, start_worker
 from warpsplat.run.command_line import vectorize_command
 
 MAX_REQUEST = 20_000
@@ -93,8 +93,7 @@ class Service:
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        worker = RunThread(self._store, self._machine)
-        worker.start()
+        worker = start_worker(self._store, self._machine)
         expiring = asyncio.create_task(self._expire())
         try:
             yield
