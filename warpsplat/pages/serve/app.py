@@ -57,13 +57,7 @@ class Service:
     """The answers to a page's requests."""
 
     def __init__(self, store: Store, machine: Machine, max_memory: str | None = None) -> None:
-        """Start nothing yet.
-
-        Args:
-            store: sessions and runs.
-            machine: where runs are computed.
-            max_memory: limit of each run, as on the command line.
-        """
+        """Start nothing yet; ``max_memory``: limit of each run, as on the command line."""
         self._store, self._machine, self._max_memory = store, machine, max_memory
         self._page = serve_page(store.limits)
         self._decoding = asyncio.Semaphore(1)

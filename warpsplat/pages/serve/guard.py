@@ -45,13 +45,7 @@ class Guard:
     """Middleware that admits authorised requests only, and adds the headers of every answer."""
 
     def __init__(self, app: ASGIApp, token: str, host: str = "") -> None:
-        """Wrap an application.
-
-        Args:
-            app: answers the requests that are admitted.
-            token: must be in the address.
-            host: name of this machine that requests may use, besides addresses and ``localhost``.
-        """
+        """Wrap an application; ``host``: a name that is trusted besides addresses and ``localhost``."""
         self._app, self._token, self._host = app, token, host.lower()
         self._tickets: set[str] = set()
 

@@ -68,14 +68,7 @@ class WarpsplatServer:
         limits: Limits | None = None,
         max_memory: str | None = None,
     ) -> None:
-        """Listen.
-
-        Args:
-            host: address or name of this machine.
-            port: number of the port; 0: any that is free.
-            machine: where runs are computed.
-            limits: what it accepts and holds.
-            max_memory: limit of each run.
+        """Listen; a ``port`` of 0 is any that is free, and ``max_memory`` the limit of each run.
 
         Raises:
             UsageError: the address cannot be used.
