@@ -11,7 +11,6 @@ import json
 import os
 import traceback
 from collections.abc import AsyncIterator
-from typing import Any
 from urllib.parse import quote
 
 from starlette.applications import Starlette
@@ -168,12 +167,17 @@ class Service:
     async def start(self, request: Request) -> Response:
         """Queue a run of ``image`` with ``settings``."""
         session = request.path_params["session"]
-        given = _parsed(await _body(request, MAX_REQUEST, "the request"))
+        try:
+            given = json.loads(await _body(request, MAX_REQUEST, "the request"))
+        except ValueError:  # includes a wrong encoding
+            given = None
+        if not isinstance(given, dict):
+            raise Refused(400, "the request must be a JSON object")
         image = str(given.get("image"))
         upload = self._store.upload(session, image)
         values, settings = settings_of(given.get("settings", {}), self._max_memory)
         path = f"./{upload.name}" if upload.name.startswith("-") else upload.name
-        command = vectorize_command(settings, path, f"{_stem(path)}.svg")
+        command = vectorize_command(settings, path, f"{os.path.splitext(path)[0]}.svg")
         return JSONResponse({"run": self._store.add_run(session, image, values, settings, command)}, 201)
 
     async def stop(self, request: Request) -> Response:
@@ -197,7 +201,7 @@ class Service:
         run = self._store.run(*_names(request))
         if "download" not in request.query_params:
             return _svg(run.svg, CACHED)
-        name = quote(_stem(run.upload.name), safe="")
+        name = quote(os.path.splitext(run.upload.name)[0], safe="")
         return _svg(run.svg, {"Content-Disposition": f"attachment; filename*=UTF-8''{name}.svg"})
 
 
@@ -205,12 +209,6 @@ def _names(request: Request) -> tuple[str, str]:
     """Return the session of a request, and its image or run."""
     session, name = request.path_params.values()
     return session, name
-
-
-def _stem(name: str) -> str:
-    """Return the name of a file without its ending."""
-    stem, _, ending = name.rpartition(".")
-    return stem if stem and "/" not in ending else name
 
 
 def _svg(data: bytes, headers: dict[str, str]) -> Response:
@@ -228,16 +226,6 @@ async def _body(request: Request, limit: int, name: str) -> bytes:
             raise Refused(413, f"{name}: more than {limit / 1e6:g} MB")
         parts.append(part)
     return b"".join(parts)
-
-
-def _parsed(body: bytes) -> dict[str, Any]:
-    try:
-        given = json.loads(body)
-    except ValueError:  # includes a wrong encoding
-        given = None
-    if not isinstance(given, dict):
-        raise Refused(400, "the request must be a JSON object")
-    return given
 
 
 async def _error(_: Request, error: Exception) -> Response:
