@@ -31,7 +31,6 @@ EXCEPTIONS = {
     ("warpsplat/tools/bench.py", "cv2.GaussianBlur"): "the same",
     ("warpsplat/tools/bench.py", "np.cos"): "the same",
     ("warpsplat/tools/bench.py", "np.sin"): "the same",
-    ("warpsplat/pages/reports/pictures.py", "cv2.cvtColor"): "a report's pictures",
     ("warpsplat/pages/reports/pictures.py", "cv2.resize"): "a report's pictures",
     ("warpsplat/pages/reports/shapes.py", "np.log10"): "a report's figures",
     ("warpsplat/metrics.py", "cv2.GaussianBlur"): "SSIM, which is only shown",

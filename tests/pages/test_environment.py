@@ -30,19 +30,17 @@ def made(name: str) -> Tags:
     return Tags(page("test.html.j2", assets=("viewer.css", "viewer.js"), name=name))
 
 
-@pytest.mark.parametrize("name", NASTY)
-def test_nasty_texts_add_no_element_and_no_attribute(name: str) -> None:
+TEXTS = st.text(alphabet=st.characters(codec="utf-8") | st.sampled_from("<>\"'&/{}%"), max_size=40)
+
+
+@given(st.sampled_from(NASTY) | TEXTS)
+def test_texts_add_no_element_and_no_attribute(name: str) -> None:
     nasty, plain = made(name), made("plain")
     assert nasty.tags == plain.tags
     assert nasty.attributes == plain.attributes
     link = nasty.links[-1]
     assert not re.search(r"[^\w./%~-]", link)
     assert unquote_to_bytes(link) == name.encode("utf-8", "surrogateescape")
-
-
-@given(st.text(alphabet=st.characters(codec="utf-8") | st.sampled_from("<>\"'&/{}%"), max_size=40))
-def test_no_text_adds_an_element(name: str) -> None:
-    assert made(name).tags == made("plain").tags
 
 
 def test_what_a_page_loads() -> None:

@@ -1,4 +1,4 @@
-"""``--report``."""
+"""The option ``--report``."""
 
 from __future__ import annotations
 
@@ -44,14 +44,6 @@ def test_where_a_report_cannot_be(
     assert (tmp_path / "other.html").read_text() == "<p>mine</p>"
 
 
-@pytest.mark.needs("batch")
-def test_a_batch_that_cannot_write_its_list(image: Path, tmp_path: Path) -> None:
-    (tmp_path / "index.html").write_text("<p>mine</p>")
-    assert run("batch", image, "-o", tmp_path / "out", "--report", tmp_path, *QUICK) == 2
-    assert (tmp_path / "index.html").read_text() == "<p>mine</p>"
-
-
-@pytest.mark.needs("batch")
 def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.png"
     other.write_bytes(image.read_bytes())
@@ -64,7 +56,6 @@ def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.needs("batch")
 @pytest.mark.parametrize(
     ("report", "said"),
     [
@@ -72,16 +63,17 @@ def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
         ("out/photo.svg", "is another file of this batch"),
         ("photo.png", "is another file of this batch"),
         ("notes.txt", "is a file, not a folder"),
+        ("", "index.html: exists and was not written by warpsplat"),
     ],
 )
 def test_a_batch_s_report_takes_no_other_file_s_place(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], report: str, said: str
 ) -> None:
-    notes = tmp_path / "notes.txt"
-    notes.write_text("mine")
+    for name in ("notes.txt", "index.html"):
+        (tmp_path / name).write_text("mine")
     before = sorted(tmp_path.rglob("*"))
     manifest = ("--manifest", tmp_path / "m.html")
     assert run("batch", image, "-o", tmp_path / "out", "--report", tmp_path / report, *manifest, *QUICK) == 2
     assert said in one_line(capsys.readouterr().err)
     assert sorted(tmp_path.rglob("*")) == before
-    assert notes.read_text() == "mine"
+    assert (tmp_path / "notes.txt").read_text() == (tmp_path / "index.html").read_text() == "mine"

@@ -81,25 +81,22 @@ def plot(
     up, across = ticks(0.0 if filled else low, high, 5), ticks(0.0, end, 6)
     low, high = min(low, up[0]), max(high, up[-1])
 
-    def x_of(value: float) -> float:
-        return LEFT + (RIGHT - LEFT) * value / end
+    def place(x: float, y: float) -> tuple[float, float]:
+        return LEFT + (RIGHT - LEFT) * x / end, BOTTOM - (BOTTOM - TOP) * (y - low) / (high - low)
 
-    def y_of(value: float) -> float:
-        return BOTTOM - (BOTTOM - TOP) * (value - low) / (high - low)
-
-    placed = [(x_of(x), y_of(y)) for x, y, _ in found]
+    placed = [place(x, y) for x, y, _ in found]
     lines = []
     for flag, group in itertools.groupby(zip(found, placed, strict=True), key=lambda pair: pair[0][2]):
-        run = [place for _, place in group]
+        run = [point for _, point in group]
         lines.append((_points(run * 2 if len(run) == 1 else run), flag))  # a single point becomes a dot
     area = [(placed[0][0], BOTTOM), *placed, (placed[-1][0], BOTTOM)] if filled else []
     return Plot(
         title,
         labels,
         lines,
-        [(x_of(value), number(value)) for value in across if value <= end * 1.0001],
-        [(y_of(value), number(value)) for value in up],
-        [mark._replace(x=x_of(mark.x), y=y_of(mark.y)) for mark in marks],
+        [(place(value, low)[0], number(value)) for value in across if value <= end * 1.0001],
+        [(place(0.0, value)[1], number(value)) for value in up],
+        [Mark(*place(mark.x, mark.y), mark.text, mark.strong) for mark in marks],
         _points(area),
     )
 

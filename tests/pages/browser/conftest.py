@@ -1,4 +1,4 @@
-"""A real browser, headless, for all tests of this folder; where there is none they are skipped."""
+"""A real headless browser for the tests of this folder, which are skipped if there is none."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Route, ViewportSize
+    from playwright.sync_api import Browser, Page, Route
 
 ARGUMENTS = [
     "--headless",
@@ -25,44 +25,40 @@ ARGUMENTS = [
 ]
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 LONGEST_WAIT = 20_000
-"""For anything on a page [ms]."""
-
-
-def installed_browser() -> str | None:
-    """The system's Chromium; None: Playwright's own, if there is one. ``WARPSPLAT_BROWSER`` overrides it."""
-    given = os.environ.get("WARPSPLAT_BROWSER")
-    return given or next(filter(None, map(shutil.which, NAMES)), None)
+"""Longest wait for anything on a page [ms]."""
 
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """As long as it is there, so is an event loop of its own: other folders' tests run some themselves."""
+    """The system's Chromium, else Playwright's own; ``WARPSPLAT_BROWSER`` overrides it.
+
+    Its scope is this package, since it keeps an event loop running, which would disturb other tests.
+    """
     api = pytest.importorskip("playwright.sync_api", reason="pip install playwright, for tests in a browser")
     with api.sync_playwright() as playwright:
-        executable = installed_browser()
-        if executable is None and not Path(playwright.chromium.executable_path).exists():
+        path = os.environ.get("WARPSPLAT_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
+        if path is None and not Path(playwright.chromium.executable_path).exists():
             pytest.skip("no browser: apt-get install chromium, or playwright install chromium")
-        made = playwright.chromium.launch(executable_path=executable, args=ARGUMENTS)
+        made = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield made
         made.close()
 
 
 class Complaints(list[str]):
-    """What went wrong on pages: errors, lines on the console, requests for what is not in the file."""
+    """What went wrong on pages: errors, messages of the console, requests for other than the file."""
 
     expected: str | None = None
-    """Part of lines that may be on the console, whenever the browser gets round to them."""
+    """Part of messages that are ignored."""
 
-    def hear(self, line: str) -> None:
-        """Note a line on the console."""
-        if self.expected is None or self.expected not in line:
-            self.append(line)
+    def add(self, text: str) -> None:
+        if self.expected is None or self.expected not in text:
+            self.append(text)
 
 
-def wait_until(page: Page, is_so: Callable[[], bool]) -> None:
-    """Let a page go on until something is so that it does not say itself."""
+def wait_until(page: Page, condition: Callable[[], bool]) -> None:
+    """Let a page run until ``condition()`` is true."""
     end = time.monotonic() + LONGEST_WAIT / 1000
-    while not is_so():
+    while not condition():
         assert time.monotonic() < end
         page.wait_for_timeout(20)
 
@@ -74,12 +70,12 @@ def complaints() -> Complaints:
 
 @contextlib.contextmanager
 def opened(browser: Browser, complaints: Complaints) -> Iterator[Page]:
-    """An empty page that must not complain of anything."""
+    """Yield an empty page, and check that there were no complaints."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     context.set_default_timeout(LONGEST_WAIT)
     page = context.new_page()
     page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda line: complaints.hear(line.text) if line.type != "log" else None)
+    page.on("console", lambda line: complaints.add(line.text) if line.type != "log" else None)
     yield page
     context.close()
     assert not complaints
@@ -87,7 +83,7 @@ def opened(browser: Browser, complaints: Complaints) -> Iterator[Page]:
 
 @pytest.fixture
 def tab(browser: Browser, complaints: Complaints) -> Iterator[Page]:
-    """An empty page that reaches nothing but files, and whose test fails where it complains of anything."""
+    """An empty page that can load files only."""
 
     def local_only(route: Route) -> None:
         if route.request.url.startswith(("file:", "data:", "blob:")):
@@ -101,19 +97,16 @@ def tab(browser: Browser, complaints: Complaints) -> Iterator[Page]:
         yield page
 
 
-PHONE: ViewportSize = {"width": 390, "height": 844}
-
-
 def fits_a_phone(page: Page) -> bool:
-    """Whether a page on a phone's screen, where it is shown from now on, need not be moved sideways."""
-    page.set_viewport_size(PHONE)
+    """Show a page on a phone's screen from now on, and return whether it needs no horizontal scrolling."""
+    page.set_viewport_size({"width": 390, "height": 844})
     width: int = page.evaluate("document.documentElement.scrollWidth")
-    return width == PHONE["width"]
+    return width == 390
 
 
 @pytest.fixture(scope="session")
 def halves() -> np.ndarray:
-    """Pixels of a dark and a bright half with grain, of the type uint8, shape (32, 48, 3)."""
+    """A dark and a bright half with grain, uint8, shape (32, 48, 3)."""
     image = np.random.default_rng(0).integers(0, 60, (32, 48, 3)).astype(np.uint8)
     image[:, 24:] += 150
     return image

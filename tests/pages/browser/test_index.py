@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def make_index(folder: Path) -> Path:
-    """Of three images, one of which is none."""
+    """Run a batch on two images and another file."""
     grain = np.random.default_rng(0).integers(0, 80, (32, 32, 3)).astype(np.uint8)
     Image.fromarray(grain).save(folder / "b#?.png")
     Image.fromarray(grain // 3 + 150).save(folder / "a.png")
@@ -50,7 +50,7 @@ def test_sorting_and_filtering(index: Page) -> None:
     index.locator("th[data-key=psnr] button").click()
     figures = [float(text) for text in index.locator("td.number:nth-child(3)").all_text_contents() if text]
     assert len(figures) == 2 and figures == sorted(figures, reverse=True)
-    assert names(index)[-1] == "c<b>.png"  # what has no figure
+    assert names(index)[-1] == "c<b>.png"  # has no figure
     assert index.locator("th[data-key=psnr]").get_attribute("aria-sort") == "descending"
     index.select_option("#sort", "name")
     index.locator("#direction").press("Enter")
@@ -63,10 +63,8 @@ def test_sorting_and_filtering(index: Page) -> None:
 
 
 def test_links_lead_to_reports_and_back(index: Page) -> None:
-    assert (
-        index.locator(".pair img").first.evaluate("image => image.decode().then(() => image.naturalWidth)")
-        > 50
-    )
+    thumbnail = index.locator(".pair img").first
+    assert thumbnail.evaluate("image => image.decode().then(() => image.naturalWidth)") > 50
     index.locator(".called a", has_text="b#?.png").click()
     index.locator(".option").first.wait_for()
     assert index.locator("h1").text_content() == "b#?.png"
@@ -79,8 +77,8 @@ def test_links_lead_to_reports_and_back(index: Page) -> None:
 
 
 def test_a_second_run_lists_what_was_made_before(tmp_path: Path, tab: Page) -> None:
-    make_index(tmp_path)
     folder = tmp_path
+    make_index(folder)
     page = folder / "pages" / "index-pages" / "a.svg.html"
     made = page.read_bytes()
     manifest = (folder / "out" / "warpsplat-manifest.jsonl").read_bytes()
@@ -88,7 +86,7 @@ def test_a_second_run_lists_what_was_made_before(tmp_path: Path, tab: Page) -> N
     arguments = ("-o", folder / "out", "--report", folder / "pages", "-q", *QUICK, "--workers", 1)
     assert run("batch", folder / "a.png", *arguments) == 0
     assert (folder / "out" / "warpsplat-manifest.jsonl").read_bytes() == manifest
-    assert abs(len(page.read_bytes()) - len(made)) < 9000  # all but the course of the run
+    assert abs(len(page.read_bytes()) - len(made)) < 9000  # without the plots of the run
     tab.goto((folder / "pages" / "index.html").as_uri())
     assert names(tab) == ["a.png"]
     assert (tab.locator("td.number").first.text_content() or "").strip()

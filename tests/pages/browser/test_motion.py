@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 SECONDS = 1.5
-"""Of the movement."""
+"""Duration of the animation."""
 
 TRIES = 10
-"""Times that a movement is begun until a picture is taken before it is over: a machine may be busy."""
+"""Attempts to take a picture before an animation is over: the machine may be busy."""
 
 LONGEST_WAIT = 15.0
-"""For what is to be seen [s]."""
+"""Longest wait for a picture [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def shot(tab: Page, element: str = "#shown") -> np.ndarray:
 
 
 def comes(tab: Page, right: Callable[[np.ndarray], bool]) -> bool:
-    """Whether a picture is seen that is ``right``."""
+    """Wait for a picture that is ``right``, and return whether there was one."""
     end = time.monotonic() + LONGEST_WAIT
     while not (found := right(shot(tab))) and time.monotonic() < end:
         tab.wait_for_timeout(50)
@@ -58,9 +58,9 @@ def page_with(tab: Page, folder: Path, element: str) -> None:
 
 
 def begins_otherwise(tab: Page, folder: Path, file: np.ndarray) -> bool:
-    """Whether an SVG that plays, ``a.svg``, shows something else at first than what ``file`` looks like."""
-    for turn in range(TRIES):
-        page_with(tab, folder, f'<img id="shown" src="a.svg?{turn}" width="48">')
+    """Return whether the animation ``a.svg`` begins with another picture than ``file``."""
+    for attempt in range(TRIES):
+        page_with(tab, folder, f'<img id="shown" src="a.svg?{attempt}" width="48">')
         if np.abs(shot(tab) - file).mean() > 2:
             return True
     return False
@@ -70,7 +70,7 @@ def begins_otherwise(tab: Page, folder: Path, file: np.ndarray) -> bool:
 def test_an_svg_plays_in_an_image(
     tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path, what: str
 ) -> None:
-    """And ends as the file. Opened by itself it is that at once for readers that ask for less motion."""
+    """It ends as the file, and begins so for users that prefer reduced motion."""
     made, result = recorded
     made.save(tmp_path / "a.svg", result, what=what, seconds=SECONDS)
     result.save(tmp_path / "file.svg")
@@ -86,7 +86,7 @@ def test_an_svg_plays_in_an_image(
 
 
 def at(tab: Page, seconds: float) -> np.ndarray:
-    """What an SVG shows at a time."""
+    """Return the picture of an SVG at a time."""
     tab.evaluate(
         """time => {
             const svg = document.documentElement;
@@ -103,7 +103,7 @@ def at(tab: Page, seconds: float) -> np.ndarray:
 
 
 def test_a_shape_is_between_its_places(tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path) -> None:
-    """And between its colours; what comes is half there."""
+    """So are its colours, and a new shape is half opaque."""
     scene = replace(mixed_scene(48, 36), opacities=np.ones(len(mixed_scene()), np.float32))
     one = scene.take(np.flatnonzero((scene.kind == Kind.FILL) & (scene.basis == Basis.SPLINE))[:1])
     box = bounds(one)[0]
@@ -139,7 +139,7 @@ def test_a_film_plays_in_an_image(
 
 
 def test_an_mp4_plays(tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path) -> None:
-    """By a browser that knows H.264, as all but builds without patents do."""
+    """Most browsers know H.264, but not builds without patented codecs."""
     pytest.importorskip("av", reason="pip install av, for MP4s")
     recorded[0].save(tmp_path / "a.mp4", recorded[1], seconds=SECONDS, width=48)
     page_with(tab, tmp_path, '<video id="shown" src="a.mp4" width="48" muted></video>')

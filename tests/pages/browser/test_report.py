@@ -1,4 +1,4 @@
-"""The report of a run, operated as people do."""
+"""The report of a run, operated like a user."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def report_file(halves: np.ndarray, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a run of some steps."""
     path = tmp_path_factory.mktemp("report") / "report.html"
     result = warpsplat.vectorize(halves, 12, iterations=12, subject="photo", device="cpu", threads=1)
     shown = Image.fromarray(halves)
@@ -49,7 +48,7 @@ def test_the_slider_is_dragged_and_moved_by_keys(report: Page) -> None:
     assert handle.get_attribute("aria-valuenow") == "0"
     handle.press("Shift+ArrowRight")
     assert handle.get_attribute("aria-valuenow") == "10"
-    # What is left of the line is the original, what is right of it the file.
+    # Left of the divider is the original, right of it the file.
     shown = report.locator(".viewer-side[data-side=right] img:not([hidden])")
     assert shown.get_attribute("data-name") == "svg"
     assert shown.evaluate("image => image.decode().then(() => image.naturalWidth)") == 48
@@ -81,7 +80,7 @@ def test_both_pictures_are_zoomed_and_panned_together(report: Page) -> None:
     assert report.locator(".viewer-zoom").text_content() == "100 %"
 
 
-def test_a_shape_is_found_in_the_picture_and_in_the_list(report: Page) -> None:
+def test_shapes_are_marked_in_the_picture_and_in_the_list(report: Page) -> None:
     options = report.locator(".option")
     assert options.count() == 12
     options.nth(1).hover()
@@ -90,7 +89,7 @@ def test_a_shape_is_found_in_the_picture_and_in_the_list(report: Page) -> None:
     assert re.search(r"of 12 from the back · fill #\w{6}.* · without it [\d.]+ dB (less|more)", told)
     report.mouse.move(0, 0)
     wait_until(report, lambda: report.locator(".viewer-overlay .edge").count() == 0)
-    # A shape that can be pointed at says which entry is its own.
+    # Pointing at a shape marks its entry.
     inside = report.evaluate(
         """() => {
             const box = document.querySelector(".viewer-stage").getBoundingClientRect();
@@ -105,7 +104,7 @@ def test_a_shape_is_found_in_the_picture_and_in_the_list(report: Page) -> None:
     report.locator(f".option.hot[data-shape='{inside[2]}']").wait_for()
 
 
-def test_the_list_is_sorted_and_walked_by_keys(report: Page) -> None:
+def test_the_list_is_sorted_and_operated_by_keys(report: Page) -> None:
     numbers = report.locator(".option .number:nth-child(2)")
     report.select_option("#order", "back")
     assert numbers.all_text_contents() == [str(i) for i in range(1, 13)]
@@ -120,7 +119,7 @@ def test_the_list_is_sorted_and_walked_by_keys(report: Page) -> None:
 
 def test_a_layer_is_switched_off(report: Page) -> None:
     def shown() -> list[int]:
-        """The middle row of the file's picture."""
+        """Return the middle row of the file's picture."""
         return report.evaluate(
             """async () => {
                 const image = document.querySelector(".viewer-side[data-side=right] img[data-name=svg]");
@@ -151,9 +150,6 @@ def test_error_map_download_and_command(report: Page, report_file: Path) -> None
     assert download.value.suggested_filename == "a b.svg"
     assert Path(download.value.path()).read_text().startswith("<svg")
     assert report.locator("#command").text_content() == "warpsplat vectorize 'a b.png'"
-
-
-def test_on_a_phone(report: Page) -> None:
     assert fits_a_phone(report)
 
 
@@ -166,7 +162,7 @@ HOSTILE = (
 
 
 def test_a_hostile_file_stays_a_picture(tab: Page, tmp_path: Path, complaints: Complaints) -> None:
-    complaints.expected = "Executing inline event handler violates"  # that it was kept from it
+    complaints.expected = "Executing inline event handler violates"  # the browser reports that it refused
     image = np.full((32, 48, 3), 90, np.uint8)
     path = tmp_path / "hostile.html"
     name = "</script><script>alert(4)</script>"
@@ -186,7 +182,7 @@ def test_a_hostile_file_stays_a_picture(tab: Page, tmp_path: Path, complaints: C
     tab.select_option("#order", "front")
     tab.locator("#list").press("ArrowDown")
     tab.locator("#list").press("Enter")
-    tab.locator(".zoomed").wait_for()  # the small square fills much of the stage now
-    for shown in tab.locator("img[data-name=svg]").all():  # drawn: what it would do, it has done
+    tab.locator(".zoomed").wait_for()  # to the small square
+    for shown in tab.locator("img[data-name=svg]").all():  # drawn: its scripts would have run
         assert shown.evaluate("image => image.decode().then(() => image.naturalWidth)") == 48
     assert not said

@@ -76,6 +76,7 @@ def test_two_settings_of_an_image_are_compared_and_one_is_saved(visit: Page, tmp
     cards.nth(0).get_by_role("button", name="Remove").click()
     page.wait_for_selector(".run:nth-child(2)", state="detached")
     assert right.get_attribute("alt") == "Original"
+    assert fits_a_phone(page)
 
 
 def test_a_run_is_live_survives_a_reload_and_can_be_stopped(visit: Page, visitor: Visitor) -> None:
@@ -103,6 +104,7 @@ def test_a_run_is_live_survives_a_reload_and_can_be_stopped(visit: Page, visitor
 
 def test_refusals_are_shown_where_they_belong(visit: Page, complaints: Complaints) -> None:
     page = visit
+    assert fits_a_phone(page)
     page.set_input_files(
         "#drop input", {"name": "notes.txt", "mimeType": "text/plain", "buffer": b"no image"}
     )
@@ -121,12 +123,3 @@ def test_refusals_are_shown_where_they_belong(visit: Page, complaints: Complaint
     wait_until(page, lambda: len(complaints) >= 2)
     assert [int(text.rpartition("status of ")[2][:3]) for text in complaints] == [415, 400]
     complaints.clear()
-
-
-def test_it_fits_a_phone(visit: Page) -> None:
-    page = visit
-    assert fits_a_phone(page)
-    give(page, picture())
-    start(page, 4)
-    done(page, 1)
-    assert fits_a_phone(page)

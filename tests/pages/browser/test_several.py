@@ -1,4 +1,4 @@
-"""The page that compares several numbers of shapes, operated as people do."""
+"""The page that compares several numbers of shapes, operated like a user."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.pages.browser.conftest import PHONE, fits_a_phone
+from tests.pages.browser.conftest import fits_a_phone
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -39,10 +39,5 @@ def test_any_two_are_compared_and_each_is_downloaded(tab: Page, several_file: Pa
         tab.locator("[data-key=version-2] a").click()
     waiting.value.save_as(tmp_path / "nine.svg")
     assert (tmp_path / "nine.svg").read_text().count("<path") == 9
-    assert tab.locator(".plot").count() == 2 and tab.locator(".plot circle").count() == 6
-
-
-def test_a_phone_sees_all_of_it(tab: Page, several_file: Path) -> None:
-    tab.set_viewport_size(PHONE)
-    tab.goto(several_file.as_uri())
     assert fits_a_phone(tab)
+    assert tab.locator(".plot").count() == 2 and tab.locator(".plot circle").count() == 6

@@ -18,11 +18,12 @@ import warpsplat
 from tests.pages.helpers import NASTY, Tags, data_of
 from warpsplat.fit.progress import Progress
 from warpsplat.pages.reports.pictures import (
+    MAP_QUALITIES,
     PAGE_PIXELS,
     ShownImage,
     encoded,
-    encoded_map,
     error_map,
+    first_that_fits,
     shown_image,
 )
 from warpsplat.pages.reports.shapes import contributions, matched
@@ -140,7 +141,7 @@ def test_the_size_of_a_page_is_limited(page: str) -> None:
     """However small the image file is, and whatever it shows."""
     noise = np.random.default_rng(0).random((300, 300, 3), np.float32)
     assert len(encoded(noise, 2000)) < 2000 * 4 / 3 + 40
-    assert len(encoded_map(np.asarray(to_pillow(noise)), 2000)) < 2000 * 4 / 3 + 40
+    assert len(first_that_fits(to_pillow(noise), MAP_QUALITIES, 2000)) < 2000 * 4 / 3 + 40
     # Of the pictures, each stands in the page once.
     pictures = re.findall(r"data:image/webp;base64,[\w+/=]+", page)
     assert len(pictures) == len(set(pictures)) == 2

@@ -180,16 +180,6 @@ def test_the_picture_of_an_image_is_encoded_here(visitor: Visitor) -> None:
     assert (told["width"], told["height"], told["transparent"]) == (20, 30, True)
 
 
-def test_an_image_that_is_longer_than_a_webp_can_be(visitor: Visitor) -> None:
-    """It is shown smaller."""
-    buffer = io.BytesIO()
-    Image.effect_noise((20_000, 60), 90).save(buffer, "JPEG")
-    image = visitor.upload(buffer.getvalue())
-    answer = visitor.client.get(visitor.at("images", image))
-    with Image.open(io.BytesIO(answer.content)) as shown:
-        assert shown.size == (10_000, 30)
-
-
 def test_headers(visitor: Visitor) -> None:
     run = visitor.over(visitor.begin(visitor.upload(picture()), **SHORT))
     for path in ("/", visitor.at("runs", run["id"], "result.svg"), "/nothing"):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import warpsplat
-from tests.pages.serve.helpers import picture
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.pages.serve.live import LEAST_PAUSE, SHARE, Live
 
@@ -75,9 +74,3 @@ def test_the_time_left() -> None:
     slow.now += 2
     live(replace(report, psnr=21.234, work=0.3))
     assert live.left == pytest.approx(7.0) and live.as_dict()["psnr"] == 21.23
-
-
-def test_a_real_run_has_pictures_of_its_shapes() -> None:
-    live = Live()
-    warpsplat.vectorize(picture(), 4, subject="photo", iterations=10, device="cpu", threads=1, callback=live)
-    assert live.number >= 1 and 1 <= len(warpsplat.load_svg(live.picture)) <= 6

@@ -82,9 +82,8 @@ def shown_image(source: ImageSource, name: str | None, most: int = PAGE_PIXELS) 
         width, height = facts.width, facts.height
         factor = math.ceil(max(1, math.sqrt(width * height / most), max(width, height) / WEBP_SIDE))
     pixels = image_of(source, name, factor=factor)
-    return ShownImage(
-        pixels, facts.width if facts else pixels.shape[1], facts.height if facts else pixels.shape[0]
-    )
+    height, width = (facts.height, facts.width) if facts else pixels.shape[:2]
+    return ShownImage(pixels, width, height)
 
 
 def capacity_of(image: ImageSource) -> float:
@@ -104,14 +103,12 @@ def error_map(drawn: Bytes, target: FloatArray) -> Bytes:
     """
     size = np.sqrt(np.mean((_on_white(target) - _bytes_on_white(drawn)) ** 2, axis=2))
     levels = np.clip(np.round(size * (255 / MOST_ERROR)), 0, 255).astype(np.uint8)
-    colors = cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)
-    return np.asarray(cv2.cvtColor(colors, cv2.COLOR_BGR2RGB), np.uint8)
+    return np.ascontiguousarray(cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[..., ::-1], np.uint8)
 
 
 def map_colors() -> list[str]:
     """Return colours along the error map's scale, as ``#rrggbb``."""
-    levels = np.linspace(0, 255, 9).astype(np.uint8)[:, None]
-    colors = cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[:, 0, ::-1]
+    colors = cv2.applyColorMap(np.linspace(0, 255, 9).astype(np.uint8), cv2.COLORMAP_INFERNO)[:, 0, ::-1]
     return ["#" + bytes(color.tolist()).hex() for color in colors]
 
 
@@ -132,39 +129,26 @@ def _bytes_on_white(drawn: Bytes) -> FloatArray:
 def encoded(pixels: FloatArray, capacity: float) -> str:
     """Return an image as a data URI of a WebP of at most ``capacity`` bytes, drawings without loss."""
     image = to_pillow(pixels)
-    if _has_few_colors(np.asarray(image)):
+    if image.getcolors(FEW_COLORS):
         data = _webp(image, lossless=True)
         if len(data) <= capacity:
             return webp_uri(data)
-    return webp_uri(_first_that_fits(image, QUALITIES, capacity))
+    return first_that_fits(image, QUALITIES, capacity)
 
 
-def encoded_map(pixels: Bytes, capacity: float) -> str:
-    """Return an error map as a data URI."""
-    return webp_uri(_first_that_fits(Image.fromarray(pixels), MAP_QUALITIES, capacity))
-
-
-def _first_that_fits(image: Image.Image, qualities: Sequence[int], capacity: float) -> bytes:
-    """Return a WebP of the first quality that fits, of a smaller copy if none does."""
+def first_that_fits(image: Image.Image, qualities: Sequence[int], capacity: float) -> str:
+    """Return a WebP of the first quality that fits as a data URI, of a smaller copy if none does."""
     for quality in qualities:
         data = _webp(image, quality=quality)
-        if len(data) <= capacity:
-            return data
-    if min(image.size) < 2:
-        return data
-    return _first_that_fits(image.reduce(2), qualities[-2:], capacity)
+        if len(data) <= capacity or (quality == qualities[-1] and min(image.size) < 2):
+            return webp_uri(data)
+    return first_that_fits(image.reduce(2), qualities[-2:], capacity)
 
 
 def _webp(image: Image.Image, *, lossless: bool = False, quality: int = 80) -> bytes:
     file = io.BytesIO()
     image.save(file, "WEBP", lossless=lossless, quality=quality, method=2)
     return file.getvalue()
-
-
-def _has_few_colors(levels: Bytes) -> bool:
-    whole = np.zeros((*levels.shape[:2], 4), np.uint8)
-    whole[..., : levels.shape[2]] = levels
-    return len(np.unique(whole.reshape(-1, 4).view(np.uint32))) <= FEW_COLORS
 
 
 def thumbnails(target: FloatArray, drawn: Bytes) -> str:

@@ -7,20 +7,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from PIL import Image
+
 from warpsplat.errors import ImageError, printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.progress import Progress
 from warpsplat.pages import page
 from warpsplat.pages.plot import Plot, plot
 from warpsplat.pages.reports.pictures import (
+    MAP_QUALITIES,
     MOST_ERROR,
     PAGE_PIXELS,
     SHORT_PIXELS,
     ShownImage,
     capacity_of,
     encoded,
-    encoded_map,
     error_map,
+    first_that_fits,
     map_colors,
     shown_image,
     thumbnails,
@@ -144,7 +147,7 @@ def report_page(
 
 def _pictures(shown: ShownImage, errors: Any, capacity: float) -> list[dict[str, Any]]:
     """Return the pictures under the slider."""
-    differences = encoded_map(errors, capacity / 3)
+    differences = first_that_fits(Image.fromarray(errors), MAP_QUALITIES, capacity / 3)
     original = encoded(shown.pixels, capacity - len(differences) * 3 / 4)  # base64 takes four bytes for three
     return [
         {"name": "image", "label": "Original", "url": original, "pixels": True},

@@ -11,7 +11,6 @@ import json
 import os
 import traceback
 from collections.abc import AsyncIterator
-from typing import Any
 from urllib.parse import quote
 
 from starlette.applications import Starlette
@@ -28,7 +27,7 @@ from warpsplat.pages.serve.guard import line
 from warpsplat.pages.serve.limits import Refused
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.uploads import DEFAULT_NAME, plain_name, read_upload
-from warpsplat.pages.serve.worker import Machine, RunThread
+from warpsplat.pages.serve.worker import Machine, start_worker
 from warpsplat.run.command_line import vectorize_command
 
 MAX_REQUEST = 20_000
@@ -57,13 +56,7 @@ class Service:
     """The answers to a page's requests."""
 
     def __init__(self, store: Store, machine: Machine, max_memory: str | None = None) -> None:
-        """Start nothing yet.
-
-        Args:
-            store: sessions and runs.
-            machine: where runs are computed.
-            max_memory: limit of each run, as on the command line.
-        """
+        """Start nothing yet; ``max_memory``: limit of each run, as on the command line."""
         self._store, self._machine, self._max_memory = store, machine, max_memory
         self._page = serve_page(store.limits)
         self._decoding = asyncio.Semaphore(1)
@@ -93,8 +86,7 @@ class Service:
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        worker = RunThread(self._store, self._machine)
-        worker.start()
+        worker = start_worker(self._store, self._machine)
         expiring = asyncio.create_task(self._expire())
         try:
             yield
@@ -175,12 +167,17 @@ class Service:
     async def start(self, request: Request) -> Response:
         """Queue a run of ``image`` with ``settings``."""
         session = request.path_params["session"]
-        given = _parsed(await _body(request, MAX_REQUEST, "the request"))
+        try:
+            given = json.loads(await _body(request, MAX_REQUEST, "the request"))
+        except ValueError:  # includes a wrong encoding
+            given = None
+        if not isinstance(given, dict):
+            raise Refused(400, "the request must be a JSON object")
         image = str(given.get("image"))
         upload = self._store.upload(session, image)
         values, settings = settings_of(given.get("settings", {}), self._max_memory)
         path = f"./{upload.name}" if upload.name.startswith("-") else upload.name
-        command = vectorize_command(settings, path, f"{_stem(path)}.svg")
+        command = vectorize_command(settings, path, f"{os.path.splitext(path)[0]}.svg")
         return JSONResponse({"run": self._store.add_run(session, image, values, settings, command)}, 201)
 
     async def stop(self, request: Request) -> Response:
@@ -204,7 +201,7 @@ class Service:
         run = self._store.run(*_names(request))
         if "download" not in request.query_params:
             return _svg(run.svg, CACHED)
-        name = quote(_stem(run.upload.name), safe="")
+        name = quote(os.path.splitext(run.upload.name)[0], safe="")
         return _svg(run.svg, {"Content-Disposition": f"attachment; filename*=UTF-8''{name}.svg"})
 
 
@@ -212,12 +209,6 @@ def _names(request: Request) -> tuple[str, str]:
     """Return the session of a request, and its image or run."""
     session, name = request.path_params.values()
     return session, name
-
-
-def _stem(name: str) -> str:
-    """Return the name of a file without its ending."""
-    stem, _, ending = name.rpartition(".")
-    return stem if stem and "/" not in ending else name
 
 
 def _svg(data: bytes, headers: dict[str, str]) -> Response:
@@ -235,16 +226,6 @@ async def _body(request: Request, limit: int, name: str) -> bytes:
             raise Refused(413, f"{name}: more than {limit / 1e6:g} MB")
         parts.append(part)
     return b"".join(parts)
-
-
-def _parsed(body: bytes) -> dict[str, Any]:
-    try:
-        given = json.loads(body)
-    except ValueError:  # includes a wrong encoding
-        given = None
-    if not isinstance(given, dict):
-        raise Refused(400, "the request must be a JSON object")
-    return given
 
 
 async def _error(_: Request, error: Exception) -> Response:

@@ -45,13 +45,7 @@ class Guard:
     """Middleware that admits authorised requests only, and adds the headers of every answer."""
 
     def __init__(self, app: ASGIApp, token: str, host: str = "") -> None:
-        """Wrap an application.
-
-        Args:
-            app: answers the requests that are admitted.
-            token: must be in the address.
-            host: name of this machine that requests may use, besides addresses and ``localhost``.
-        """
+        """Wrap an application; ``host``: a name that is trusted besides addresses and ``localhost``."""
         self._app, self._token, self._host = app, token, host.lower()
         self._tickets: set[str] = set()
 
@@ -84,8 +78,9 @@ class Guard:
         if request.method not in {"GET", "HEAD"} and not _is_same_origin(request.headers):
             return line(403, "requests from other pages are not allowed")
         cookie = f"warpsplat-{port}"
-        given = request.query_params.get(TOKEN)
-        if given is not None and request.url.path == "/" and self._take(given):
+        given = request.query_params.get(TOKEN, "") if request.url.path == "/" else ""
+        if given in self._tickets or self._is_token(given):
+            self._tickets.discard(given)
             answer = RedirectResponse("/", 303)
             answer.set_cookie(cookie, self._token, httponly=True, samesite="strict")
             return answer
@@ -102,13 +97,6 @@ class Guard:
         except ValueError:
             return False
         return True
-
-    def _take(self, token: str) -> bool:
-        """Tell whether a token is right; a ticket is used up by it."""
-        if token in self._tickets:
-            self._tickets.remove(token)
-            return True
-        return self._is_token(token)
 
     def _is_token(self, token: str) -> bool:
         return hmac.compare_digest(token.encode(), self._token.encode())

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import ipaddress
 import logging
 import os
 import secrets
 import socket
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 
 import uvicorn
 
@@ -20,6 +21,9 @@ from warpsplat.pages.serve.guard import TOKEN, Guard
 from warpsplat.pages.serve.limits import Limits
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
+
+POLL = 0.1
+"""Time between two calls of ``stop`` [s]."""
 
 LAST_ANSWERS = 2
 """Longest wait for unfinished answers when the server ends [s]."""
@@ -64,14 +68,7 @@ class WarpsplatServer:
         limits: Limits | None = None,
         max_memory: str | None = None,
     ) -> None:
-        """Listen.
-
-        Args:
-            host: address or name of this machine.
-            port: number of the port; 0: any that is free.
-            machine: where runs are computed.
-            limits: what it accepts and holds.
-            max_memory: limit of each run.
+        """Listen; a ``port`` of 0 is any that is free, and ``max_memory`` the limit of each run.
 
         Raises:
             UsageError: the address cannot be used.
@@ -98,13 +95,11 @@ class WarpsplatServer:
 
     def run(self, stop: Callable[[], bool], ready: Callable[[], None] = lambda: None) -> None:
         """Answer requests until ``stop()``, which is polled, is true; ``ready`` is called at the start."""
-
-        def is_over() -> bool:
-            if stop():
-                self.store.close()  # ends the streams of events, which uvicorn would wait for
-            return self.store.closed
-
         logging.getLogger("uvicorn").setLevel(logging.CRITICAL)  # its messages are about faulty clients
+        self._socket.setblocking(False)
+        asyncio.run(self._serve(stop, ready))
+
+    async def _serve(self, stop: Callable[[], bool], ready: Callable[[], None]) -> None:
         config = uvicorn.Config(
             self._guard,
             http=Protocol,
@@ -115,47 +110,24 @@ class WarpsplatServer:
             server_header=False,
             timeout_graceful_shutdown=LAST_ANSWERS,
         )
-        self._socket.setblocking(False)
-        asyncio.run(_PolledServer(config, self._socket, is_over, ready).serve([]))
-
-
-class _PolledServer(uvicorn.Server):
-    """Polls whether to end instead of handling signals: ours also handle a second Ctrl-C."""
-
-    def __init__(
-        self,
-        config: uvicorn.Config,
-        listener: socket.socket,
-        is_over: Callable[[], bool],
-        ready: Callable[[], None],
-    ) -> None:
-        super().__init__(config)
-        self._listener, self._is_over, self._ready = listener, is_over, ready
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Generator[None, None, None]:
-        """Leave the handlers of signals as they are."""
-        yield
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start to answer."""
-        await super().startup(sockets)
-        self._accepting = asyncio.create_task(accept(self._listener, self._protocol))
-        self._is_over()  # from the first poll on a signal is a request to stop
-        self._ready()
-
-    def _protocol(self) -> Protocol:
-        return Protocol(self.config, self.server_state, self.lifespan.state)
-
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop answering."""
-        self._accepting.cancel()
-        self._listener.close()
-        await super().shutdown(sockets)
-
-    async def on_tick(self, counter: int) -> bool:
-        """Close idle connections and return whether to end; called ten times a second."""
-        for connection in list(self.server_state.connections):
-            assert isinstance(connection, Protocol)
-            connection.close_if_idle()
-        return self._is_over() or await super().on_tick(counter)
+        server = uvicorn.Server(config)
+        # Our own handlers of signals make ``stop`` true, and also handle a second Ctrl-C.
+        server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
+        serving = asyncio.create_task(server.serve([]))
+        while not (server.started or serving.done()):
+            await asyncio.sleep(POLL / 10)
+        stop()  # from the first call on a signal is a request to stop
+        state = server.server_state
+        make = functools.partial(Protocol, config, state, server.lifespan.state)
+        accepting = asyncio.create_task(accept(self._socket, make))
+        ready()
+        while not (self.store.closed or stop() or serving.done()):
+            for connection in list(state.connections):
+                assert isinstance(connection, Protocol)
+                connection.close_if_idle()
+            await asyncio.sleep(POLL)
+        self.store.close()  # ends the streams of events, which uvicorn would wait for
+        accepting.cancel()
+        self._socket.close()
+        server.should_exit = True
+        await serving

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,7 +23,6 @@ FIGURES = ("psnr", "ssim", "bytes", "shapes", "seconds", "subject", "why", "redu
 class QueuedRun:
     """A run that a page asked for. ``Store`` changes it under its lock."""
 
-    id: str
     number: int
     """Number among the runs of its session, from 1."""
     image: str
@@ -33,6 +33,7 @@ class QueuedRun:
     settings: Settings
     command: str
     """Shell command that makes the same file."""
+    id: str = field(default_factory=lambda: secrets.token_urlsafe(8))
     state: State = "waiting"
     live: Live = field(default_factory=Live)
     stopping: threading.Event = field(default_factory=threading.Event)

@@ -158,16 +158,8 @@ class Store:
                 pass
             live = Live(lambda: self.is_attended(name), self._changed)
             session.runs_started += 1
-            run = QueuedRun(
-                secrets.token_urlsafe(8),
-                session.runs_started,
-                image,
-                upload,
-                values,
-                settings,
-                command,
-                live=live,
-            )
+            number = session.runs_started
+            run = QueuedRun(number, image, upload, values, settings, command, live=live)
             session.runs[run.id] = run
             self._queue.append(run)
             self._changed()

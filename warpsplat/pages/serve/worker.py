@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 import threading
 import traceback
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import warpsplat
@@ -27,48 +25,50 @@ class Machine:
     threads: int | None = None
 
 
-class RunThread(threading.Thread):
-    """Does the runs of a store's queue until the store is closed."""
-
-    def __init__(self, store: Store, machine: Machine) -> None:
-        # A daemon: when the program has to end at once, as within the compiler, it does not wait for a run.
-        super().__init__(name="runs", daemon=True)
-        self._store, self._machine = store, machine
-
-    def run(self) -> None:
-        """Do one run after the other."""
-        while run := self._store.next():
-            with _notices_to(run.live):
-                outcome = self._outcome(run)
-            self._store.finish(run, outcome)
-            del run, outcome
-            release_memory()
-
-    def _outcome(self, run: QueuedRun) -> Result | str:
-        """Return the result, or the error."""
-        try:
-            return warpsplat.vectorize(
-                run.upload.data,
-                settings=run.settings,
-                name=run.upload.name,
-                device=self._machine.device,
-                threads=self._machine.threads,
-                callback=run.live,
-                stop=run.stopping.is_set,
-            )
-        except BaseException as error:  # whatever it is, the next run may succeed
-            if os.environ.get("WARPSPLAT_TRACEBACK"):
-                traceback.print_exception(error)
-            return explain(error)[0]
+def start_worker(store: Store, machine: Machine) -> threading.Thread:
+    """Start a thread that does the runs of a store's queue until the store is closed."""
+    # A daemon: when the program has to end at once, as within the compiler, it does not wait for a run.
+    thread = threading.Thread(target=_work, args=(store, machine), name="runs", daemon=True)
+    thread.start()
+    return thread
 
 
-@contextlib.contextmanager
-def _notices_to(live: Live) -> Iterator[None]:
-    """Show the notices of the library on a run's page."""
-    log, handler = logging.getLogger("warpsplat"), logging.Handler()
-    handler.emit = lambda record: live.notify(record.getMessage())  # type: ignore[method-assign]
-    log.addHandler(handler)
+def _work(store: Store, machine: Machine) -> None:
+    log = logging.getLogger("warpsplat")
+    while run := store.next():
+        notices = _Notices(run.live)
+        log.addHandler(notices)
+        outcome = _outcome(run, machine)
+        log.removeHandler(notices)
+        store.finish(run, outcome)
+        del run, outcome, notices
+        release_memory()
+
+
+def _outcome(run: QueuedRun, machine: Machine) -> Result | str:
+    """Return the result of a run, or its error."""
     try:
-        yield
-    finally:
-        log.removeHandler(handler)
+        return warpsplat.vectorize(
+            run.upload.data,
+            settings=run.settings,
+            name=run.upload.name,
+            device=machine.device,
+            threads=machine.threads,
+            callback=run.live,
+            stop=run.stopping.is_set,
+        )
+    except BaseException as error:  # whatever it is, the next run may succeed
+        if os.environ.get("WARPSPLAT_TRACEBACK"):
+            traceback.print_exception(error)
+        return explain(error)[0]
+
+
+class _Notices(logging.Handler):
+    """Shows the notices of the library on a run's page."""
+
+    def __init__(self, live: Live) -> None:
+        super().__init__()
+        self._live = live
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._live.notify(record.getMessage())
