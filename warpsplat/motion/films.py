@@ -155,7 +155,7 @@ def _with_palette(picture: Image.Image) -> Image.Image:
 
 
 def _gif(frames: list[Frame]) -> bytes:
-    """Encode with a palette per frame: a common one shows banding, dithering flickers and is twice as large."""
+    """Encode with a palette per frame: a common one shows banding, and dithering flickers."""
     pictures = [_with_palette(_opaque(picture)) for picture, _ in frames]
     times = [round(100 * seconds) * 10 for _, seconds in frames]
     return _encoded_by_pillow(pictures, times, format="GIF", comment=GIF_COMMENT, optimize=False)
@@ -177,7 +177,7 @@ def _encoded_by_pillow(pictures: list[Image.Image], times: list[int], **options:
 
 
 H264 = {"crf": "17", "preset": "veryfast", "threads": "1"}
-"""Options of x264: files as large as with CRF 18 and the default preset, half a decibel worse, in a third of the
+"""Options of x264: as large as with CRF 18 and the default preset, half a decibel worse, in a third of the
 time. Several threads would mostly wait, as frames come one by one."""
 
 

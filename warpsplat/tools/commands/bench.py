@@ -32,8 +32,8 @@ def table(values: dict[str, Any], verbose: int) -> str:
     rows += [(f"  {name}", spread) for name, spread in values["stages"].items()]
     if verbose:
         rows += [(f"    {name}", spread) for name, spread in values["kernels"].items()]
-    both = values.get("through_torch", {})
-    rows += [(f"alternately, {name}", both[name]) for name in ("own", "torch") if both]
+    torch = values.get("through_torch", {})
+    rows += [(f"alternately, {name}", torch[name]) for name in ("own", "torch") if torch]
     memory = values["peak_memory"]
     where = values["device"] + (
         f", {values['threads']} threads" if values["device"] == "cpu" else f" ({values['device_name']})"
@@ -48,16 +48,21 @@ def table(values: dict[str, Any], verbose: int) -> str:
             f"{values['megapixels_per_s']:.1f} megapixels/s, {values['us_per_shape']:.1f} us a shape, "
             f"{values['ns_per_pixel']:.1f} ns a pixel"
             + (f", peak memory {memory / 1e6:.0f} MB" if memory else "")
-            + (f"; through PyTorch {both['ratio']:.2f} times as long" if both else ""),
+            + (f"; through PyTorch {torch['ratio']:.2f} times as long" if torch else ""),
         ]
     )
 
 
 @click.command("bench", context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
-    "--curves", type=click.IntRange(1, 100_000), default=512, show_default=True, metavar="N", help="Shapes."
+    "--curves",
+    type=click.IntRange(1, 100_000),
+    default=512,
+    show_default=True,
+    metavar="N",
+    help="Number of shapes.",
 )
-@click.option("--size", default="768x512", show_default=True, metavar="WxH", help="Of the canvas [px].")
+@click.option("--size", default="768x512", show_default=True, metavar="WxH", help="Size of the canvas [px].")
 @click.option(
     "--kind",
     type=click.Choice(["closed", "open"]),
@@ -70,10 +75,14 @@ def table(values: dict[str, Any], verbose: int) -> str:
     type=click.Choice(renderer_names()),
     default="exact",
     show_default=True,
-    help="How shapes are seen, as in vectorize.",
+    help="Model of coverage, as in vectorize.",
 )
 @click.option(
-    "--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True, help="Of each shape."
+    "--opacity",
+    type=click.FloatRange(0.02, 0.99),
+    default=0.9,
+    show_default=True,
+    help="Opacity of each shape.",
 )
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, or cuda:N.")
 @threads_option
@@ -83,7 +92,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
     default=20,
     show_default=True,
     metavar="N",
-    help="Steps that are timed.",
+    help="Number of timed steps.",
 )
 @click.option(
     "--seed",
@@ -91,18 +100,17 @@ def table(values: dict[str, Any], verbose: int) -> str:
     default=0,
     show_default=True,
     metavar="N",
-    help="Of the random scene.",
+    help="Seed of the random scene.",
 )
-@click.option("--torch", "through_torch", is_flag=True, help="Time the passes through PyTorch as well.")
-@click.option("-v", "--verbose", count=True, help="List the kernels as well.")
+@click.option("--torch", "through_torch", is_flag=True, help="Also time the passes through PyTorch.")
+@click.option("-v", "--verbose", count=True, help="Also list the kernels.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
     """Time a training step and its stages on a random scene.
 
     Shapes have uniform centres and radii of 5 to 10 % of the width (half of
     that on canvases wider than 2000 px): closed outlines of 4 cubics on a
-    jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves
-    while it is timed.
+    jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves.
     """
     width, height = parse_size(size)
     from warpsplat.rendering.backend import Backend
