@@ -43,8 +43,9 @@ TARGET_BLUR = 8.0
 """Standard deviation of the blur of the random target image [px]."""
 
 
-def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float, seed: int) -> Scene:
+def bench_scene(name: str, curves: int, size: tuple[int, int], opacity: float, seed: int) -> Scene:
     """Return shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
+    kind, (width, height) = KINDS[name], size
     rng = np.random.default_rng(seed)
     centres = rng.uniform(0, [width, height], (curves, 2))
     radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > 2000 else 1.0)
@@ -55,9 +56,8 @@ def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float
         angle = rng.uniform(0, np.pi, curves)
         along = np.linspace(-1, 1, 3 * STROKE_CUBICS + 1)
         direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        offsets = along[None, :, None] * direction[:, None] + JITTER * rng.normal(
-            size=(curves, len(along), 2)
-        )
+        offsets = along[None, :, None] * direction[:, None]
+        offsets = offsets + JITTER * rng.normal(size=(curves, len(along), 2))
     return Scene.uniform(
         kind,
         Canvas(width, height, np.zeros(3, np.float32)),
@@ -87,17 +87,7 @@ def peak_memory(device: wp.Device) -> int | None:
 
 
 def bench(
-    *,
-    curves: int,
-    width: int,
-    height: int,
-    kind: str,
-    renderer: Any,
-    backend: Backend,
-    opacity: float,
-    repeats: int,
-    seed: int,
-    through_torch: bool = False,
+    scene: Scene, renderer: Any, backend: Backend, repeats: int, seed: int, through_torch: bool = False
 ) -> dict[str, Any]:
     """Time ``repeats`` steps after a warm-up. Nothing moves: all learning rates are 0.
 
@@ -107,21 +97,20 @@ def bench(
     Raises:
         UsageError: PyTorch is needed and not installed.
     """
+    curves, width, height = len(scene), scene.canvas.width, scene.canvas.height
     settings = Settings(
-        kind=KINDS[kind],
+        kind=Kind(int(scene.kind[0])),
         curves=curves,
         renderer=renderer,
         rates=dict.fromkeys(default_rates(), 0.0),
         density=Density(interval=0),
         iterations=1000,
     )
-    scene = bench_scene(KINDS[kind], curves, width, height, opacity, seed)
     target = Target(bench_target(width, height, seed), Phase(width, height))
     step = Step(FitState.start(scene, backend, np.random.default_rng(seed)), settings, target)
     times = time_steps(step, repeats)
     median = times["step"]["median"]
     return {
-        "kind": kind,
         "renderer": renderer,
         "device": str(backend.device),
         "device_name": backend.device.name,
@@ -130,7 +119,6 @@ def bench(
         "curves": curves,  # former name
         "width": width,
         "height": height,
-        "opacity": opacity,
         "pairs": int(step.renderer.needed_slots.numpy()[0]),
         "samples": int(step.renderer.needed_samples.numpy()[0]),
         **times,
