@@ -40,7 +40,7 @@ MIN_SIDE = 320
 """Longest side of a film of a smaller image [px]."""
 
 MAX_PIXELS = 80_000_000
-"""Of all frames of a film: the GIF and WebP encoders hold them all, with four bytes per pixel."""
+"""Total of all frames: the GIF and WebP encoders hold them all, with four bytes per pixel."""
 
 Size = tuple[int, int]
 """Width and height [px]."""

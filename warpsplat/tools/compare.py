@@ -46,7 +46,7 @@ class ComparisonRow:
     score: Score | None
     """None if there is no file, or one that cannot be rendered."""
     error: str = ""
-    """What went wrong, as one line."""
+    """The failure, in one line."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return values for JSON."""

@@ -11,7 +11,7 @@ from warpsplat.tools.compare import OURS, Comparison, ComparisonRow
 from warpsplat.tools.tracer import TracerOptions
 
 Figures = dict[str, float | None]
-"""Of a row, or means; None if unknown."""
+"""Figures of a row, or means; None if unknown."""
 
 
 def _decimals(count: int, per: float = 1.0) -> Callable[[float], str]:

@@ -52,7 +52,7 @@ class Check:
     """The same as data."""
     status: Literal["ok", "note", "broken"] = "ok"
     hint: str = ""
-    """What to do about it."""
+    """The remedy."""
     name: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -223,7 +223,7 @@ def check_viewer() -> Check:
 
 
 KNOWN_PSNR, PSNR_TOLERANCE = 23.65, 1.0
-"""Of the self-test [dB]: devices round in different ways, which a run amplifies."""
+"""Result of the self-test and its tolerance [dB]: devices round in different ways, which a run amplifies."""
 
 
 def check_run(device: str) -> Check:
@@ -255,7 +255,7 @@ MAX_DIFFERENCE = 0.02
 """Relative, between a derivative and the difference quotient in single precision."""
 
 STEP = 0.01
-"""Of the difference quotient [px]."""
+"""Step of the difference quotient [px]."""
 
 
 def check_adjoint(device: str) -> Check:
