@@ -58,7 +58,6 @@ HEAVY = {
     "resvg_py",
     "svgelements",
     "scipy",
-    "matplotlib",
     "jinja2",
     "starlette",
     "uvicorn",

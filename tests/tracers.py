@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 
-from warpsplat.tools.tracer import Options, Tracer
+from warpsplat.tools.tracer import Tracer, TracerOptions
 
-SIZES: dict[str, Options] = {"one": {"bands": 1}, "four": {"bands": 4}}
+SIZES: dict[str, TracerOptions] = {"one": {"bands": 1}, "four": {"bands": 4}}
 
 
-def bands(png: bytes, options: Options) -> str:
+def bands(png: bytes, options: TracerOptions) -> str:
     """So many bands across the image, each of its mean colour."""
     image = Image.open(io.BytesIO(png))
     width, height = image.size
@@ -26,5 +26,7 @@ def bands(png: bytes, options: Options) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">{"".join(paths)}</svg>'
 
 
-def stub(trace: Callable[[bytes, Options], str] = bands, settings: dict[str, Options] = SIZES) -> Tracer:
+def stub(
+    trace: Callable[[bytes, TracerOptions], str] = bands, settings: dict[str, TracerOptions] = SIZES
+) -> Tracer:
     return Tracer("Bands", "1.2", settings, trace)

@@ -1,4 +1,4 @@
-"""A run that was recorded."""
+"""A recorded run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from warpsplat import Recorder, Result
 
 
 def recording(iterations: int) -> tuple[Recorder, Result]:
-    """Of a photograph of 48 x 36 px, a report every ten steps."""
+    """Vectorize an image of 48 x 36 px; progress is reported every ten steps."""
     y, x = np.mgrid[:36, :48] / 48
     pixels = np.stack([x, y, 0.5 + 0.3 * np.sin(9 * x * y)], axis=2)
     recorder = Recorder()

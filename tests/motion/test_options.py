@@ -1,4 +1,4 @@
-"""``--animate`` and ``--preview``: what the command line does with them."""
+"""``--animate`` and ``--preview`` on the command line."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from warpsplat.svg.viewer import render_own
 SHORT = [*QUICK[:2], "--iterations", "40", *QUICK[4:]]
 
 
-def test_an_animation_besides_the_file(
+def test_an_animation_does_not_change_the_file(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The file is the same, and so is what is said of it; with a preview as well."""
+    """Nor the figures; with a preview as well."""
     plain, shown, film = tmp_path / "a.svg", tmp_path / "b.svg", tmp_path / "b.gif"
     assert run("vectorize", image, "-o", plain, *SHORT) == 0
     figures = capsys.readouterr().out
@@ -38,8 +38,8 @@ def test_an_animation_besides_the_file(
         assert opened.width == 40 and getattr(opened, "n_frames", 1) > 3
 
 
-def test_traced_drawings_are_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Also where the training is asked for that there is none of."""
+def test_traced_images_show_the_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Even if the training is requested, as there is none."""
     image, film = tmp_path / "cells.png", tmp_path / "a.svg"
     cells = Image.effect_noise((6, 5), 90).point(lambda level: 255 * (level > 128))
     cells.resize((48, 40), Image.Resampling.NEAREST).save(image)
@@ -55,7 +55,7 @@ def test_traced_drawings_are_drawn(tmp_path: Path, capsys: pytest.CaptureFixture
         assert render_own(film.read_text()).tobytes() == render_own(output.read_text()).tobytes()
 
 
-def test_refine_as_well(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_refine(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     svg, film = tmp_path / "a.svg", tmp_path / "b.webp"
     assert run("vectorize", image, "-o", svg, *QUICK) == 0
     options = ["--iterations", "40", "--device", "cpu", "--animate", film, "--preview=kitty"]
@@ -86,7 +86,7 @@ def test_refine_as_well(image: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
         (["photo.png", "--preview"], "--preview takes one image"),
     ],
 )
-def test_what_cannot_be_is_said_before_the_run(
+def test_errors_come_before_the_run(
     options: list[str],
     message: str,
     image: Path,
@@ -101,10 +101,10 @@ def test_what_cannot_be_is_said_before_the_run(
     assert sorted(image.parent.iterdir()) == before
 
 
-def test_without_a_terminal_a_line_says_so(
+def test_notice_without_a_terminal(
     image: Path, tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
 ) -> None:
-    """An image may follow the flag; the SVG on stdout stays what it is."""
+    """An image may follow the flag; stdout has only the SVG."""
     assert run("vectorize", "--preview", image, "-o", "-", *QUICK) == 0
     captured = capfdbinary.readouterr()
     lines = captured.err.decode().splitlines()
@@ -136,10 +136,8 @@ def test_notices_go_below_the_preview(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_a_second_signal_leaves_the_cursor_to_be_seen(
-    terminal: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A progress bar hides it, and nobody cleans up after a program that ends at once."""
+def test_a_second_signal_restores_the_cursor(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The progress bar hides it."""
     written: list[tuple[int, bytes]] = []
     monkeypatch.setattr(os, "isatty", lambda handle: terminal)
     monkeypatch.setattr(os, "write", lambda handle, text: written.append((handle, text)))

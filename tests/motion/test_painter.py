@@ -1,4 +1,4 @@
-"""Scenes as pictures: what the painter draws is what a viewer shows of their files."""
+"""The painter draws scenes as viewers show their files."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_pictures_look_as_a_viewer_shows_the_file(renderer: str, make: Callable[
 
 
 def test_a_viewer_draws_what_the_renderer_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """More shapes than it has room for, and none at all."""
+    """Too many shapes, and none."""
 
     def refuses(*_: object) -> None:
         raise CapacityError("too many")

@@ -1,4 +1,4 @@
-"""A run's animation, decoded again."""
+"""Animations of a run, decoded again."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import functools
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ Recorded = tuple[Recorder, Result]
 
 
 def frames_of(path: Path) -> tuple[list[np.ndarray], float]:
-    """Pictures of a film, on white, and how long it is [s]."""
+    """Return the frames of a film, on white, and its duration [s]."""
     if path.suffix == ".mp4":
         av = pytest.importorskip("av")
         with av.open(str(path)) as film:
@@ -48,9 +49,9 @@ def shown(svg: str, width: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("what", ["training", "drawing"])
-@pytest.mark.parametrize(("ending", "least"), [("gif", 28), ("webp", 28), ("mp4", 28)])
+@pytest.mark.parametrize("ending", ["gif", "webp", "mp4"])
 def test_a_film_ends_with_the_file(
-    recorded: Recorded, tmp_path: Path, ending: str, least: float, what: recorder.Subject
+    recorded: Recorded, tmp_path: Path, ending: str, what: recorder.Subject
 ) -> None:
     made, result = recorded
     path = tmp_path / f"a.{ending}"
@@ -60,14 +61,14 @@ def test_a_film_ends_with_the_file(
     assert seconds == pytest.approx(1 + HOLD, abs=0.15)
     assert {picture.shape for picture in pictures} == {(48, 64, 3)}
     end = shown(result.svg, 64)
-    assert psnr(pictures[-1], end) > least
+    assert psnr(pictures[-1], end) > 28
     assert psnr(pictures[0], end) < psnr(pictures[len(pictures) // 4], end) < psnr(pictures[-1], end)
     assert may_replace(path)
     path.write_bytes(path.read_bytes()[:-20].replace(b"\xfe\x09warpsplat", b"\xfe\x09somebody."))
     assert not may_replace(path), "somebody else's"
 
 
-def test_an_svg_moves_and_is_the_file_where_nothing_does(recorded: Recorded, tmp_path: Path) -> None:
+def test_an_animated_svg_shows_the_file_where_nothing_is_animated(recorded: Recorded, tmp_path: Path) -> None:
     made, result = recorded
     path = tmp_path / "a.svg"
     made.save(path, result)
@@ -76,16 +77,16 @@ def test_an_svg_moves_and_is_the_file_where_nothing_does(recorded: Recorded, tmp
     assert text.count('<animate attributeName="d"') > 0
     assert "<script" not in text and "prefers-reduced-motion" in text
     assert np.array_equal(np.asarray(render_own(text)), np.asarray(render_own(result.svg)))
-    # What moves ends where the run did.
+    # The moving shapes end where the run did.
     moving = re.sub(r"<style>.*</style>", "", text.partition('<g class="e">')[0] + "</svg>")
-    moving = re.sub(r'<path[^>]*forwards".*', "", moving)  # what goes before the end
+    moving = re.sub(r'<path[^>]*forwards".*', "", moving)  # those that fade out
     assert psnr(on_white(render_own(moving)), on_white(render_own(result.svg))) > 22, (
         "32 dB and more over five seeds"
     )
 
 
-def test_what_is_translucent_is_not_seen_twice(recorded: Recorded, tmp_path: Path) -> None:
-    """The file takes the place of the last set at once, where nothing is behind it."""
+def test_translucent_shapes_are_not_seen_twice(recorded: Recorded, tmp_path: Path) -> None:
+    """Without a background, the file replaces the last shapes at once."""
     scene = replace(mixed_scene(48, 36), canvas=Canvas(48, 36, None))
     made = Recorder()
     snapshots(made, [scene, scene, scene])
@@ -101,8 +102,8 @@ def snapshots(made: Recorder, scenes: list[Scene]) -> None:
         made(Progress(step, len(scenes), 20.0, 0.0, 0.0, True, len(scene), now))
 
 
-def test_gradients_are_kept_apart(recorded: Recorded, tmp_path: Path) -> None:
-    """And those of a run on a smaller image fill the picture."""
+def test_gradients_have_unique_ids(recorded: Recorded, tmp_path: Path) -> None:
+    """A run on a reduced image fills the picture."""
     scene = with_gradients(mixed_scene(48, 36))
     small = replace(enlarged(scene, 1, 24, 18), points=scene.points / 2, frames=scene.frames / 2)
     made = Recorder()
@@ -113,11 +114,11 @@ def test_gradients_are_kept_apart(recorded: Recorded, tmp_path: Path) -> None:
     assert len(names) > 3 and len(names) == len(set(names))
     assert set(re.findall(r"url\(#([^)]*)\)", text)) == set(names)
     scales = [float(scale) for scale in re.findall(r"scale\(([\d.]+)\)", text)]
-    assert scales[1:] == [1] * (len(scales) - 1), "each has about as many units, within those of the whole"
+    assert scales[1:] == [1] * (len(scales) - 1)
 
 
-def test_what_is_kept_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By number and by bytes; the first and the last scenes are there, the early ones are denser."""
+def test_the_number_of_scenes_and_bytes_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first and the last scene are kept, and early ones are denser."""
     scene = mixed_scene()
     scenes = [replace(scene, widths=np.full_like(scene.widths, i)) for i in range(250)]
     monkeypatch.setattr(recorder, "MAX_SCENES", 60)
@@ -147,34 +148,36 @@ def test_times_add_up(count: int, ticks: int) -> None:
     assert (chosen[0], chosen[-1]) == (0, count - 1) and len(chosen) <= max(ticks, 3)
 
 
-def test_a_report_without_shapes_is_none(recorded: Recorded) -> None:
-    made = Recorder()
-    made(recorded[1].history[0])
-    assert not made.scenes
-
-
-def test_what_cannot_be_made_is_said(
-    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("a.avi", {}, r"a\.avi: not an animation format; the name must end in \.svg, "),
+        ("a.gif", {"width": 5}, "16 to 2048 px wide, not 5"),
+        ("a.gif", {"seconds": 0.1}, r"takes 0\.5 to 60 s, not 0\.1"),
+        ("a.gif", {"what": "dance"}, "training or drawing, not dance"),
+        ("a.mp4", {}, "pip install no_such_package, or warpsplat with its extra"),
+    ],
+)
+def test_errors(
+    recorded: Recorded,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    options: dict[str, Any],
+    message: str,
 ) -> None:
-    made, result = recorded
-    with pytest.raises(UsageError, match=r"a\.avi: not an animation format; the name must end in \.svg, "):
-        made.save(tmp_path / "a.avi", result)
-    with pytest.raises(UsageError, match="16 to 2048 px wide, not 5"):
-        made.save(tmp_path / "a.gif", result, width=5)
-    with pytest.raises(UsageError, match=r"takes 0\.5 to 60 s, not 0\.1"):
-        made.save(tmp_path / "a.gif", result, seconds=0.1)
-    with pytest.raises(UsageError, match="training or drawing, not dance"):
-        made.save(tmp_path / "a.gif", result, what="dance")
-    with pytest.raises(UsageError, match="there is no training to show"):
-        Recorder().save(tmp_path / "a.gif", result, what="training")
     monkeypatch.setattr(films, "VIDEO_PACKAGE", "no_such_package")
-    with pytest.raises(UsageError, match="pip install no_such_package, or warpsplat with its extra"):
-        made.save(tmp_path / "a.mp4", result)
+    with pytest.raises(UsageError, match=message):
+        recorded[0].save(tmp_path / name, recorded[1], **options)
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_shown_where_nobody_says(recorded: Recorded) -> None:
+def test_default_subject(recorded: Recorded, tmp_path: Path) -> None:
     made, result = recorded
     assert made.shows(result) == "training"
     assert made.shows(replace(result, subject="line")) == "drawing"
-    assert Recorder().shows(result) == "drawing"
+    empty = Recorder()
+    empty(result.history[0])  # a report without shapes
+    assert not empty.scenes and empty.shows(result) == "drawing"
+    with pytest.raises(UsageError, match="there is no training to show"):
+        empty.save(tmp_path / "a.gif", result, what="training")

@@ -1,4 +1,4 @@
-"""``bench``: what it measures, what it refuses."""
+"""``bench``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("kind", ["closed", "open"])
 @pytest.mark.parametrize("renderer", ["exact", "splat"])
-def test_bench_for_people(kind: str, renderer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_table(kind: str, renderer: str, capsys: pytest.CaptureFixture[str]) -> None:
     options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--kind", kind, "--renderer", renderer)
     assert run("bench", *options, "-v") == 0
     shown = capsys.readouterr().out

@@ -15,7 +15,6 @@ from PIL import Image
 from tests.fit.pictures import picture
 from tests.runs import vectorize
 from tests.tracers import SIZES, bands, stub
-from warpsplat.errors import Stopped
 from warpsplat.files.image import load_image
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings, make_settings
@@ -25,7 +24,7 @@ from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
 from warpsplat.scene import FloatArray
 from warpsplat.tools.compare import OURS, compare, warm_up
-from warpsplat.tools.tracer import VTRACER_SETTINGS, Options, vtracer
+from warpsplat.tools.tracer import VTRACER_SETTINGS, TracerOptions, vtracer
 
 
 def run(target: FloatArray, settings: Settings, write: Callable[[str], None]) -> Result:
@@ -39,17 +38,11 @@ def ours(*curves: int) -> list[Settings]:
 def test_rows_of_both_programs_are_measured_alike() -> None:
     target = picture()
     rows = list(compare("a.png", target, ours(4, 8), stub(), run))
-    assert [(r.program, r.setting) for r in rows] == [
-        (OURS, "4"),
-        (OURS, "8"),
-        ("Bands", "one"),
-        ("Bands", "four"),
-    ]
+    settings = [(OURS, "4"), (OURS, "8"), ("Bands", "one"), ("Bands", "four")]
+    assert [(row.program, row.setting) for row in rows] == settings
     for row in rows:
-        assert row.image == "a.png"
-        assert row.score == score_svg(row.svg, target)
-        assert row.seconds > 0
-        assert row.cpu_seconds > 0
+        assert row.image == "a.png" and row.score == score_svg(row.svg, target)
+        assert row.seconds > 0 and row.cpu_seconds > 0
         assert row.as_dict().items() >= row.score.as_dict().items()
     assert [row.score.paths for row in rows if row.score] == [4, 8, 1, 4]
 
@@ -61,7 +54,7 @@ def test_the_tracer_sees_the_image_on_white(tmp_path: Path) -> None:
     target = load_image(tmp_path / "a.png")
     seen: list[np.ndarray] = []
 
-    def trace(png: bytes, options: Options) -> str:
+    def trace(png: bytes, options: TracerOptions) -> str:
         seen.append(np.asarray(Image.open(io.BytesIO(png))))
         return bands(png, options)
 
@@ -86,7 +79,7 @@ class PanicException(BaseException):
     ],
 )
 def test_a_tracer_that_fails_at_one_setting(failure: BaseException, words: str) -> None:
-    def trace(png: bytes, options: Options) -> str:
+    def trace(png: bytes, options: TracerOptions) -> str:
         if options["bands"] == 1:
             raise failure
         return bands(png, options)
@@ -94,34 +87,16 @@ def test_a_tracer_that_fails_at_one_setting(failure: BaseException, words: str) 
     failed, fine = compare("a.png", picture(), [], stub(trace), run)
     assert (failed.svg, failed.score, failed.error) == ("", None, words)
     assert failed.as_dict()["error"] == words
-    assert fine.score
-    assert not fine.error
+    assert fine.score and not fine.error
 
 
-def test_a_file_that_no_viewer_shows() -> None:
+def test_a_file_that_cannot_be_rendered() -> None:
     rows = list(compare("a.png", picture(), [], stub(lambda png, options: "no SVG"), run))
     assert all(row.svg == "no SVG" and row.score is None for row in rows)
     assert all(row.error.startswith("its file: not ") or "well-formed" in row.error for row in rows)
 
 
-def test_an_interruption_is_no_failure_of_the_tracer() -> None:
-    def trace(png: bytes, options: Options) -> str:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        list(compare("a.png", picture(), [], stub(trace), run))
-
-
-def test_an_interrupted_run_has_no_row() -> None:
-    def stopped(target: FloatArray, settings: Settings, write: Callable[[str], None]) -> Result:
-        return vectorize(target, settings, Backend.on("cpu"), write=write, stop=lambda: True)
-
-    with pytest.raises(Stopped):
-        next(compare("a.png", picture(), ours(4), stub(), stopped))
-
-
 def test_warm_up_loads_what_a_run_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the kind and renderer of the settings, whatever else they say."""
     made: list[Settings] = []
 
     def note(image: PreparedImage, run: Run) -> None:
@@ -131,8 +106,7 @@ def test_warm_up_loads_what_a_run_needs(monkeypatch: pytest.MonkeyPatch) -> None
     asked = make_settings(curves=100_000, iterations=1_000_000, renderer="splat")
     warm_up(asked, Backend.on("cpu"))
     assert (made[0].kind, made[0].renderer) == (asked.kind, asked.renderer)
-    assert made[0].curves < 100
-    assert made[0].iterations < 100
+    assert made[0].curves < 100 and made[0].iterations < 100
 
 
 def test_vtracer_takes_all_of_its_settings() -> None:
@@ -143,18 +117,15 @@ def test_vtracer_takes_all_of_its_settings() -> None:
     rows = {row.setting: row for row in compare("a.png", target, [], vtracer(), run)}
     assert list(rows) == list(VTRACER_SETTINGS)
     for row in rows.values():
-        assert row.program == "VTracer"
-        assert row.score
-        assert row.score.psnr > 20, row.setting
+        assert row.program == "VTracer" and row.score and row.score.psnr > 20, row.setting
     curved = {name: bool(re.search(r' d="[^"]*C', row.svg)) for name, row in rows.items()}
-    assert curved["default"]
-    assert not curved["polygon"]
+    assert curved["default"] and not curved["polygon"]
     assert len(rows["rounded"].svg) < len(rows["default"].svg)
 
 
 def test_a_panic_of_vtracer_is_a_row(capfd: pytest.CaptureFixture[str]) -> None:
     """Rust would print a trace of its own."""
-    options: dict[str, Options] = {"none": {"color_precision": 0}, "one": {"color_precision": 1}}
+    options: dict[str, TracerOptions] = {"none": {"color_precision": 0}, "one": {"color_precision": 1}}
     panicked, fine = compare("a.png", picture(), [], replace(vtracer(), settings=options), run)
     assert panicked.error.startswith("failed: PanicException: assertion failed")
     assert fine.score

@@ -1,4 +1,4 @@
-"""``compare``: our files and another program's, side by side."""
+"""``compare``, the command."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from PIL import Image
 
 from tests.cli.helpers import one_line, run
 from tests.tracers import bands, stub
-from warpsplat.tools.tracer import TRACERS, Options
+from warpsplat.tools.tracer import TRACERS, TracerOptions
 
 QUICK = ["--against", "vtracer", "--curves", "8,4", "--iterations", "12", "--device", "cpu"]
-REPORTS = {"comparison.md", "comparison.json", "comparison.svg"}
+REPORTS = {"comparison.md", "comparison.json"}
 
 
-def use(monkeypatch: pytest.MonkeyPatch, trace: Callable[[bytes, Options], str] = bands) -> None:
+def use(monkeypatch: pytest.MonkeyPatch, trace: Callable[[bytes, TracerOptions], str] = bands) -> None:
     monkeypatch.setitem(sys.modules, "vtracer", None)
     monkeypatch.setitem(TRACERS, "vtracer", lambda: stub(trace))
 
@@ -26,7 +26,7 @@ def use(monkeypatch: pytest.MonkeyPatch, trace: Callable[[bytes, Options], str] 
 def test_a_comparison_and_its_files(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Figures are those of eval; nothing is replaced unless that is asked for."""
+    """Figures are those of eval; existing files are only replaced with --overwrite."""
     use(monkeypatch)
     folder = tmp_path / "new" / "folder"
     assert run("compare", image, *QUICK, "-o", folder, "--json") == 0
@@ -61,7 +61,7 @@ def test_a_comparison_with_vtracer(image: Path, capsys: pytest.CaptureFixture[st
 def test_several_images_and_one_failure(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def trace(png: bytes, options: Options) -> str:
+    def trace(png: bytes, options: TracerOptions) -> str:
         if options["bands"] == 4:
             raise ValueError("no more than three")
         return bands(png, options)
@@ -76,10 +76,10 @@ def test_several_images_and_one_failure(
     assert not list((tmp_path / "out").glob("*four*"))
 
 
-def test_an_interruption_shows_what_there_is(
+def test_an_interruption_publishes_the_rows_so_far(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def trace(png: bytes, options: Options) -> str:
+    def trace(png: bytes, options: TracerOptions) -> str:
         if options["bands"] == 4:
             raise KeyboardInterrupt
         return bands(png, options)
@@ -87,41 +87,34 @@ def test_an_interruption_shows_what_there_is(
     use(monkeypatch, trace)
     assert run("compare", image, *QUICK, "-o", tmp_path / "out") == 130
     captured = capsys.readouterr()
-    assert one_line(captured.err) == "warpsplat: interrupted"
-    settings = [
-        r["setting"] for r in json.loads((tmp_path / "out" / "comparison.json").read_text())["results"]
-    ]
-    assert settings == ["4", "8", "one"]
-    assert "| Bands " in captured.out
-
-
-def test_a_run_that_is_cut_short_is_no_result(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    use(monkeypatch)
+    assert one_line(captured.err) == "warpsplat: interrupted" and "| Bands " in captured.out
+    results = json.loads((tmp_path / "out" / "comparison.json").read_text())["results"]
+    assert [result["setting"] for result in results] == ["4", "8", "one"]
     monkeypatch.setattr("warpsplat.cli.signals.Interrupt.__call__", lambda self: True)
-    assert run("compare", image, *QUICK, "-o", tmp_path / "out") == 130
+    assert run("compare", image, *QUICK, "-o", tmp_path / "none") == 130
     captured = capsys.readouterr()
-    assert one_line(captured.err) == "warpsplat: interrupted"
-    assert captured.out == ""
-    assert not list((tmp_path / "out").iterdir())
+    assert one_line(captured.err) == "warpsplat: interrupted" and captured.out == ""
+    assert not list((tmp_path / "none").iterdir()), "a run that was cut short is no result"
 
 
-@pytest.mark.parametrize(("module", "folder"), [("vtracer", []), ("matplotlib", ["-o", "out"])])
-def test_packages_that_are_missing(
-    image: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    module: str,
-    folder: list[str],
+def test_vtracer_may_be_missing(
+    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Said before any work."""
-    monkeypatch.chdir(image.parent)
-    monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr("warpsplat.run.strategies.fit", None)
-    assert run("compare", image, *QUICK, *folder) == 2
-    assert f"pip install {module}" in one_line(capsys.readouterr().err)
-    assert list(image.parent.iterdir()) == [image]
+    monkeypatch.setitem(sys.modules, "vtracer", None)
+    assert run("compare", image, *QUICK) == 2
+    assert "needs vtracer, which is not installed: pip install vtracer" in one_line(capsys.readouterr().err)
+
+
+def test_drawings_are_traced_as_vectorize_does(tmp_path: Path) -> None:
+    pixels = Image.new("RGB", (48, 40), "white")
+    pixels.paste("navy", (8, 8, 30, 30))
+    pixels.paste("red", (20, 16, 44, 36))
+    pixels.save(tmp_path / "flat.png")
+    assert run("compare", tmp_path / "flat.png", *QUICK, "-o", tmp_path / "out", "-q") == 0
+    assert (
+        run("vectorize", tmp_path / "flat.png", "-o", tmp_path / "a.svg", *QUICK[2:3], "8", *QUICK[4:]) == 0
+    )
+    assert (tmp_path / "out" / "flat.warpsplat-8.svg").read_bytes() == (tmp_path / "a.svg").read_bytes()
 
 
 WRONG = [
@@ -158,5 +151,4 @@ def test_wrong_requests_are_one_line_before_any_work(
     assert run("compare", *arguments) == code
     captured = capsys.readouterr()
     assert words in one_line(captured.err)
-    assert captured.out == ""
-    assert set(Path().iterdir()) == before
+    assert captured.out == "" and set(Path().iterdir()) == before

@@ -1,4 +1,4 @@
-"""``doctor``: what is broken is found, named, and stops no other check."""
+"""``doctor`` finds and names what is broken; no failure stops the other checks."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.tools import doctor
 
 
-def looked_at(capsys: pytest.CaptureFixture[str], code: int) -> dict[str, dict[str, Any]]:
-    """The checks of a run by their names."""
+def checked(capsys: pytest.CaptureFixture[str], code: int) -> dict[str, dict[str, Any]]:
+    """Run the command and return its checks by name."""
     assert run("doctor", "--device", "cpu", "--json") == code
     found = json.loads(capsys.readouterr().out)
     assert found["ok"] is (code == 0)
@@ -25,12 +25,12 @@ def looked_at(capsys: pytest.CaptureFixture[str], code: int) -> dict[str, dict[s
 
 @pytest.mark.usual_seed  # whose figure the self-test knows
 def test_all_is_well(capsys: pytest.CaptureFixture[str]) -> None:
-    found = looked_at(capsys, 0)
+    found = checked(capsys, 0)
     assert "broken" not in {check["status"] for check in found.values()}
     assert found["packages"]["versions"].keys() >= {"numpy", "warp-lang", "pillow"}
     assert "cpu" in [device["name"] for device in found["devices"]["devices"]]
-    assert found["self-test"]["psnr"] == pytest.approx(doctor.KNOWN_PSNR, abs=doctor.NEAR_PSNR)
-    assert 0 < found["adjoint"]["difference"] < doctor.MOST_DIFFERENCE
+    assert found["self-test"]["psnr"] == pytest.approx(doctor.KNOWN_PSNR, abs=doctor.PSNR_TOLERANCE)
+    assert 0 < found["adjoint"]["difference"] < doctor.MAX_DIFFERENCE
 
 
 def test_a_broken_package_and_wrong_kernels(
@@ -38,7 +38,7 @@ def test_a_broken_package_and_wrong_kernels(
 ) -> None:
     monkeypatch.setitem(sys.modules, "yaml", None)
     monkeypatch.setattr(Renderer, "backward", lambda self: None)
-    monkeypatch.setattr(doctor, "check_itself", lambda device: 1 / 0)
+    monkeypatch.setattr(doctor, "check_run", lambda device: 1 / 0)
     assert run("doctor", "--device", "cpu") == 7
     lines = capsys.readouterr().out.splitlines()
     broken = [line.split(":")[0] for line in lines if line.startswith("BROKEN")]
@@ -50,7 +50,7 @@ def test_a_broken_package_and_wrong_kernels(
 
 def test_a_figure_that_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "KNOWN_PSNR", 40.0)
-    assert doctor.check_itself("cpu").status == "broken"
+    assert doctor.check_run("cpu").status == "broken"
 
 
 def test_a_kernel_cache_of_no_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

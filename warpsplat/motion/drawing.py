@@ -48,7 +48,7 @@ class DrawnElement:
 
     element: ET.Element
     length: float
-    """Of a stroke, in its own units; 0: it fades in."""
+    """Length of a stroke in its own units; 0: it fades in."""
     start: float
     """[s]"""
     seconds: float

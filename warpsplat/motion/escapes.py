@@ -17,7 +17,7 @@ Pixels = npt.NDArray[np.uint8]
 """sRGB, shape (height, width, 3)."""
 
 LARGEST_PICTURE = (1600, 800)
-"""Of a picture that the terminal scales [px]."""
+"""Limits of width and height if the terminal scales the picture [px]."""
 
 
 def picture_escapes(terminal: Terminal, pixels: Pixels, columns: int, rows: int, number: int) -> str:

@@ -1,4 +1,4 @@
-"""What animations and terminal previews add to the core."""
+"""Declare animations and terminal previews."""
 
 from warpsplat.extensions import Extension
 

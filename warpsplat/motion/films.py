@@ -40,7 +40,7 @@ MIN_SIDE = 320
 """Longest side of a film of a smaller image [px]."""
 
 MAX_PIXELS = 80_000_000
-"""Of all frames of a film: the GIF and WebP encoders hold them all, with four bytes per pixel."""
+"""Total of all frames: the GIF and WebP encoders hold them all, with four bytes per pixel."""
 
 Size = tuple[int, int]
 """Width and height [px]."""
@@ -177,8 +177,8 @@ def _encoded_by_pillow(pictures: list[Image.Image], times: list[int], **options:
 
 
 H264 = {"crf": "17", "preset": "veryfast", "threads": "1"}
-"""Options of x264: files as large as with CRF 18 and the default preset, half a decibel worse, in a third of
-the time. Several threads would mostly wait, as frames come one by one."""
+"""Options of x264: as large as with CRF 18 and the default preset, half a decibel worse, in a third of the
+time. Several threads would mostly wait, as frames come one by one."""
 
 
 def _mp4(frames: list[Frame]) -> bytes:

@@ -27,7 +27,7 @@ the next fades in: two of them cover too much; but two fading opaque ones let th
 
 
 class PathForm(NamedTuple):
-    """What does not change while a shape moves."""
+    """Properties that stay the same while a shape moves."""
 
     kind: int
     basis: int

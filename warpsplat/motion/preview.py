@@ -26,7 +26,7 @@ from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import premultiplied, render_svg
 
 TIME_SHARE = 0.05
-"""Of a run's time that drawing may take: the interval between two updates depends on how long one takes."""
+"""Share of a run's time for drawing: the interval between two updates depends on how long one takes."""
 
 SHORTEST_INTERVAL = 0.1
 """Between two updates [s]."""
@@ -46,7 +46,7 @@ MAX_SIXEL_SIDE = 800
 """Longer side of a picture of sixels [px]."""
 
 MIN_COLUMNS, MIN_LINES = 8, 7
-"""Of a terminal on which a picture shows anything."""
+"""Smallest useful terminal."""
 
 MAX_FINISHED_SIDE = 1600
 """Longer side at which the finished picture is rendered [px]: more than any terminal shows."""
@@ -62,7 +62,7 @@ class Preview:
         self._stream, self._measure, self._clock = stream, measure, clock
         self._terminal: Terminal | None = None
         self._rows = 0
-        """Of the picture above the cursor; 0: there is none."""
+        """Height of the picture above the cursor; 0: there is none."""
         self._next, self._cost = 0.0, math.inf
         self._number = 1 + secrets.randbelow(2**24 - 1)
 

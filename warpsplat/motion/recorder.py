@@ -27,13 +27,13 @@ MAX_SCENES = 240
 """More than any animation shows."""
 
 MAX_BYTES = 256 << 20
-"""Of all recorded scenes."""
+"""Total of all recorded scenes."""
 
 MIN_SCENES = 3
 """For an animation of the training."""
 
 MIN_WIDTH, MAX_WIDTH = 16, 2048
-"""Of an animation [px]."""
+"""Limits of an animation's width [px]."""
 
 
 class Recorder:

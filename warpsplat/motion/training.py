@@ -65,7 +65,7 @@ def _final_svg(result: Result) -> str:
 MAX_KEYFRAMES, MIN_KEYFRAMES = 20, 6
 
 MAX_BYTES = 3 << 20
-"""Of all keyframes, as long as that allows ``MIN_KEYFRAMES``."""
+"""Total of all keyframes, as long as that allows ``MIN_KEYFRAMES``."""
 
 MIN_UNITS = 1000
 """Coordinate units along the longer side; moving shapes are seen only briefly."""

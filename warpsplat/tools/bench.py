@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import statistics
 import sys
-from dataclasses import asdict, dataclass
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import cv2
@@ -17,34 +20,35 @@ from warpsplat.fit.settings import Density, Settings, default_rates
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.program import capture
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.run.options import KINDS
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
-from warpsplat.tools.timing import WARM_UP, Spread, timed
 
 STAGES = ("outline", "bins", "forward", "loss", "backward", "update")
 
+WARM_UP = 3
+"""Steps that are not counted."""
+
 RADIUS = (0.05, 0.1)
-"""Range of the shapes' radii over the width of the canvas."""
+"""Range of the shapes' radii over the width of the canvas; half of that on canvases of over 2000 px."""
 
-LARGE = 2000
-"""Canvases wider than this [px] get shapes of half that radius."""
-
-HALF_WIDTH = 1.5
-"""Of the strokes [px]."""
+STROKE_WIDTH = 3.0
+"""[px]"""
 
 JITTER = 0.2
 """Standard deviation of the control points' distance from the centre, over the radius."""
 
-SMOOTH = 8.0
+TARGET_BLUR = 8.0
 """Standard deviation of the blur of the random target image [px]."""
 
 
-def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float, seed: int) -> Scene:
+def bench_scene(name: str, curves: int, size: tuple[int, int], opacity: float, seed: int) -> Scene:
     """Return shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
+    kind, (width, height) = KINDS[name], size
     rng = np.random.default_rng(seed)
     centres = rng.uniform(0, [width, height], (curves, 2))
-    radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > LARGE else 1.0)
+    radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > 2000 else 1.0)
     if kind == Kind.FILL:
         circles = circle_outlines(np.zeros((curves, 2)), np.ones(curves), 2)
         offsets = circles * (1 + JITTER * rng.normal(size=(curves, circles.shape[1], 1)))
@@ -52,23 +56,22 @@ def bench_scene(kind: Kind, curves: int, width: int, height: int, opacity: float
         angle = rng.uniform(0, np.pi, curves)
         along = np.linspace(-1, 1, 3 * STROKE_CUBICS + 1)
         direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        offsets = along[None, :, None] * direction[:, None] + JITTER * rng.normal(
-            size=(curves, len(along), 2)
-        )
+        offsets = along[None, :, None] * direction[:, None]
+        offsets = offsets + JITTER * rng.normal(size=(curves, len(along), 2))
     return Scene.uniform(
         kind,
         Canvas(width, height, np.zeros(3, np.float32)),
         np.asarray(centres[:, None] + radii[:, None, None] * offsets, np.float32),
         colors=rng.uniform(0, 1, (curves, 3)).astype(np.float32),
         opacities=np.full(curves, opacity, np.float32),
-        widths=np.full(curves, 0.0 if kind == Kind.FILL else 2 * HALF_WIDTH, np.float32),
+        widths=np.full(curves, 0.0 if kind == Kind.FILL else STROKE_WIDTH, np.float32),
     )
 
 
 def bench_target(width: int, height: int, seed: int) -> FloatArray:
     """Return smooth noise: sRGB in [0, 1], shape (height, width, 3)."""
     noise = np.random.default_rng(seed).uniform(0, 1, (height, width, 3)).astype(np.float32)
-    return np.asarray(cv2.GaussianBlur(noise, (0, 0), SMOOTH), np.float32)
+    return np.asarray(cv2.GaussianBlur(noise, (0, 0), TARGET_BLUR), np.float32)
 
 
 def peak_memory(device: wp.Device) -> int | None:
@@ -84,112 +87,125 @@ def peak_memory(device: wp.Device) -> int | None:
 
 
 def bench(
-    *,
-    curves: int,
-    width: int,
-    height: int,
-    kind: str,
-    renderer: Any,
-    backend: Backend,
-    opacity: float,
-    repeats: int,
-    seed: int,
-    through_torch: bool = False,
+    scene: Scene, renderer: Any, backend: Backend, repeats: int, seed: int, through_torch: bool = False
 ) -> dict[str, Any]:
-    """Time ``repeats`` steps after a warm-up. The scene stays as it is: all rates are 0.
+    """Time ``repeats`` steps after a warm-up. Nothing moves: all learning rates are 0.
 
     Returns:
-        ``step``, ``forward_backward`` and each of ``stages`` as median, low and high [ms]; counts; memory;
-        ``through_torch``, where that is asked for, as ``bench_torch`` has it.
+        results of ``time_steps``, counts, memory and, with ``through_torch``, results of ``time_torch``.
 
     Raises:
-        UsageError: PyTorch is asked for and not installed.
+        UsageError: PyTorch is needed and not installed.
     """
+    curves, width, height = len(scene), scene.canvas.width, scene.canvas.height
     settings = Settings(
-        kind=KINDS[kind],
+        kind=Kind(int(scene.kind[0])),
         curves=curves,
         renderer=renderer,
         rates=dict.fromkeys(default_rates(), 0.0),
         density=Density(interval=0),
         iterations=1000,
     )
-    scene = bench_scene(KINDS[kind], curves, width, height, opacity, seed)
     target = Target(bench_target(width, height, seed), Phase(width, height))
     step = Step(FitState.start(scene, backend, np.random.default_rng(seed)), settings, target)
     times = time_steps(step, repeats)
-    whole = Spread.of(times.steps)
+    median = times["step"]["median"]
     return {
-        "kind": kind,
         "renderer": renderer,
         "device": str(backend.device),
         "device_name": backend.device.name,
         "threads": backend.threads,
         "shapes": curves,
-        "curves": curves,  # what it was called at first
+        "curves": curves,  # former name
         "width": width,
         "height": height,
-        "opacity": opacity,
         "pairs": int(step.renderer.needed_slots.numpy()[0]),
         "samples": int(step.renderer.needed_samples.numpy()[0]),
-        **times.as_dict(),
-        "megapixels_per_s": round(width * height / 1e3 / whole.median, 3),
-        "us_per_shape": round(1e3 * whole.median / curves, 3),
-        "us_per_curve": round(1e3 * whole.median / curves, 3),  # what it was called at first
-        "ns_per_pixel": round(1e6 * whole.median / (width * height), 3),
-        **({"through_torch": _through_torch(step.renderer, repeats)} if through_torch else {}),
+        **times,
+        "megapixels_per_s": round(width * height / 1e3 / median, 3),
+        "us_per_shape": round(1e3 * median / curves, 3),
+        "us_per_curve": round(1e3 * median / curves, 3),  # former name
+        "ns_per_pixel": round(1e6 * median / (width * height), 3),
+        **({"through_torch": time_torch(step.renderer, repeats)} if through_torch else {}),
         "peak_memory": peak_memory(backend.device),
     }
 
 
-def _through_torch(own: Renderer, repeats: int) -> dict[str, Any]:
-    try:
-        from warpsplat.tools.bench_torch import bench_torch
-    except ImportError as error:
-        raise UsageError(str(error)) from None
-    return bench_torch(own, repeats)
+def summary(seconds: Sequence[float]) -> dict[str, float]:
+    """Return median, lowest and highest [ms]."""
+    values = {"median": statistics.median(seconds), "low": min(seconds), "high": max(seconds)}
+    return {name: round(1e3 * value, 3) for name, value in values.items()}
 
 
-@dataclass(frozen=True)
-class Times:
-    """Times of steps [s], one entry a repeat."""
-
-    steps: list[float]
-    both: list[float]
-    """Forward and backward pass alone."""
-    kernels: list[dict[tuple[str, str], float]]
-    """By stage and name."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return medians, lows and highs [ms]."""
-        stages = {
-            stage: [sum(v for k, v in kernels.items() if k[0] == stage) for kernels in self.kernels]
-            for stage in STAGES
-        }
-        singles = {f"{stage}/{name}": (stage, name) for stage, name in self.kernels[0]}
-        return {
-            "step": asdict(Spread.of(self.steps)),
-            "forward_backward": asdict(Spread.of(self.both)),
-            "stages": {stage: asdict(Spread.of(seconds)) for stage, seconds in stages.items()},
-            "kernels": {
-                label: asdict(Spread.of([kernels[key] for kernels in self.kernels]))
-                for label, key in singles.items()
-            },
-        }
+def timed(device: wp.Device, work: Callable[[], object]) -> float:
+    """Return how long ``work`` takes [s], including the device."""
+    begin = time.perf_counter()
+    work()
+    wp.synchronize_device(device)
+    return time.perf_counter() - begin
 
 
-def time_steps(step: Step, repeats: int) -> Times:
-    """Time ``repeats`` steps after a warm-up, whole, then in two halves, then launch by launch."""
+def time_steps(step: Step, repeats: int) -> dict[str, Any]:
+    """Time ``repeats`` steps after a warm-up: as a whole, as two passes, and launch by launch.
+
+    Returns:
+        summaries of ``step``, ``forward_backward``, and of all ``stages`` and ``kernels``.
+    """
     device, renderer = step.renderer.backend.device, step.renderer
-    times = Times([], [], [])
-    for i in range(repeats + WARM_UP):
-        whole = timed(device, step.advance)
-        both = timed(device, renderer.forward) + timed(device, renderer.backward)
-        kernels: dict[tuple[str, str], float] = {}
+    steps, passes = [], []
+    launches: list[dict[tuple[str, str], float]] = []
+    for _ in range(repeats + WARM_UP):
+        steps.append(timed(device, step.advance))
+        passes.append(timed(device, renderer.forward) + timed(device, renderer.backward))
+        sums: dict[tuple[str, str], float] = defaultdict(float)
         for program in step.programs:
             for key, value in program.run_timed().items():
-                kernels[key] = kernels.get(key, 0.0) + value
-        if i >= WARM_UP:
-            times.steps.append(whole)
-            times.both.append(both)
-            times.kernels.append(kernels)
-    return times
+                sums[key] += value
+        launches.append(sums)
+    launches = launches[WARM_UP:]
+    stages = {name: [sum(v for k, v in one.items() if k[0] == name) for one in launches] for name in STAGES}
+    return {
+        "step": summary(steps[WARM_UP:]),
+        "forward_backward": summary(passes[WARM_UP:]),
+        "stages": {name: summary(seconds) for name, seconds in stages.items()},
+        "kernels": {"/".join(key): summary([one[key] for one in launches]) for key in launches[0]},
+    }
+
+
+def time_torch(own: Renderer, repeats: int) -> dict[str, Any]:
+    """Time passes through PyTorch and the renderer's own alternately, ``repeats`` of each after a warm-up.
+
+    Returns:
+        summaries of ``own`` and ``torch``; ``ratio``, the median of PyTorch's time over the own time just
+        before.
+
+    Raises:
+        UsageError: PyTorch is not installed.
+    """
+    try:
+        import torch
+
+        from warpsplat.torch import SceneTensors, render
+    except ImportError as error:
+        raise UsageError(str(error)) from None
+    device, viewport = own.backend.device, own.viewport
+    torch_device = wp.device_to_torch(device)
+    tensors = SceneTensors.of(own.parameters.scene(), torch_device, requires_grad=True)
+    inputs = [value for value in tensors.values.values() if value.requires_grad]
+    gradient = torch.rand(viewport.height, viewport.width, 4, dtype=torch.float32, device=torch_device)
+    graph = capture(device, (own.forward_program, own.backward_program))
+
+    def own_pass() -> None:
+        if graph:
+            wp.capture_launch(graph)
+        else:
+            own.forward()
+            own.backward()
+
+    def torch_pass() -> None:
+        image = render(tensors, viewport.width, renderer=own.model, threads=own.backend.threads)
+        torch.autograd.grad(image, inputs, gradient)
+
+    pairs = [(timed(device, own_pass), timed(device, torch_pass)) for _ in range(repeats + WARM_UP)][WARM_UP:]
+    ratio = round(statistics.median(theirs / ours for ours, theirs in pairs), 3)
+    return {"own": summary([a for a, _ in pairs]), "torch": summary([b for _, b in pairs]), "ratio": ratio}

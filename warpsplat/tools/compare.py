@@ -1,4 +1,4 @@
-"""Vectorize an image by warpsplat and by another program, and measure both files alike."""
+"""Vectorize an image by warpsplat and by another program, and measure both files in the same way."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ from warpsplat.tools.tracer import Tracer
 OURS = "warpsplat"
 
 Maker = Callable[[FloatArray, Settings, Callable[[str], None]], Result]
-"""Vectorizes an image by settings, and hands over the SVG before it is scored (``vectorize``)."""
+"""Vectorizes an image, and passes the SVG to the callback before it is scored."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One file of one program at one setting."""
+class ComparisonRow:
+    """A file of one program at one setting."""
 
     image: str
     program: str
     setting: str
     svg: str
-    """Empty where the program failed."""
+    """Empty if the program failed."""
     seconds: float
-    """From the pixels to the SVG, on the clock; not the score."""
+    """Wall time from pixels to SVG, without the score."""
     cpu_seconds: float
-    """The same by the processor: of all threads, and whatever else the machine does."""
+    """The same in processor time of all threads, which hardly depends on what else the machine does."""
     score: Score | None
-    """None where there is no file, or one that no viewer can show."""
+    """None if there is no file, or one that cannot be rendered."""
     error: str = ""
-    """What went wrong, as one line."""
+    """The failure, in one line."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return values for JSON."""
@@ -60,14 +60,14 @@ class Row:
 class Comparison:
     """All rows, and how they were made."""
 
-    rows: Sequence[Row]
+    rows: Sequence[ComparisonRow]
     settings: Settings
-    """Of ours, but for the number of shapes."""
+    """Ours, apart from the number of shapes."""
     tracer: Tracer
 
-    def by_image(self) -> dict[str, list[Row]]:
+    def by_image(self) -> dict[str, list[ComparisonRow]]:
         """Return the rows of each image."""
-        found: dict[str, list[Row]] = {}
+        found: dict[str, list[ComparisonRow]] = {}
         for row in self.rows:
             found.setdefault(row.image, []).append(row)
         return found
@@ -86,7 +86,7 @@ class Comparison:
 
 def compare(
     image: str, target: FloatArray, settings: Sequence[Settings], tracer: Tracer, make: Maker
-) -> Iterator[Row]:
+) -> Iterator[ComparisonRow]:
     """Vectorize an image by each of our settings, then by each of the tracer's.
 
     Args:
@@ -97,71 +97,60 @@ def compare(
         make: makes our files.
 
     Raises:
-        Stopped: a run of ours was interrupted: its file says nothing.
+        Stopped: a run of ours was interrupted.
     """
     for ours in settings:
         yield our_row(image, target, ours, make)
-    eyes = all(has_time_for_ssimulacra2(ours, target) for ours in settings)
+    with_ssimulacra2 = all(has_time_for_ssimulacra2(ours, target) for ours in settings)
     file = io.BytesIO()
     Image.fromarray(np.round(255 * target).astype(np.uint8)).save(file, "PNG", compress_level=1)
     for setting in tracer.settings:
-        yield their_row(image, target, file.getvalue(), tracer, setting, eyes=eyes)
+        yield their_row(image, target, file.getvalue(), tracer, setting, with_ssimulacra2)
 
 
-class Watch:
-    """Measures time since its creation."""
-
-    def __init__(self) -> None:
-        self.begin = time.monotonic(), time.process_time()
-
-    def read(self) -> tuple[float, float]:
-        """Return the wall time and the processor time since then [s]."""
-        return time.monotonic() - self.begin[0], time.process_time() - self.begin[1]
+def stopwatch() -> Callable[[], tuple[float, float]]:
+    """Return a function that returns the wall time and the processor time since this call [s]."""
+    begin = time.monotonic(), time.process_time()
+    return lambda: (time.monotonic() - begin[0], time.process_time() - begin[1])
 
 
-def our_row(image: str, target: FloatArray, settings: Settings, make: Maker) -> Row:
-    """Our file, of at most ``settings.curves`` shapes.
+def our_row(image: str, target: FloatArray, settings: Settings, make: Maker) -> ComparisonRow:
+    """Return our file of at most ``settings.curves`` shapes.
 
     Raises:
         Stopped: the run was interrupted.
     """
-    watch = Watch()
-    spent = watch.read()
-
-    def note_end(_: str) -> None:
-        nonlocal spent
-        spent = watch.read()
-
-    result = make(target, settings, note_end)
+    times: list[tuple[float, float]] = []
+    elapsed = stopwatch()
+    result = make(target, settings, lambda _: times.append(elapsed()))
     if result.stopped or result.score is None:
         raise Stopped
-    return Row(image, OURS, str(settings.curves), result.svg, *spent, result.score)
+    return ComparisonRow(image, OURS, str(settings.curves), result.svg, *times[-1], result.score)
 
 
-def their_row(image: str, target: FloatArray, png: bytes, tracer: Tracer, setting: str, *, eyes: bool) -> Row:
-    """The tracer's file of ``png``, which holds ``target``; ``eyes`` as in ``score_svg``.
-
-    Whatever the tracer throws is its own failure at this setting.
-    """
-    watch = Watch()
+def their_row(
+    image: str, target: FloatArray, png: bytes, tracer: Tracer, setting: str, with_ssimulacra2: bool
+) -> ComparisonRow:
+    """Return the tracer's file of ``png``, which holds ``target``; its exceptions become the row's error."""
+    elapsed = stopwatch()
     try:
         svg = tracer.trace(png, tracer.settings[setting])
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
-    except BaseException as error:  # a panic of Rust code derives from no Exception
+    except BaseException as error:  # Rust panics do not derive from Exception
         cause = (str(error).strip().splitlines() or ["no cause given"])[0]
         message = printable(f"failed: {type(error).__name__}: {cause}")
-        return Row(image, tracer.name, setting, "", *watch.read(), None, message)
-    spent = watch.read()
+        return ComparisonRow(image, tracer.name, setting, "", *elapsed(), None, message)
+    times = elapsed()
     try:
-        score = score_svg(svg, target, eyes=eyes)
+        score = score_svg(svg, target, eyes=with_ssimulacra2)
     except ImageError as error:
-        return Row(image, tracer.name, setting, svg, *spent, None, f"its file: {error}")
-    return Row(image, tracer.name, setting, svg, *spent, score)
+        return ComparisonRow(image, tracer.name, setting, svg, *times, None, f"its file: {error}")
+    return ComparisonRow(image, tracer.name, setting, svg, *times, score)
 
 
 def warm_up(settings: Settings, backend: Backend) -> None:
-    """Load or compile the kernels of a run, so that no row's time includes that."""
+    """Load or compile the kernels of a run, so that no row's time includes this."""
     y, x = np.mgrid[:64, :64].astype(np.float32) / 64
     target = np.stack([y, x, x * y], axis=2)
     quick = make_settings(kind=settings.kind, renderer=settings.renderer, curves=8, iterations=60)

@@ -1,19 +1,17 @@
-"""Tables and a plot of a comparison."""
+"""Tables of a comparison."""
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import Any
 
 from warpsplat._version import __version__
-from warpsplat.tools.compare import OURS, Comparison, Row
-from warpsplat.tools.tracer import Options, require
+from warpsplat.tools.compare import OURS, Comparison, ComparisonRow
+from warpsplat.tools.tracer import TracerOptions
 
 Figures = dict[str, float | None]
-"""Of one row, or means; None where there are none."""
+"""Figures of a row, or means; None if unknown."""
 
 
 def _decimals(count: int, per: float = 1.0) -> Callable[[float], str]:
@@ -38,7 +36,7 @@ COLUMNS: dict[str, tuple[str, Callable[[float], str]]] = {
 """Figures of a table: heading, and how a value is written."""
 
 
-def figures(row: Row) -> Figures:
+def figures(row: ComparisonRow) -> Figures:
     """Return the figures of a row; none if it failed."""
     if row.score is None:
         return {}
@@ -65,7 +63,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def table(entries: Sequence[tuple[str, str, Figures]]) -> str:
-    """Return aligned Markdown; columns without any figure are left out."""
+    """Return a Markdown table; columns without figures are left out."""
     shown = [name for name in COLUMNS if any(values.get(name) is not None for *_, values in entries)]
     cells = [["program", "setting", *(COLUMNS[name][0] for name in shown)]]
     for program, setting, values in entries:
@@ -102,59 +100,6 @@ def markdown(found: Comparison) -> str:
     return "\n\n".join([*parts, "## Settings", "\n".join(lines)])
 
 
-def options_text(options: Options) -> str:
+def options_text(options: TracerOptions) -> str:
     """Return a tracer's options as text."""
     return ", ".join(f"{name} {value}" for name, value in options.items()) or "none"
-
-
-PANEL = (5.0, 3.8)
-"""Width and height of an image's part of the plot [inches of 72 px]."""
-
-ACROSS = 2
-"""Most panels in a row."""
-
-
-def plot(found: Comparison) -> bytes:
-    """PSNR against the size of the file, one panel an image, as an SVG.
-
-    Raises:
-        UsageError: Matplotlib is not installed.
-    """
-    matplotlib = require("matplotlib")
-    figure_module = require("matplotlib.figure")
-    images = found.by_image()
-    across = min(ACROSS, len(images))
-    down = math.ceil(len(images) / across)
-    # Text stays text, and the same rows give the same bytes.
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": OURS}):
-        figure = figure_module.Figure((PANEL[0] * across, PANEL[1] * down), layout="constrained")
-        for i, (image, rows) in enumerate(images.items()):
-            axes = figure.add_subplot(down, across, i + 1)
-            draw_panel(axes, image, rows, found.tracer.name)
-        file = io.BytesIO()
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-    return file.getvalue()
-
-
-def draw_panel(axes: Any, image: str, rows: Sequence[Row], tracer: str) -> None:
-    """Draw the panel of an image: our numbers of shapes as a line, the tracer's settings as points."""
-    for program, style in ((OURS, "o-"), (tracer, "s")):
-        points = [
-            (row.score.bytes / 1000, row.score.psnr, row.setting)
-            for row in rows
-            if row.program == program and row.score and math.isfinite(row.score.psnr)
-        ]
-        axes.plot([x for x, _, _ in points], [y for _, y, _ in points], style, markersize=4, label=program)
-        for i, (x, y, setting) in enumerate(points):
-            axes.annotate(setting, (x, y), (4, 4 if i % 2 else -9), textcoords="offset points", fontsize=7)
-    axes.set_title(image, parse_math=False)
-    axes.set(xscale="log", xlabel="file [kB]", ylabel="PSNR [dB]")
-    axes.xaxis.set_major_locator(require("matplotlib.ticker").LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter(
-        ""
-    )  # or they are labelled where there are few: as powers, one over the other
-    axes.grid(visible=True, alpha=0.3)
-    axes.tick_params(labelsize=8)
-    axes.margins(0.15)
-    axes.legend()

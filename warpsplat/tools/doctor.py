@@ -1,4 +1,4 @@
-"""Check what a run needs, piece by piece; each piece is imported in its own check, as it may be broken."""
+"""Checks of everything that a run needs. Each imports what it checks, which may be broken."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from warpsplat._version import __version__
 from warpsplat.errors import explain
-
-Status = Literal["ok", "note", "broken"]
 
 MODULES = {
     "warp-lang": "warp",
@@ -26,7 +24,7 @@ MODULES = {
     "pyyaml": "yaml",
     "resvg-py": "resvg_py",
 }
-"""Package -> module, where the names differ."""
+"""Package -> module, if the names differ."""
 
 EXTRAS = {
     "torch": ("torch", "warpsplat.torch, and code written for DiffVG"),
@@ -38,24 +36,24 @@ EXTRAS = {
     "serve": ("starlette", "warpsplat serve"),
     "remote": ("upath", "images and results behind URLs"),
 }
-"""Extra -> its module, and what it is for."""
+"""Extra -> its package and purpose."""
 
-LEAST_MEMORY = 1.0
-"""Free memory that a photograph of some megapixels needs [GB]."""
+MIN_MEMORY = 1e9
+"""Free memory that a photograph of some megapixels needs [bytes]."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Result of one check."""
+    """Result of a check."""
 
-    name: str
-    status: Status
     text: str
     """One line."""
-    hint: str = ""
-    """What to do about it."""
     values: dict[str, Any] = field(default_factory=dict)
     """The same as data."""
+    status: Literal["ok", "note", "broken"] = "ok"
+    hint: str = ""
+    """The remedy."""
+    name: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return values for JSON."""
@@ -64,73 +62,50 @@ class Check:
 
 
 def checks(device: str = "auto") -> Iterator[Check]:
-    """Yield all checks, ordered so that the first broken thing explains later ones.
+    """Yield all checks, ordered so that the first failure explains later ones.
 
     Args:
         device: where the self-test runs.
     """
-    tests: tuple[tuple[str, Callable[[], Check]], ...] = (
-        ("python", check_python),
-        ("packages", check_packages),
-        ("extras", check_extras),
-        ("devices", check_devices),
-        ("machine", check_machine),
-        ("kernel cache", check_cache),
-        ("viewer", check_viewer),
-        ("self-test", lambda: check_itself(device)),
-        ("adjoint", lambda: check_adjoint(device)),
-    )
-    for name, test in tests:
+    tests: dict[str, Callable[[], Check]] = {
+        "python": check_python,
+        "packages": check_packages,
+        "extras": check_extras,
+        "devices": check_devices,
+        "machine": check_machine,
+        "kernel cache": check_cache,
+        "viewer": check_viewer,
+        "self-test": lambda: check_run(device),
+        "adjoint": lambda: check_adjoint(device),
+    }
+    for name, test in tests.items():
         try:
-            yield test()
+            check = test()
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # broken packages raise anything
-            yield Check(name, "broken", explain(error)[0])
+            check = Check(explain(error)[0], status="broken")
+        yield replace(check, name=name)
 
 
 def check_python() -> Check:
-    """Check the interpreter, the program and the system."""
+    """Check the interpreter and the system."""
     values = {"warpsplat": __version__, "python": platform.python_version(), "executable": sys.executable}
     values["system"] = f"{platform.system()} {platform.release()} {platform.machine()}"
     text = f"warpsplat {__version__}, Python {values['python']} ({sys.executable}) on {values['system']}"
     if sys.maxsize < 2**32:
-        return Check("python", "broken", f"{text}: 32 bits", "a Python of 64 bits is needed", values)
-    return Check("python", "ok", text, values=values)
+        return Check(f"{text}: 32 bits", values, "broken", "a 64-bit Python is needed")
+    return Check(text, values)
 
 
-def needed() -> list[str]:
-    """Return the packages that warpsplat requires, as it was installed."""
+def required_packages() -> list[str]:
+    """Return the packages that warpsplat requires."""
     try:
         requires = importlib.metadata.requires("warpsplat") or []
     except importlib.metadata.PackageNotFoundError:  # a checkout that was not installed
         requires = ["warp-lang", "numpy", "opencv-contrib-python-headless", "pillow", "click", "resvg-py"]
     names = (re.match(r"[\w.-]+", line) for line in requires if "extra ==" not in line)
     return sorted(name[0].lower() for name in names if name)
-
-
-def check_packages() -> Check:
-    """Check that each required package can be imported."""
-    versions: dict[str, str] = {}
-    wrong: list[str] = []
-    for package in needed():
-        try:
-            module = importlib.import_module(MODULES.get(package, package))
-            versions[package] = version_of(package) or str(getattr(module, "__version__", "?"))
-        except BaseException as error:  # native libraries fail in their own ways
-            wrong.append(
-                f"{package} ({explain(error)[0].removeprefix('internal error: ').split(' (set ')[0]})"
-            )
-    if wrong:
-        return Check(
-            "packages",
-            "broken",
-            "cannot be imported: " + ", ".join(wrong),
-            "install warpsplat anew: pip install --force-reinstall warpsplat",
-            {"versions": versions},
-        )
-    text = ", ".join(f"{name} {version}" for name, version in versions.items())
-    return Check("packages", "ok", text, values={"versions": versions})
 
 
 def version_of(package: str) -> str | None:
@@ -141,13 +116,33 @@ def version_of(package: str) -> str | None:
         return None
 
 
+def check_packages() -> Check:
+    """Check that each required package can be imported."""
+    versions: dict[str, str] = {}
+    broken: list[str] = []
+    for package in required_packages():
+        try:
+            module = importlib.import_module(MODULES.get(package, package))
+            versions[package] = version_of(package) or str(getattr(module, "__version__", "?"))
+        except BaseException as error:  # native libraries fail in their own ways
+            cause = explain(error)[0].removeprefix("internal error: ").split(" (set ")[0]
+            broken.append(f"{package} ({cause})")
+    if broken:
+        hint = "reinstall warpsplat: pip install --force-reinstall warpsplat"
+        return Check("cannot be imported: " + ", ".join(broken), {"versions": versions}, "broken", hint)
+    text = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return Check(text, {"versions": versions})
+
+
 def check_extras() -> Check:
     """Check the optional packages."""
     found = {extra: version_of(package) for extra, (package, _) in EXTRAS.items()}
-    there = [f"{extra} ({EXTRAS[extra][0]} {version})" for extra, version in found.items() if version]
+    installed = [f"{extra} ({EXTRAS[extra][0]} {version})" for extra, version in found.items() if version]
     missing = [f"{extra} (for {EXTRAS[extra][1]})" for extra, version in found.items() if not version]
-    parts = [", ".join(there)] * bool(there) + ["not installed: " + ", ".join(missing)] * bool(missing)
-    return Check("extras", "note" if missing else "ok", "; ".join(parts), values={"versions": found})
+    parts = [", ".join(installed)] * bool(installed) + ["not installed: " + ", ".join(missing)] * bool(
+        missing
+    )
+    return Check("; ".join(parts), {"versions": found}, "note" if missing else "ok")
 
 
 def check_devices() -> Check:
@@ -173,25 +168,23 @@ def check_devices() -> Check:
     ]
     text = ", ".join(shown) + f"; default: {values['default_device']}"
     if driver and len(devices) == 1:
-        hint = "Warp finds none: nvidia-smi should list it, CUDA_VISIBLE_DEVICES may hide it"
-        return Check(
-            "devices", "note", f"{text}; a CUDA driver ({values['cuda_driver']}), no GPU", hint, values
-        )
-    return Check("devices", "ok", text, values=values)
+        hint = "Warp finds no GPU: nvidia-smi should list it, CUDA_VISIBLE_DEVICES may hide it"
+        return Check(f"{text}; a CUDA driver ({values['cuda_driver']}), no GPU", values, "note", hint)
+    return Check(text, values)
 
 
 def check_machine() -> Check:
     """Check cores and memory."""
     from warpsplat.native import available_cores, free_memory
 
-    values: dict[str, Any] = {"cpu_threads": available_cores(), "free_memory": free_memory()}
-    text, free = f"{values['cpu_threads']} CPU threads", values["free_memory"]
+    cores, free = available_cores(), free_memory()
+    values = {"cpu_threads": cores, "free_memory": free}
     if free is None:
-        return Check("machine", "ok", text, values=values)
-    text += f", {free / 1e9:.1f} GB of memory free"
-    if free < 1e9 * LEAST_MEMORY:
-        return Check("machine", "note", text, "large images need more; end other programs", values)
-    return Check("machine", "ok", text, values=values)
+        return Check(f"{cores} CPU threads", values)
+    text = f"{cores} CPU threads, {free / 1e9:.1f} GB of memory free"
+    if free < MIN_MEMORY:
+        return Check(text, values, "note", "large images need more; end other programs")
+    return Check(text, values)
 
 
 def check_cache() -> Check:
@@ -210,39 +203,31 @@ def check_cache() -> Check:
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except OSError as error:
-        text = f"{folder}: cannot be written: {error.strerror}"
-        return Check("kernel cache", "broken", text, "WARP_CACHE_PATH names another folder", values)
-    bad = [path.name for path in modules if damaged(path)]
-    if bad:
-        return Check(
-            "kernel cache", "note", f"{text}, {len(bad)} damaged", "they are made anew when needed", values
-        )
-    return Check("kernel cache", "ok", text, values=values)
+        text, hint = f"{folder}: cannot be written: {error.strerror}", "WARP_CACHE_PATH names another folder"
+        return Check(text, values, "broken", hint)
+    if bad := sum(damaged(path) for path in modules):
+        return Check(f"{text}, {bad} damaged", values, "note", "they are rebuilt when needed")
+    return Check(text, values)
 
 
 def check_viewer() -> Check:
-    """Check resvg, which files are measured with."""
+    """Check resvg, which renders files for measurement."""
     from warpsplat.svg.viewer import render_svg
 
     head = '<svg xmlns="http://www.w3.org/2000/svg" width="2" height="2">'
-    text = f'{head}<path d="M0 0h1v2H0z" fill="red"/></svg>'
-    found = [render_svg(text).convert("RGBA").getpixel((x, 1)) for x in (0, 1)]
+    image = render_svg(f'{head}<path d="M0 0h1v2H0z" fill="red"/></svg>').convert("RGBA")
+    found = [image.getpixel((x, 1)) for x in (0, 1)]
     if found != [(255, 0, 0, 255), (0, 0, 0, 0)]:
-        return Check(
-            "viewer", "broken", f"resvg draws something else: {found}", "pip install --upgrade resvg-py"
-        )
-    return Check("viewer", "ok", "resvg draws what it should")
+        return Check(f"resvg renders wrong pixels: {found}", {}, "broken", "pip install --upgrade resvg-py")
+    return Check("resvg renders correctly")
 
 
-KNOWN_PSNR = 23.65
-"""Of the self-test [dB]."""
-
-NEAR_PSNR = 1.0
-"""So far from it the figure may be: other devices round in other ways, and a run carries that on."""
+KNOWN_PSNR, PSNR_TOLERANCE = 23.65, 1.0
+"""Result of the self-test and its tolerance [dB]: devices round in different ways, which a run amplifies."""
 
 
-def check_itself(device: str) -> Check:
-    """Check a tiny run, whose figure is known."""
+def check_run(device: str) -> Check:
+    """Check a tiny run whose PSNR is known."""
     import numpy as np
     import warp as wp
 
@@ -256,22 +241,25 @@ def check_itself(device: str) -> Check:
     result = vectorize(image, 16, subject="photo", iterations=60, seed=0, device=device)
     seconds = time.monotonic() - started
     assert result.score
-    compiled = len(set(folder.glob("wp_*")) - before)
-    values = {"psnr": round(result.score.psnr, 2), "seconds": round(seconds, 2), "compiled": compiled}
-    text = f"16 shapes in 60 steps: {result.score.psnr:.1f} dB in {seconds:.1f} s"
+    psnr, compiled = result.score.psnr, len(set(folder.glob("wp_*")) - before)
+    values = {"psnr": round(psnr, 2), "seconds": round(seconds, 2), "compiled": compiled}
+    text = f"16 shapes in 60 steps: {psnr:.1f} dB in {seconds:.1f} s"
     text += f", {compiled} modules compiled" if compiled else ", kernels were compiled before"
-    if abs(result.score.psnr - KNOWN_PSNR) > NEAR_PSNR:
-        hint = "wrong kernels, or a wrong device: remove the kernel cache, try --device cpu"
-        return Check("self-test", "broken", f"{text}; {KNOWN_PSNR:.1f} dB are expected", hint, values)
-    return Check("self-test", "ok", text, values=values)
+    if abs(psnr - KNOWN_PSNR) > PSNR_TOLERANCE:
+        hint = "wrong kernels or a faulty device: remove the kernel cache, try --device cpu"
+        return Check(f"{text}; {KNOWN_PSNR:.1f} dB are expected", values, "broken", hint)
+    return Check(text, values)
 
 
-MOST_DIFFERENCE = 0.02
-"""Relative, of a derivative and the difference quotient, in single precision."""
+MAX_DIFFERENCE = 0.02
+"""Relative, between a derivative and the difference quotient in single precision."""
+
+STEP = 0.01
+"""Step of the difference quotient [px]."""
 
 
 def check_adjoint(device: str) -> Check:
-    """Check a derivative of an image against a difference of images."""
+    """Check a derivative of an image against the difference quotient."""
     import numpy as np
 
     from warpsplat.rendering.backend import Backend, Viewport
@@ -289,22 +277,18 @@ def check_adjoint(device: str) -> Check:
     weights = np.stack([np.sin(5 * x), np.cos(4 * y), x * y], axis=2).astype(np.float32)
     renderer.write_image_grad(weights)
     renderer.backward()
-    way = rng.normal(size=scene.points.shape).astype(np.float32)
-    derivative = float((parameters.arrays["points_grad"].numpy() * way).sum(dtype="float64"))
+    direction = rng.normal(size=scene.points.shape).astype(np.float32)
+    derivative = float((parameters.arrays["points_grad"].numpy() * direction).sum(dtype="float64"))
 
-    def measured(step: float) -> float:
-        parameters.arrays["points"].assign(scene.points + np.float32(step) * way)
+    def weighted_sum(step: float) -> float:
+        parameters.arrays["points"].assign(scene.points + np.float32(step) * direction)
         renderer.forward_complete()
         return float((renderer.read_image() * weights).sum(dtype="float64"))
 
-    quotient = (measured(STEP) - measured(-STEP)) / (2 * STEP)
+    quotient = (weighted_sum(STEP) - weighted_sum(-STEP)) / (2 * STEP)
     difference = abs(derivative - quotient) / max(abs(quotient), 1e-9)
-    text = f"derivative and difference quotient of a picture differ by {100 * difference:.2f} %"
-    values = {"difference": difference}
-    if not difference <= MOST_DIFFERENCE:
-        return Check("adjoint", "broken", text, "remove the kernel cache, try --device cpu", values)
-    return Check("adjoint", "ok", text, values=values)
-
-
-STEP = 0.01
-"""Of the difference [px]."""
+    text = f"derivative and difference quotient of an image differ by {100 * difference:.2f} %"
+    if not difference <= MAX_DIFFERENCE:
+        hint = "remove the kernel cache, try --device cpu"
+        return Check(text, {"difference": difference}, "broken", hint)
+    return Check(text, {"difference": difference})

@@ -1,4 +1,4 @@
-"""What the commands about the program itself add to the core."""
+"""Declare the commands about the program itself."""
 
 from warpsplat.extensions import Command, Extension
 
@@ -9,7 +9,7 @@ EXTENSION = Extension(
             "compare": "Compare our files with another program's.",
             "bench": "Time the stages of a training step.",
             "info": "Show version and devices.",
-            "doctor": "Check that all that is needed is there and works.",
+            "doctor": "Check that everything a run needs works.",
         }.items()
     },
     uses=("torch",),

@@ -1,17 +1,15 @@
-"""Programs to compare with: how to call each, and with which settings."""
+"""Other programs for comparison: how to call them, and with which settings."""
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Any
 
 from warpsplat.errors import UsageError
 from warpsplat.native import messages_hidden
 
-Options = Mapping[str, str | int | float]
+TracerOptions = Mapping[str, str | int | float]
 """Arguments of a tracer, by its own names."""
 
 
@@ -21,16 +19,16 @@ class Tracer:
 
     name: str
     version: str
-    settings: Mapping[str, Options]
-    """Options by the name that tables and files give them."""
-    trace: Callable[[bytes, Options], str]
+    settings: Mapping[str, TracerOptions]
+    """Options by the name that tables and files use for them."""
+    trace: Callable[[bytes, TracerOptions], str]
     """PNG, options -> SVG. May raise anything."""
 
 
-POLYGON: Options = {"mode": "polygon", "path_precision": 0}
-"""Straight lines between whole pixels: for VTracer the same PSNR in a seventh of the bytes."""
+POLYGON: TracerOptions = {"mode": "polygon", "path_precision": 0}
+"""Straight lines between whole pixels: the same PSNR as splines, in a seventh of the bytes."""
 
-VTRACER_SETTINGS: dict[str, Options] = {
+VTRACER_SETTINGS: dict[str, TracerOptions] = {
     "default": {},
     "rounded": {"path_precision": 1},
     "smooth": {"path_precision": 1, "length_threshold": 10},
@@ -40,34 +38,24 @@ VTRACER_SETTINGS: dict[str, Options] = {
     "fine": {**POLYGON, "color_precision": 8, "layer_difference": 8, "filter_speckle": 2},
     "pixel": {"mode": "none", "path_precision": 0},
 }
-"""Of VTracer: the defaults, and what is best for its size or its figures out of forty that were tried on
-photographs, drawings and logos (docs/comparison.md)."""
-
-
-def require(module: str) -> Any:
-    """Import an optional dependency, of the extra ``compare``.
-
-    Raises:
-        UsageError: it is not installed; the message says how to install it.
-    """
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        name = module.partition(".")[0]
-        hint = f"pip install {name}, or warpsplat with its extra: '.[compare]'"
-        raise UsageError(f"compare needs {name}, which is not installed: {hint}") from error
+"""The defaults, and the best for their size of forty combinations that were tried on photographs, drawings
+and logos (docs/comparison.md)."""
 
 
 def vtracer() -> Tracer:
     """Return VTracer (visioncortex), by its Python package.
 
     Raises:
-        UsageError: the package is not installed.
+        UsageError: it is not installed; the message says how to install it.
     """
-    package = require("vtracer")
+    try:
+        import vtracer as package
+    except ImportError as error:
+        hint = "pip install vtracer, or warpsplat with its extra: '.[compare]'"
+        raise UsageError(f"compare needs vtracer, which is not installed: {hint}") from error
 
-    def trace(png: bytes, options: Options) -> str:
-        with messages_hidden():  # where it panics, Rust prints a trace of its own
+    def trace(png: bytes, options: TracerOptions) -> str:
+        with messages_hidden():  # a Rust panic prints a trace
             return str(package.convert_raw_image_to_svg(png, img_format="png", **options))
 
     return Tracer("VTracer", metadata.version("vtracer"), VTRACER_SETTINGS, trace)

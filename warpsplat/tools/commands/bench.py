@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from typing import Any
 
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Function
 from warpsplat.cli.options import threads_option
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import renderer_names
@@ -32,8 +34,8 @@ def table(values: dict[str, Any], verbose: int) -> str:
     rows += [(f"  {name}", spread) for name, spread in values["stages"].items()]
     if verbose:
         rows += [(f"    {name}", spread) for name, spread in values["kernels"].items()]
-    both = values.get("through_torch", {})
-    rows += [(f"alternately, {name}", both[name]) for name in ("own", "torch") if both]
+    torch = values.get("through_torch", {})
+    rows += [(f"alternately, {name}", torch[name]) for name in ("own", "torch") if torch]
     memory = values["peak_memory"]
     where = values["device"] + (
         f", {values['threads']} threads" if values["device"] == "cpu" else f" ({values['device_name']})"
@@ -48,67 +50,52 @@ def table(values: dict[str, Any], verbose: int) -> str:
             f"{values['megapixels_per_s']:.1f} megapixels/s, {values['us_per_shape']:.1f} us a shape, "
             f"{values['ns_per_pixel']:.1f} ns a pixel"
             + (f", peak memory {memory / 1e6:.0f} MB" if memory else "")
-            + (f"; through PyTorch {both['ratio']:.2f} times as long" if both else ""),
+            + (f"; through PyTorch {torch['ratio']:.2f} times as long" if torch else ""),
         ]
     )
 
 
-@click.command("bench", context_settings={"help_option_names": ["-h", "--help"]})
-@click.option(
-    "--curves", type=click.IntRange(1, 100_000), default=512, show_default=True, metavar="N", help="Shapes."
-)
-@click.option("--size", default="768x512", show_default=True, metavar="WxH", help="Of the canvas [px].")
-@click.option(
-    "--kind",
-    type=click.Choice(["closed", "open"]),
-    default="closed",
-    show_default=True,
-    help="Fills, or strokes.",
-)
+def number_option(
+    name: str, numbers: click.ParamType, default: float, text: str
+) -> Callable[[Function], Function]:
+    """Return a click option."""
+    return click.option(name, type=numbers, default=default, metavar="N", help=text)
+
+
+@click.command("bench", context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
+@number_option("--curves", click.IntRange(1, 100_000), 512, "Number of shapes.")
+@click.option("--size", default="768x512", metavar="WxH", help="Size of the canvas [px].")
+@click.option("--kind", type=click.Choice(["closed", "open"]), default="closed", help="Fills or strokes.")
 @click.option(
     "--renderer",
     type=click.Choice(renderer_names()),
     default="exact",
-    show_default=True,
-    help="How shapes are seen, as in vectorize.",
+    help="Model of coverage, as in vectorize.",
 )
-@click.option(
-    "--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, show_default=True, help="Of each shape."
-)
-@click.option("--device", default="auto", show_default=True, help="auto, cpu, or cuda:N.")
+@number_option("--opacity", click.FloatRange(0.02, 0.99), 0.9, "Opacity of each shape.")
+@click.option("--device", default="auto", help="auto, cpu, or cuda:N.")
 @threads_option
-@click.option(
-    "--repeats",
-    type=click.IntRange(1, 10_000),
-    default=20,
-    show_default=True,
-    metavar="N",
-    help="Steps that are timed.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(0, 2**32 - 1),
-    default=0,
-    show_default=True,
-    metavar="N",
-    help="Of the random scene.",
-)
-@click.option("--torch", "through_torch", is_flag=True, help="Time the passes through PyTorch as well.")
-@click.option("-v", "--verbose", count=True, help="List the kernels as well.")
+@number_option("--repeats", click.IntRange(1, 10_000), 20, "Number of timed steps.")
+@number_option("--seed", click.IntRange(0, 2**32 - 1), 0, "Seed of the random scene.")
+@click.option("--torch", "through_torch", is_flag=True, help="Also time the passes through PyTorch.")
+@click.option("-v", "--verbose", count=True, show_default=False, help="Also list the kernels.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
     """Time a training step and its stages on a random scene.
 
     Shapes have uniform centres and radii of 5 to 10 % of the width (half of
     that on canvases wider than 2000 px): closed outlines of 4 cubics on a
-    jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves
-    while it is timed.
+    jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves.
     """
     width, height = parse_size(size)
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
-    from warpsplat.tools.bench import bench
+    from warpsplat.tools.bench import bench, bench_scene
 
     start_warp()
-    values = bench(width=width, height=height, backend=Backend.on(choose_device(device), threads), **options)
+    kind, opacity, seed = options["kind"], options["opacity"], options["seed"]
+    scene = bench_scene(kind, options["curves"], (width, height), opacity, seed)
+    backend = Backend.on(choose_device(device), threads)
+    times = bench(scene, options["renderer"], backend, options["repeats"], seed, options["through_torch"])
+    values = {"kind": kind, "opacity": opacity, **times}
     echo(json.dumps(values) if as_json else table(values, verbose))

@@ -13,7 +13,7 @@ from warpsplat.cli.echo import echo
 from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
 from warpsplat.errors import Stopped, UsageError, printable, shown
 from warpsplat.run.options import BY_NAME, settings_from
-from warpsplat.tools.tracer import TRACERS, require
+from warpsplat.tools.tracer import TRACERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from warpsplat.fit.settings import Settings
     from warpsplat.run.result import Result
     from warpsplat.scene import FloatArray
-    from warpsplat.tools.compare import Comparison, Row
+    from warpsplat.tools.compare import Comparison, ComparisonRow
     from warpsplat.tools.tracer import Tracer
 
-TABLES, FIGURES, PLOT = "comparison.md", "comparison.json", "comparison.svg"
+TABLES, FIGURES = "comparison.md", "comparison.json"
 """Files in the folder besides the SVGs."""
 
 
@@ -51,11 +51,11 @@ def result_names(images: Sequence[Path], settings: Sequence[Settings], tracer: T
 
     made = [(OURS, str(ours.curves)) for ours in settings]
     made += [(tracer.name, setting) for setting in tracer.settings]
-    return [*(svg_name(image, *one) for image in images for one in made), TABLES, FIGURES, PLOT]
+    return [*(svg_name(image, *one) for image in images for one in made), TABLES, FIGURES]
 
 
 def prepare_folder(folder: Path, names: Sequence[str], images: Sequence[Path], *, overwrite: bool) -> None:
-    """Make the folder of the results, and check before the run that they can be written.
+    """Make the folder of the results, and check that they can be written.
 
     Raises:
         UsageError: they cannot, or exist and ``overwrite`` is not given.
@@ -97,7 +97,7 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="FOLDER",
-    help=f"For all SVGs, {TABLES}, {FIGURES} and the plot {PLOT}.",
+    help=f"Write all SVGs, {TABLES} and {FIGURES} there.",
 )
 @overwrite_option
 @click.option(
@@ -125,21 +125,22 @@ def command(
 ) -> None:
     """Compare our files of IMAGES with those of another program.
 
-    Each image is vectorized by us with several numbers of shapes, and by the
-    other program at several of its settings. All files are measured as eval
-    measures them: PSNR, SSIM, size, paths, nodes; and the seconds that they
-    took. Both get the same pixels, transparency on white.
+    Each image is vectorized by us with several numbers of shapes (for
+    drawings, upper limits), and by the other program at several of its
+    settings. All files are measured as by eval: PSNR, SSIM, size, paths,
+    nodes; and the time they took. Both get the same pixels, with
+    transparency on white.
 
-    VTracer and, with -o, Matplotlib must be installed: the extra "compare".
+    VTracer must be installed: the extra "compare".
     """
     settings = [settings_from({**given, "curves": n}) for n in parse_curves(curves)]
     tracer = TRACERS[against]()
     sources = read_images(images)
     if output:
-        require("matplotlib")
         prepare_folder(output, result_names(images, settings, tracer), images, overwrite=overwrite)
     from warpsplat.cli.run import progress_bar
     from warpsplat.cli.signals import Interrupt
+    from warpsplat.drawing.subjects import choose_subject
     from warpsplat.files.image import load_image
     from warpsplat.files.output import write_result
     from warpsplat.fit.problem import Problem, Run
@@ -154,10 +155,12 @@ def command(
     interrupt = Interrupt()
 
     def run(path: Path, target: FloatArray, ours: Settings, write: Callable[[str], None]) -> Result:
-        with interrupt.watching(), progress_bar(path, ours, quiet=quiet, verbose=verbose) as report:
-            return make_result(PreparedImage(Problem(target, ours)), Run(backend, report, interrupt), write)
+        with interrupt.watching(), progress_bar(path, ours, quiet=quiet, verbose=verbose) as on_progress:
+            chosen, _ = choose_subject(target, ours)
+            image = PreparedImage(Problem(target, chosen))
+            return make_result(image, Run(backend, on_progress, interrupt), write)
 
-    rows: list[Row] = []
+    rows: list[ComparisonRow] = []
     try:
         warm_up(settings[0], backend)
         for path, data in sources.items():
@@ -171,20 +174,19 @@ def command(
     except Stopped as error:
         raise KeyboardInterrupt from error
     finally:
-        if rows:  # publish what there is, however it ended
+        if rows:  # also after a failure
             publish(Comparison(rows, settings[0], tracer), output, as_json=as_json, quiet=quiet)
 
 
 def publish(found: Comparison, output: Path | None, *, as_json: bool, quiet: bool) -> None:
-    """Write tables, figures and plot into the folder, and print tables or figures."""
+    """Write tables and figures into the folder, and print one of them."""
     from warpsplat.files.output import write_result
-    from warpsplat.tools.compare_tables import markdown, plot
+    from warpsplat.tools.compare_tables import markdown
 
     tables, figures = markdown(found), json.dumps(found.as_dict())
     if output:
         write_result(output / TABLES, f"{tables}\n".encode())
         write_result(output / FIGURES, f"{figures}\n".encode())
-        write_result(output / PLOT, plot(found))
     if as_json:
         echo(figures)
     elif not quiet:

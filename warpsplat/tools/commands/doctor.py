@@ -19,11 +19,11 @@ MARKS = {"ok": "ok", "note": "note", "broken": "BROKEN"}
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(device: str, as_json: bool) -> None:
-    """Check that all that a run needs is there and works.
+    """Check that everything a run needs is installed and works.
 
-    Versions, devices, memory, the kernel cache, and a self-test of some
-    seconds, in which kernels are compiled where they are not yet. What is
-    broken comes with a hint; the exit code is 7 then.
+    Checks versions, devices, memory and the kernel cache, and runs a
+    self-test of some seconds (longer if kernels must be compiled). If
+    anything is broken, a hint says what to do, and the exit code is 7.
     """
     from warpsplat.tools.doctor import checks
 
@@ -38,6 +38,6 @@ def command(device: str, as_json: bool) -> None:
     if as_json:
         echo(json.dumps({"ok": not broken, "checks": [check.as_dict() for check in found]}))
     else:
-        echo("broken: " + ", ".join(broken) if broken else "all that is needed is there and works")
+        echo("broken: " + ", ".join(broken) if broken else "everything needed is installed and works")
     if broken:
         sys.exit(ExitCode.RESOURCES)

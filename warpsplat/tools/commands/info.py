@@ -13,7 +13,7 @@ from warpsplat.cli.echo import echo
 @click.command("info", context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(as_json: bool) -> None:
-    """Show the version, the devices and where compiled kernels are kept; doctor checks them."""
+    """Show the version, the devices and the folder of compiled kernels; doctor checks them."""
     from warpsplat.tools.doctor import check_cache, check_devices, check_machine, check_packages, check_python
 
     python, packages, found = (check().values for check in (check_python, check_packages, check_devices))
