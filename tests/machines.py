@@ -1,10 +1,10 @@
 """Make the golden files as other machines would, and compare: ``python -m tests.machines``.
 
-Without options: with each choice of code that NumPy, OpenBLAS, OpenCV and the C library can be told to make,
-and with several numbers of threads. With ``--emulate``: on other processors, by QEMU's user mode (``qemu-user``
-10 or newer: 7.2 gathers wrong elements of strided arrays with AVX2), which takes minutes for the first case,
-as the kernels are compiled there too. An aarch64 needs its own Python and packages, which ``--prepare FOLDER``
-fetches (Debian, pip) and ``--aarch64 FOLDER`` uses.
+Without options: with each choice of code that NumPy, OpenBLAS, OpenCV and the C library can be told to
+make, and with several numbers of threads. With ``--emulate``: on other processors, by QEMU's user mode
+(``qemu-user`` 10 or newer: 7.2 gathers wrong elements of strided arrays with AVX2), which takes minutes for
+the first case, as the kernels are compiled there too. An aarch64 needs its own Python and packages, which
+``--prepare FOLDER`` fetches (Debian, pip) and ``--aarch64 FOLDER`` uses.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ EMULATED_CASES = ("photo closed", "photo open", "photo splat", "drawing", "line"
 """Cases made under emulation where none are named; all take hours."""
 
 PACKAGES = """
-python3.11-minimal libpython3.11-minimal libpython3.11-stdlib libc6 libgcc-s1 libstdc++6 zlib1g libexpat1 libffi8
-libssl3 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 libncursesw6 libtinfo6 libreadline8 libdb5.3 libnsl2 libtirpc3
-libcrypt1 media-types
+python3.11-minimal libpython3.11-minimal libpython3.11-stdlib libc6 libgcc-s1 libstdc++6 zlib1g libexpat1
+libffi8 libssl3 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 libncursesw6 libtinfo6 libreadline8 libdb5.3 libnsl2
+libtirpc3 libcrypt1 media-types
 """
 """Debian's packages of a Python for aarch64."""
 

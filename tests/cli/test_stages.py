@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -209,28 +207,3 @@ def test_a_signal_at_the_start(tmp_path: Path, moment: str, number: signal.Signa
     assert "Traceback" not in said
     assert len(said.strip().splitlines()) <= 1, said
     assert_whole(folder)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_ctrl_c_at_any_early_moment_shows_no_traceback(tmp_path: Path, seed: int) -> None:
-    make_image(tmp_path / "a.png")
-    command = [sys.executable, "-X", "importtime", "-m", "warpsplat", "vectorize", "a.png", "-q"]
-    process = subprocess.Popen(
-        [*command, "-o", "a.svg", "--iterations", "900000", "--device", "cpu"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-    )
-    assert process.stderr
-    for line in process.stderr:
-        if b"click" in line:  # the first import after the one that prepares for signals
-            break
-    time.sleep(random.Random(seed).uniform(0, 0.3))
-    process.send_signal(signal.SIGINT)
-    try:
-        _, said = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert b"Traceback" not in said
-    assert process.returncode in {130, -signal.SIGINT}
