@@ -219,7 +219,7 @@ def test_an_svg_is_refined(device: str) -> None:
 
 
 def test_threads_do_not_disturb_each_other(device: str) -> None:
-    """With one thread each, a step is a graph, which other threads' launches must not get into."""
+    """A step of one thread is a graph, which must not record other threads' launches."""
     images = [np.roll(photograph(), 5 * i, axis=1) for i in range(4)]
 
     def made(image: np.ndarray) -> str:

@@ -68,8 +68,8 @@ FORBIDDEN = {
         argpartition
     """),
 }
-"""By module, what has code of its own for some processors, or comes from the C library. Of ``cmath`` and
-``np.linalg`` everything counts (but lengths along an axis), of ``cv2`` what is not ``EXACT``."""
+"""Functions with code of their own for some processors, or of the C library, by module. ``cmath`` and
+``np.linalg`` are forbidden as a whole (but lengths along an axis), ``cv2`` but for ``EXACT``."""
 
 METHODS = words("""
     argsort dot argpartition normal standard_normal multivariate_normal lognormal exponential
@@ -198,5 +198,5 @@ def test_nothing_depends_on_the_processor() -> None:
         ("text.partition(':')", []),
     ],
 )
-def test_what_is_found(code: str, names: list[str]) -> None:
+def test_forbidden_calls_are_found(code: str, names: list[str]) -> None:
     assert [name for name, _ in forbidden(ast.parse(code))] == names

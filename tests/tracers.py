@@ -14,7 +14,7 @@ SIZES: dict[str, Options] = {"one": {"bands": 1}, "four": {"bands": 4}}
 
 
 def bands(png: bytes, options: Options) -> str:
-    """So many bands across the image, each of its mean colour."""
+    """Draw bands across the image, each of its mean colour."""
     image = Image.open(io.BytesIO(png))
     width, height = image.size
     count = int(options["bands"])

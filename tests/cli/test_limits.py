@@ -86,14 +86,14 @@ def test_an_input_without_permission(forks: Forks, folder: Path, name: str) -> N
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 @pytest.mark.parametrize("command", ["info --json", "eval a.png drawing.svg"])
-def test_results_that_nobody_can_take(forks: Forks, folder: Path, command: str) -> None:
+def test_a_full_standard_output(forks: Forks, folder: Path, command: str) -> None:
     code, _, err = forks.run(command.split(), folder, stdout="/dev/full")
     assert code == 4, err
     assert_one_line(err)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
-def test_messages_that_nobody_can_take(forks: Forks, folder: Path) -> None:
+def test_a_full_standard_error(forks: Forks, folder: Path) -> None:
     """The code is that of the failure, and what was asked for is done."""
     assert forks.run(["eval", "none.png", "drawing.svg"], folder, stderr="/dev/full")[0] == 3
     code, out, _ = forks.run([*VECTORIZE.split(), "-v"], folder, stderr="/dev/full")

@@ -37,7 +37,7 @@ def test_outputs_and_standard_streams(
 KEPT = '<filter id="f"><feOffset dx="1"/></filter><path d="M5 5h20v9z" filter="url(#f)"/>'
 
 
-def test_what_is_kept_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_kept_elements_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
     svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20z" fill="red"/>{KEPT}</svg>')
     Image.new("RGB", (40, 30), "grey").save(image)
@@ -59,7 +59,7 @@ def test_what_is_kept_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As ``vectorize`` takes them, with the same ``--background``."""
+    """``refine`` takes them as ``vectorize`` does, with the same ``--background``."""
     svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
     svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20h-30z" fill="red"/></svg>')
     picture = Image.new("RGBA", (40, 30))

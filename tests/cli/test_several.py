@@ -23,7 +23,7 @@ FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
 def test_a_file_for_each_number(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of few steps begin anew: they are what single runs make."""
+    """Short runs do not continue from each other: the files are those of single runs."""
     monkeypatch.chdir(tmp_path)
     assert run("vectorize", image, "--curves", "9,3", "--report", "both.html", *FEW) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -86,7 +86,7 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
 def test_files_are_named_after_their_numbers_where_it_is_interrupted(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of few shapes are made first, in whichever order the numbers are given."""
+    """Files of few shapes are made first, in whichever order the numbers are given."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("warpsplat.cli.run.Interrupt.__call__", lambda self: os.path.exists("photo-3.svg"))
     run("vectorize", image, "--curves", "9,3,6", *FEW)
@@ -114,8 +114,8 @@ def test_a_drawing_has_no_more_shapes_than_regions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("noise", [1, 90])
-def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
-    """They would lose by going on from one another; those to what looks like a photograph do go on."""
+def test_fits_to_a_drawing_start_from_scratch(tmp_path: Path, noise: int) -> None:
+    """Continuing from one another would cost quality; fits to what looks like a photograph do continue."""
     levels = np.full((48, 48, 3), 250, np.uint8)
     levels[8:30, 8:30], levels[20:40, 20:44] = (200, 130, 130), (120, 180, 160)
     levels -= np.random.default_rng(0).integers(0, noise, levels.shape, np.uint8)

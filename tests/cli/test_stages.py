@@ -1,4 +1,4 @@
-"""Runs that a signal ends: the old file, none or a whole one, the code of the signal, and nothing stray."""
+"""Runs ended by a signal leave the old file, none or a whole one, and nothing stray."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKIL
 GENTLE = [signal.SIGINT, signal.SIGTERM]
 COMMANDS = ("vectorize", "batch")
 EARLY = ("decoding", "loading")
-"""Moments at which there is nothing to write yet."""
+"""Moments before there is anything to write."""
 TRAINING = {"vectorize": 60, "batch": 125}
-"""Launches of kernels until the middle of the training, of a batch that of its second image."""
+"""Kernel launches until the middle of the training; of the second image of a batch."""
 STEPS = int(QUICK[-1])
 BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {STEPS}}}\njobs: [{{images: '*.png'}}]\n"
 
 
 def lay_out(folder: Path, command: str) -> list[str]:
-    """Make the inputs of a command; its arguments."""
+    """Make the inputs of a command; return its arguments."""
     folder.mkdir(parents=True, exist_ok=True)
     for seed, name in enumerate(("a.png", "b.png") if command == "batch" else ("a.png",)):
         make_image(folder / name, seed)
@@ -48,7 +48,7 @@ def results(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(forks: Forks, tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, bytes]]:
-    """What each command makes where no signal comes."""
+    """Results of each command without a signal."""
     made = {}
     for command in COMMANDS:
         folder = tmp_path_factory.mktemp(command)
@@ -60,7 +60,7 @@ def undisturbed(forks: Forks, tmp_path_factory: pytest.TempPathFactory) -> dict[
 
 
 def assert_whole(folder: Path) -> None:
-    """Every result that is there is a whole SVG, and there is nothing but inputs and results."""
+    """Check that every result is a whole SVG, and that there are only inputs and results."""
     for data in results(folder).values():
         assert data.rstrip().endswith(b"</svg>")
         assert render_own(data.decode()).size == (32, 24)
@@ -74,7 +74,7 @@ SIGNALS = [
     for j, moment in enumerate(MOMENTS)
     for number in (GENTLE[(i + j) % 2], signal.SIGKILL)
 ]
-"""Ctrl-C and SIGTERM, which are heard by the same lines, in turns."""
+"""Ctrl-C and SIGTERM alternate: the same code handles both."""
 
 
 @pytest.mark.parametrize(("command", "moment", "number"), SIGNALS)
@@ -87,7 +87,7 @@ def test_a_signal_at_a_stage(
     number: signal.Signals,
 ) -> None:
     arguments = lay_out(tmp_path, command)
-    # Of a batch, into its second image.
+    # A batch is interrupted in its second image.
     count = {"training": TRAINING[command], "loading": 1}.get(moment, 2 if command == "batch" else 1)
     code, _, said = forks.run(arguments, tmp_path, moment=moment, count=count, signal=number)
     assert code == CODES[number], said

@@ -107,7 +107,7 @@ def test_ssimulacra2_is_left_out_in_large_images_and_short_times() -> None:
 
 
 def test_target_psnr_is_reached_with_few_bytes(device: str) -> None:
-    """With a file between those of fixed numbers of shapes, and no more decibels than a shape is worth."""
+    """The file is smaller than one of a fixed number of shapes."""
     settings = make_settings(iterations=100, target_psnr=24.0)
     result = vectorize(picture(), settings, Backend.on(device))
     assert 24 <= scored(result).psnr < 31, "24.1 to 27.4 over five seeds"
@@ -136,7 +136,7 @@ def test_target_psnr_within_a_size_and_a_time(device: str) -> None:
 
 @pytest.mark.parametrize("asked", [3, 25, 45])
 def test_a_goal_may_be_interrupted_anywhere(device: str, asked: int) -> None:
-    """In a probe run, in the run, and where shapes are added: the best so far is the result."""
+    """The best so far is the result: of a probe run, of the run, and where shapes are added."""
     steps = itertools.count()
     settings = make_settings(iterations=20, curves=10, target_psnr=60.0)
     result = vectorize(picture(), settings, Backend.on(device), stop=lambda: next(steps) >= asked)
@@ -156,7 +156,7 @@ def test_max_bytes_is_kept(device: str) -> None:
 
 @pytest.mark.parametrize(("kind", "precision"), [(Kind.FILL, 0), (Kind.STROKE, 1)])
 def test_max_bytes_are_used(device: str, kind: Kind, precision: int) -> None:
-    """On a photograph; its shapes fit a little more than the limit, and the least of them go."""
+    """The shapes of a photograph take a little more than the limit, and the least of them go."""
     settings = make_settings("draft", curves=900, kind=kind, precision=precision, max_bytes="20KB")
     result = vectorize(load_image(CAT), replace(settings, iterations=30), Backend.on(device))
     assert 0.95 * 20_000 < scored(result).bytes <= 20_000
