@@ -6,7 +6,6 @@ import io
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -71,15 +70,3 @@ def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         values = json.loads(capsys.readouterr().out)
         assert values["psnr"] > values["psnr_before"]
         assert ("<rect" in output.read_text()) == has_one
-
-
-def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
-    svg.write_text(HEAD + FOREIGN["shapes"])
-    pixels = np.random.default_rng(0).integers(0, 80, (30, 40, 3), dtype=np.uint8)
-    Image.fromarray(pixels).save(image)
-    assert run("refine", svg, image, "-o", output, "--iterations", "30", "--json", "--device", "cpu") == 0
-    values = json.loads(capsys.readouterr().out)
-    assert values["psnr"] > values["psnr_before"] + 1
-    assert values["paths"] == 2
-    assert output.exists()
