@@ -26,7 +26,7 @@ from tests import ROOT
 
 QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "12")
 CLOSED = "-"
-"""In place of a file: the stream is closed, as by ``>&-`` in a shell."""
+"""A name for a closed stream, as by ``>&-`` in a shell."""
 NOBODY = 65534
 """The number of the user "nobody"."""
 

@@ -26,11 +26,11 @@ def vectorize(
     write: Callable[[str], None] | None = None,
     start: Start | None = None,
 ) -> Result:
-    """The result of a run on what is shown, as ``settings`` say."""
+    """Vectorize pixels."""
     return make_result(PreparedImage(Problem(target, settings)), Run(backend, report, stop), write, start)
 
 
 def scored(result: Result) -> Score:
-    """The score of a run that was not stopped."""
+    """Return the score of a run that was not stopped."""
     assert result.score
     return result.score

@@ -1,4 +1,4 @@
-"""What a change needs first: ``pytest -m smoke`` runs these, one or two of each part."""
+"""The first tests to run after a change, one or two of each part: ``pytest -m smoke``."""
 
 SMOKE = {
     "kernels": (

@@ -37,13 +37,15 @@ def as_png(pixels: np.ndarray) -> bytes:
 
 
 @pytest.mark.parametrize("channels", [3, 4])
-def test_an_image_is_the_same_in_whatever_form(channels: int, tmp_path: Path, device: str) -> None:
+def test_all_forms_of_an_image_give_the_same_file(channels: int, tmp_path: Path, device: str) -> None:
     pixels = photograph(channels)
     path = tmp_path / "a.png"
     path.write_bytes(as_png(pixels))
     with path.open("rb") as file:
         forms = [path, str(path), path.read_bytes(), file, Image.open(path), pixels, pixels / np.float32(255)]
-        results = [warpsplat.vectorize(form, device=device, **QUICK) for form in forms]
+        results = [
+            warpsplat.vectorize(form, 6, subject="photo", iterations=4, device=device) for form in forms
+        ]
     assert len({result.svg for result in results}) == 1
     assert ("<rect" in results[0].svg) == (channels == 3)
 
@@ -217,7 +219,7 @@ def test_an_svg_is_refined(device: str) -> None:
 
 
 def test_threads_do_not_disturb_each_other(device: str) -> None:
-    """With one thread each, a step is a graph, which other threads' launches must not get into."""
+    """A step of one thread is a graph, which must not record other threads' launches."""
     images = [np.roll(photograph(), 5 * i, axis=1) for i in range(4)]
 
     def made(image: np.ndarray) -> str:

@@ -1,4 +1,4 @@
-"""What the documentation says works: its Python runs, its commands parse, its links lead somewhere.
+"""The documentation is right: its Python runs, its commands parse, its links lead somewhere.
 
 Python blocks that are whole programs are marked ``python``; fragments are marked ``py``.
 """
@@ -28,17 +28,17 @@ pytestmark = [pytest.mark.usefixtures("single_precision"), WHOLE]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 CAT = "docs/images/cat.jpg"
 PHOTOGRAPHS = ("photo.jpg", "cat.jpg", CAT)
-"""What pages call one: the reader's own, the tutorial's copy, and the repository's."""
+"""Names of one on the pages: the reader's own, the tutorial's copy, and the repository's."""
 
 SMALL = (72, 64)
 """Pixels that it is reduced to, so that blocks are quick."""
 
 NEEDED = {"warpsplat.torch": "torch"}
-"""What parts of the library need, which need not be installed."""
+"""Optional packages that parts of the library need."""
 
 
 def blocks(page: Path, language: str) -> list[str]:
-    """The code of a page in a language, without what a list indents it by."""
+    """Return the code of a page in a language, without the indentation of lists."""
     text = page.read_text("utf-8")
     found = re.findall(rf"^( *)```{language}\n(.*?)^\1```$", text, re.DOTALL | re.MULTILINE)
     return [re.sub(rf"^{indent}", "", code, flags=re.MULTILINE) for indent, code in found]
@@ -66,7 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("page", with_code("python"))
 def test_python_runs(page: Path, folder: Path) -> None:
-    """In order, each block after those before it."""
+    """Run the blocks of a page in order."""
     names: dict[str, object] = {"__name__": "__main__"}
     for number, block in enumerate(blocks(page, "python")):
         for module, needs in NEEDED.items():
@@ -89,7 +89,7 @@ def test_commands_parse(page: Path) -> None:
 
 
 def commands(page: Path) -> Iterator[list[str]]:
-    """The words of each run of warpsplat."""
+    """Yield the words of each run of warpsplat."""
     for block in blocks(page, "sh"):
         for line in block.replace("\\\n", " ").splitlines():
             for part in line.split("&&"):
@@ -124,7 +124,7 @@ MADE = {"architecture.md", "changelog.md", "contributing.md", "commands.md", "ga
 
 
 def test_words_of_the_pages_are_public() -> None:
-    """What Python blocks take from the package is what it offers."""
+    """Python blocks use public names only."""
     for page in PAGES:
         for block in blocks(page, "python"):
             for name in re.findall(r"\bwarpsplat\.(\w+)", re.sub(r"[\"'].*?[\"']", "", block)):

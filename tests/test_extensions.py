@@ -21,7 +21,7 @@ from warpsplat.fit.renderers import FitRenderer
 
 @pytest.fixture
 def found(monkeypatch: pytest.MonkeyPatch) -> dict[str, Extension]:
-    """What the registry finds, to change."""
+    """The extensions that the registry finds, to change."""
     known = dict(extensions.extensions())
     monkeypatch.setattr(extensions, "extensions", lambda: known)
     monkeypatch.setattr("warpsplat.cli.hooks.extensions", lambda: known)
@@ -48,7 +48,7 @@ def test_what_is_declared_is_there(name: str) -> None:
 def test_one_whose_requirement_is_missing_is_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And so are those that require it."""
+    """Extensions that require it are left out, too."""
     for name, requires in (("a", ()), ("b", ("none",)), ("c", ("b",))):
         (tmp_path / name).mkdir()
         text = f"from warpsplat.extensions import Extension\nEXTENSION = Extension(requires={requires})\n"

@@ -31,7 +31,7 @@ pytestmark = [
 ]
 
 MOST_BYTES = 5_000_000
-"""Of all that is kept of the gallery."""
+"""Most that the gallery's files take together."""
 LONGEST = 512
 """Side of an image [px]."""
 

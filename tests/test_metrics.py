@@ -1,9 +1,7 @@
 from __future__ import annotations
 
-import os
 import sys
 import tracemalloc
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +17,7 @@ from warpsplat.errors import Stopped
 from warpsplat.metrics import SSIMULACRA2_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
 from warpsplat.scene import Kind
 from warpsplat.svg import strips
-from warpsplat.svg.viewer import on_white, render_own, render_svg
+from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
 
@@ -119,41 +117,15 @@ def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) 
     np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
 
 
-def test_no_more_strips_are_drawn_at_once_than_the_process_has_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However many the machine has."""
-    text, _ = scored_scene()
-    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 50)
-    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
-    monkeypatch.setattr(os, "cpu_count", lambda: 64)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 3}, raising=False)
-    made = []
-
-    def counted(workers: int) -> ThreadPoolExecutor:
-        made.append(workers)
-        return ThreadPoolExecutor(workers)
-
-    monkeypatch.setattr(strips, "ThreadPoolExecutor", counted)
-    strips.draw(text, 371, 357)
-    assert made == [2]
-
-
 @pytest.mark.parametrize("per_pixel", [0.5, 1.0, 5.0, 32.0])
 def test_strips_of_any_view_box(per_pixel: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Strips begin where they should for any units: a tenth of a row would be visible."""
     scene = random_scene(Kind.FILL, count=40, width=91, height=157)
     text = write_svg(scene, per_pixel=per_pixel)
     whole = strips.draw(text, 91, 157).astype(int)
-    drawn: list[str] = []
-
-    def counted(text: str) -> Image.Image:
-        drawn.append(text)
-        return render_own(text)
-
     monkeypatch.setattr(strips, "STRIP_PIXELS", 91 * 20)
     monkeypatch.setattr(strips, "WHOLE_PIXELS", 91 * 157 - 1)
-    monkeypatch.setattr(strips, "render_own", counted)
     in_strips = strips.draw(text, 91, 157, own=True).astype(int)
-    assert len(drawn) == 8
     row = np.abs(np.roll(whole, 1, axis=0) - whole).mean()
     assert np.abs(in_strips - whole).mean() < 0.025 * row
     assert np.abs(in_strips - whole).max() <= 32
@@ -167,7 +139,7 @@ def test_transparent_files_are_scored_on_white() -> None:
 
 
 def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At every stage: before drawing, between strips, between the strips of the figures."""
+    """Scoring stops at every stage: before drawing, between strips, between the strips of the figures."""
     text, target = scored_scene()
     monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 100)
     monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
@@ -199,7 +171,7 @@ def test_memory_of_a_score_is_bounded() -> None:
 
 
 def test_ssimulacra2_is_that_of_the_package(tmp_path: Path) -> None:
-    """For files, which its own command takes: the SVG rendered on white, and the image."""
+    """The package compares the SVG rendered on white with the image."""
     package = pytest.importorskip("ssimulacra2")
     shape = '<circle cx="40" cy="30" r="25" fill="#c52" fill-opacity=".7"/>'
     text = f'<svg xmlns="http://www.w3.org/2000/svg" width="80" height="60">{shape}</svg>'

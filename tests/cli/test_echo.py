@@ -1,4 +1,4 @@
-"""What becomes of words that nobody can take."""
+"""Messages to streams that are full, closed or no terminal."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ def test_a_reader_that_has_gone_is_for_the_caller(monkeypatch: pytest.MonkeyPatc
 
 
 class Passing(logging.LogRecord):
-    """What is said while one waits."""
+    """A message for the meantime, which the next one replaces."""
 
     def __init__(self, text: str) -> None:
         super().__init__("warpsplat", logging.INFO, "", 0, text, (), None)
         self.passing = True
 
 
-def test_what_passes_is_for_terminals(capfd: pytest.CaptureFixture[str]) -> None:
-    """Also while native code's messages are hidden."""
+def test_temporary_messages_are_for_terminals(capfd: pytest.CaptureFixture[str]) -> None:
+    """Native code's messages are hidden meanwhile."""
     for terminal, said in ((False, ""), (True, "\r\x1b[2Kwarpsplat: compiling: 3 s\r\x1b[2K")):
         handler = _Notices(terminal=terminal)
         with messages_hidden():

@@ -34,7 +34,7 @@ def test_ssimulacra2_where_it_is_installed(
     monkeypatch: pytest.MonkeyPatch,
     installed: bool,
 ) -> None:
-    """In every report; without its package nothing else changes."""
+    """Reports have it; without its package nothing else changes."""
     package = None
     if installed:
         spec = ModuleSpec("ssimulacra2", None)

@@ -1,4 +1,4 @@
-"""Results are what their names say."""
+"""The ending of a result's name gives its format."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="64" height="48">
 
 
 def shown(path: Path, scale: float) -> npt.NDArray[np.float64]:
-    """A PDF's page as its viewer shows it, at so many pixels a point."""
+    """Return a PDF's page as its viewer shows it, with ``scale`` pixels a point."""
     pdfium = pytest.importorskip("pypdfium2")
     document = pdfium.PdfDocument(path)
     assert len(document) == 1

@@ -56,7 +56,7 @@ def test_standard_streams_that_are_full_or_closed(
 
 @pytest.mark.slow
 def test_all_standard_streams_are_closed(image: Path) -> None:
-    """From the start of Python, which has none of them then."""
+    """Python itself starts without them."""
     output = image.parent / "a.svg"
     assert shell("$W <&- >&- 2>&-", "vectorize", image, "-o", output, "-vv", *QUICK).returncode == 0
     render_own(output.read_text())

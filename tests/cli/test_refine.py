@@ -6,7 +6,6 @@ import io
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -37,7 +36,7 @@ def test_outputs_and_standard_streams(
 KEPT = '<filter id="f"><feOffset dx="1"/></filter><path d="M5 5h20v9z" filter="url(#f)"/>'
 
 
-def test_what_is_kept_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_kept_elements_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
     svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20z" fill="red"/>{KEPT}</svg>')
     Image.new("RGB", (40, 30), "grey").save(image)
@@ -59,7 +58,7 @@ def test_what_is_kept_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As ``vectorize`` takes them, with the same ``--background``."""
+    """``refine`` takes them as ``vectorize`` does, with the same ``--background``."""
     svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
     svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20h-30z" fill="red"/></svg>')
     picture = Image.new("RGBA", (40, 30))
@@ -71,15 +70,3 @@ def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         values = json.loads(capsys.readouterr().out)
         assert values["psnr"] > values["psnr_before"]
         assert ("<rect" in output.read_text()) == has_one
-
-
-def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
-    svg.write_text(HEAD + FOREIGN["shapes"])
-    pixels = np.random.default_rng(0).integers(0, 80, (30, 40, 3), dtype=np.uint8)
-    Image.fromarray(pixels).save(image)
-    assert run("refine", svg, image, "-o", output, "--iterations", "30", "--json", "--device", "cpu") == 0
-    values = json.loads(capsys.readouterr().out)
-    assert values["psnr"] > values["psnr_before"] + 1
-    assert values["paths"] == 2
-    assert output.exists()

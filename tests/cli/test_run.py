@@ -1,4 +1,4 @@
-"""What commands that optimise have in common: progress, goals, threads, Ctrl-C."""
+"""Commands that optimise: progress, goals, threads, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from warpsplat.svg.viewer import render_svg
 
 @pytest.mark.slow
 def test_ctrl_c_writes_the_best_so_far(image: Path, tmp_path: Path) -> None:
-    """In a terminal: the progress bar shows, Ctrl-C ends the run, the file is there and valid."""
+    """The progress bar shows in a terminal, Ctrl-C ends the run, the file is there and valid."""
     output = tmp_path / "a.svg"
     command = [sys.executable, "-m", "warpsplat", "vectorize", str(image), "-o", str(output)]
     primary, secondary = pty.openpty()

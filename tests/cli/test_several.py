@@ -13,10 +13,8 @@ from PIL import Image
 import warpsplat
 from tests.cli.helpers import run
 from warpsplat.cli.main import main
-from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.fit.progress import Progress
 from warpsplat.run.suggest import suggestion
-from warpsplat.scene import FloatArray
 from warpsplat.search.survey import Worth
 
 FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
@@ -25,7 +23,7 @@ FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
 def test_a_file_for_each_number(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of few steps begin anew: they are what single runs make."""
+    """Short runs do not continue from each other: the files are those of single runs."""
     monkeypatch.chdir(tmp_path)
     assert run("vectorize", image, "--curves", "9,3", "--report", "both.html", *FEW) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -88,7 +86,7 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
 def test_files_are_named_after_their_numbers_where_it_is_interrupted(
     image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of few shapes are made first, in whichever order the numbers are given."""
+    """Files of few shapes are made first, in whichever order the numbers are given."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("warpsplat.cli.run.Interrupt.__call__", lambda self: os.path.exists("photo-3.svg"))
     run("vectorize", image, "--curves", "9,3,6", *FEW)
@@ -105,29 +103,19 @@ def test_the_library_names_the_function_for_several(image: Path) -> None:
         warpsplat.vectorize_several(image, [3, 9], outputs=["a.svg"])
 
 
-def test_a_drawing_that_has_fewer_regions_is_traced_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_drawing_has_no_more_shapes_than_regions(tmp_path: Path) -> None:
     levels = np.full((48, 48, 3), 250, np.uint8)
     levels[8:30, 8:30], levels[20:40, 20:44] = (200, 30, 30), (20, 80, 160)
     path = tmp_path / "drawing.png"
     Image.fromarray(levels).save(path)
-    calls: list[object] = []
-
-    def noted(image: FloatArray, *, most: int | None = None) -> Traced:
-        calls.append(most)
-        return trace(image, most=most)
-
-    monkeypatch.setattr("warpsplat.drawing.draw.trace", noted)
     settings = warpsplat.make_settings(subject="drawing")
     few, many, most = warpsplat.vectorize_several(path, [1, 9, 99], settings=settings, device="cpu")
-    assert len(calls) == 2, "what 9 limit as little as 99 do is made once"
     assert many.svg == most.svg and len(few.scene) < len(many.scene) <= 9
 
 
 @pytest.mark.parametrize("noise", [1, 90])
-def test_fits_to_a_drawing_begin_anew(tmp_path: Path, noise: int) -> None:
-    """They would lose by going on from one another; those to what looks like a photograph do go on."""
+def test_fits_to_a_drawing_start_from_scratch(tmp_path: Path, noise: int) -> None:
+    """Continuing from one another would cost quality; fits to what looks like a photograph do continue."""
     levels = np.full((48, 48, 3), 250, np.uint8)
     levels[8:30, 8:30], levels[20:40, 20:44] = (200, 130, 130), (120, 180, 160)
     levels -= np.random.default_rng(0).integers(0, noise, levels.shape, np.uint8)
@@ -170,7 +158,7 @@ def test_a_suggestion_in_words(
     assert lines[-1].strip() == f"warpsplat vectorize {image} --curves {made.curves} -o photo.svg"
 
 
-def test_the_suggestion_is_the_knee() -> None:
+def test_the_suggestion_is_where_more_shapes_gain_little() -> None:
     made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
     # Decibels a shape are 2 / (shapes ln 2): a hundred buy half of one at 577, 10 kB (156 shapes) at 902.
     assert (made.by_shapes, made.by_bytes, made.curves) == (580, 900, 580)
@@ -181,24 +169,15 @@ def test_the_suggestion_is_the_knee() -> None:
     )
 
 
-def test_pictures_that_gain_less_are_worth_fewer_shapes() -> None:
-    little, heavy = Worth(16, 1024, 256, 20.0, 0.8, 0.0, 64.0), Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0)
-    assert suggestion(little).curves == 230
-    made = suggestion(heavy)
-    assert (made.by_shapes, made.by_bytes, made.curves) == (580, 290, 290)
-    assert "10 kB more buy 0.5 dB" in made.why and "twice as many 2.0 dB more" in made.why
-
-
 @pytest.mark.parametrize(
     ("worth", "curves", "words"),
     [
+        (Worth(16, 1024, 256, 20.0, 0.8, 0.0, 64.0), 230, ""),
+        (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0), 290, "10 kB more buy 0.5 dB"),
+        (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0), 290, "twice as many 2.0 dB more"),
         (Worth(7, 7, 7, 20.0, 0.0, 0.0, 64.0), 7, "no room for more than 7 shapes"),
         (Worth(16, 99, 99, 20.0, 0.0, 0.0, 64.0), 16, "100 more buy less than 0.5 dB"),
-        (
-            Worth(16, 99, 99, 20.0, 2.0, 0.0, 64.0),
-            99,
-            "All the way to 99 shapes 100 more buy 0.5 dB at least",
-        ),
+        (Worth(16, 99, 99, 20.0, 2.0, 0.0, 64.0), 99, "All the way to 99 shapes 100 more buy 0.5 dB"),
         (Worth(16, 32, 32, 99.0, 2.0, 0.0, 64.0), 16, "more are expected to add nothing"),
     ],
 )

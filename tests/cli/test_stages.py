@@ -1,14 +1,12 @@
-"""Runs that a signal ends: the old file, none or a whole one, the code of the signal, and nothing stray."""
+"""Runs ended by a signal leave the old file, none or a whole one, and nothing stray."""
 
 from __future__ import annotations
 
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,15 +24,15 @@ CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKIL
 GENTLE = [signal.SIGINT, signal.SIGTERM]
 COMMANDS = ("vectorize", "batch")
 EARLY = ("decoding", "loading")
-"""Moments at which there is nothing to write yet."""
+"""Moments before there is anything to write."""
 TRAINING = {"vectorize": 60, "batch": 125}
-"""Launches of kernels until the middle of the training, of a batch that of its second image."""
+"""Kernel launches until the middle of the training; of the second image of a batch."""
 STEPS = int(QUICK[-1])
 BATCH = f"defaults: {{device: cpu, curves: 4, iterations: {STEPS}}}\njobs: [{{images: '*.png'}}]\n"
 
 
 def lay_out(folder: Path, command: str) -> list[str]:
-    """Make the inputs of a command; its arguments."""
+    """Make the inputs of a command; return its arguments."""
     folder.mkdir(parents=True, exist_ok=True)
     for seed, name in enumerate(("a.png", "b.png") if command == "batch" else ("a.png",)):
         make_image(folder / name, seed)
@@ -50,7 +48,7 @@ def results(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(forks: Forks, tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, bytes]]:
-    """What each command makes where no signal comes."""
+    """Results of each command without a signal."""
     made = {}
     for command in COMMANDS:
         folder = tmp_path_factory.mktemp(command)
@@ -62,7 +60,7 @@ def undisturbed(forks: Forks, tmp_path_factory: pytest.TempPathFactory) -> dict[
 
 
 def assert_whole(folder: Path) -> None:
-    """Every result that is there is a whole SVG, and there is nothing but inputs and results."""
+    """Check that every result is a whole SVG, and that there are only inputs and results."""
     for data in results(folder).values():
         assert data.rstrip().endswith(b"</svg>")
         assert render_own(data.decode()).size == (32, 24)
@@ -76,7 +74,7 @@ SIGNALS = [
     for j, moment in enumerate(MOMENTS)
     for number in (GENTLE[(i + j) % 2], signal.SIGKILL)
 ]
-"""Ctrl-C and SIGTERM, which are heard by the same lines, in turns."""
+"""Ctrl-C and SIGTERM alternate: the same code handles both."""
 
 
 @pytest.mark.parametrize(("command", "moment", "number"), SIGNALS)
@@ -89,7 +87,7 @@ def test_a_signal_at_a_stage(
     number: signal.Signals,
 ) -> None:
     arguments = lay_out(tmp_path, command)
-    # Of a batch, into its second image.
+    # A batch is interrupted in its second image.
     count = {"training": TRAINING[command], "loading": 1}.get(moment, 2 if command == "batch" else 1)
     code, _, said = forks.run(arguments, tmp_path, moment=moment, count=count, signal=number)
     assert code == CODES[number], said
@@ -209,28 +207,3 @@ def test_a_signal_at_the_start(tmp_path: Path, moment: str, number: signal.Signa
     assert "Traceback" not in said
     assert len(said.strip().splitlines()) <= 1, said
     assert_whole(folder)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_ctrl_c_at_any_early_moment_shows_no_traceback(tmp_path: Path, seed: int) -> None:
-    make_image(tmp_path / "a.png")
-    command = [sys.executable, "-X", "importtime", "-m", "warpsplat", "vectorize", "a.png", "-q"]
-    process = subprocess.Popen(
-        [*command, "-o", "a.svg", "--iterations", "900000", "--device", "cpu"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-    )
-    assert process.stderr
-    for line in process.stderr:
-        if b"click" in line:  # the first import after the one that prepares for signals
-            break
-    time.sleep(random.Random(seed).uniform(0, 0.3))
-    process.send_signal(signal.SIGINT)
-    try:
-        _, said = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert b"Traceback" not in said
-    assert process.returncode in {130, -signal.SIGINT}

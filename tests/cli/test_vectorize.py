@@ -14,7 +14,6 @@ from PIL import Image
 
 import warpsplat
 from tests.cli.helpers import QUICK, one_line, run, shell
-from tests.files.samples import bad_files
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.svg.uri import data_uri
@@ -44,16 +43,6 @@ def test_summary_and_default_output(
         r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}(, SSIMULACRA2 -?[\d.]+)?, 8 paths, .* s\n", captured.out
     )
     assert captured.err == "", "no progress bar where stderr is no terminal"
-
-
-def test_bad_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name, path in bad_files(tmp_path).items():
-        before = set(os.listdir(tmp_path))
-        assert run("vectorize", path, "-o", tmp_path / "out.svg", *QUICK) == 3, name
-        captured = capsys.readouterr()
-        assert captured.out == ""
-        assert str(path) in one_line(captured.err)
-        assert set(os.listdir(tmp_path)) == before
 
 
 def test_what_only_the_work_finds_out_names_the_image(

@@ -139,7 +139,7 @@ def test_grey_of_16_bits_comes_back(pixels: np.ndarray, form: str) -> None:
 @examples(60)
 @given(shapes.flatmap(lambda s: arrays.arrays(np.float32, s)))
 def test_floats_are_pixels_or_refused(pixels: np.ndarray) -> None:
-    """Even NaN, infinities and values out of range."""
+    """Floats may be NaN, infinite or out of range."""
     try:
         loaded = load(pixels, "TIFF")
     except ImageError as error:

@@ -16,7 +16,7 @@ TURNED = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 48" width="6
 <path d="M8 40A9 6 30 1 1 20 44L14 30Z" fill="#345" fill-opacity=".7"/>
 <path d="M5 8Q30 2 58 9" fill="none" stroke="#fff" stroke-width="2" stroke-dasharray="5 2"/>
 </svg>"""
-"""Something to refine: arcs, turns, a gradient and dashes."""
+"""An SVG to refine: arcs, rotations, a gradient and dashes."""
 
 SHORT: dict[str, Any] = {"curves": 16, "iterations": 40}
 
@@ -64,7 +64,7 @@ CASES = {
 
 
 def text_of(name: str, threads: int | None = None) -> str:
-    """The SVG of a case."""
+    """Return the SVG of a case."""
     picture, given = CASES[name]
     given = {"device": "cpu", "threads": threads, **given}
     if "importance" in given:
@@ -77,5 +77,5 @@ def text_of(name: str, threads: int | None = None) -> str:
 
 
 def digest_of(svg: str) -> str:
-    """The first 16 hexadecimal digits of the SHA-256 of an SVG's bytes."""
+    """Return the first 16 hexadecimal digits of the SHA-256 of an SVG's bytes."""
     return hashlib.sha256(svg.encode()).hexdigest()[:16]

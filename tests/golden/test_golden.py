@@ -18,7 +18,7 @@ from tests.golden.pictures import PICTURES
 EXPECTED = json.loads(Path(__file__).with_name("digests.json").read_text(encoding="utf-8"))
 
 LEVELS = {"native": "", "without AVX-512": "X86_V4 AVX512_ICL", "without AVX2": "X86_V3 X86_V4 AVX512_ICL"}
-"""What NumPy is told not to use; it reads this when it is imported."""
+"""Features that NumPy must not use; it reads this when it is imported."""
 
 
 def environment_of(level: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Runs that are ended and go on: to the same bytes, from their own checkpoints only."""
+"""Resumed runs end with the same bytes, and take their own checkpoints only."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MASK = np.ascontiguousarray(PICTURE[..., 0])
 
 
 def after(count: int) -> Callable[[], bool]:
-    """A wish to stop after so many steps."""
+    """Return a ``stop`` that is true after ``count`` steps."""
     steps = itertools.count(1)
     return lambda: next(steps) >= count
 
@@ -63,7 +63,7 @@ RUNS: dict[str, Callable[..., warpsplat.Result]] = {
 
 @pytest.mark.parametrize("kind", RUNS)
 def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path, kind: str) -> None:
-    """Stopped at some step; exact ones twice, then behind a look at the file as well."""
+    """Stopped at some step; some twice, the second time after an evaluation of the file."""
     run, path = RUNS[kind], tmp_path / "run.checkpoint"
     whole = run()
     first = run(checkpoint=path, stop=after(3 + sum(map(ord, kind)) % 24))
@@ -74,7 +74,7 @@ def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path, kind: str) -> None:
     result = run(checkpoint=path, resume=True)
     assert result.svg == whole.svg
     assert result.as_dict() | {"seconds": 0} == whole.as_dict() | {"seconds": 0}
-    assert not path.exists(), "of a run that is done nothing is left"
+    assert not path.exists(), "a finished run leaves none"
 
 
 def test_a_run_that_was_killed_goes_on_from_the_last_save(
@@ -115,7 +115,7 @@ def test_saving_costs_a_hundredth(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stopped_file_says_so_and_a_goal_is_stopped_between_its_fits(tmp_path: Path) -> None:
-    """In the last step of a fit: it is done, and the next one is begun by the run that goes on."""
+    """Stopped in the last step of a fit, the run that resumes begins the next one."""
     path = tmp_path / "run.checkpoint"
     run = RUNS["layered"]
     stopped = run(checkpoint=path, stop=after(21))
@@ -171,7 +171,7 @@ def test_another_run_is_refused(saved: Path, given: dict[str, Any], cause: str) 
 
 
 def changed(saved: Path, path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], None]) -> Path:
-    """A checkpoint with other content, well packed."""
+    """Write a valid archive with changed content."""
     header, arrays = unpack(saved)
     change(header, arrays)
     path.write_bytes(pack(header, arrays))
@@ -179,7 +179,7 @@ def changed(saved: Path, path: Path, change: Callable[[dict[str, Any], dict[str,
 
 
 def at(*keys: Any, value: Any) -> Callable[[dict[str, Any], dict[str, np.ndarray]], None]:
-    """A change of one entry."""
+    """Return a change of one entry."""
 
     def change(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
         place: Any = arrays if "/" in str(keys[0]) else header

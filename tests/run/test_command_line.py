@@ -1,4 +1,4 @@
-"""The command that makes a result again says all that its settings say."""
+"""The command that makes a result again has all of its settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from warpsplat.cli.main import cli
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.run.command_line import refine_command, several_command, vectorize_command
-from warpsplat.run.options import settings_from
+from warpsplat.run.options import OPTIONS, settings_from
 from warpsplat.scene import Kind
 
 CASES: list[dict[str, Any]] = [
@@ -28,8 +28,11 @@ CASES: list[dict[str, Any]] = [
 ]
 
 
+NAMES = {"kind", *(option.keyword for option in OPTIONS)}
+
+
 def settings_of(line: str) -> Settings:
-    """What the program would run with."""
+    """Return the settings that the program would run with."""
     words = shlex.split(line, comments=True)
     assert words[:2] == ["warpsplat", "vectorize"]
     import click
@@ -37,20 +40,7 @@ def settings_of(line: str) -> Settings:
     command = cli.get_command(click.Context(cli), "vectorize")
     assert command
     given = command.make_context("vectorize", words[2:]).params
-    others = {
-        "images",
-        "output",
-        "overwrite",
-        "importance",
-        "device",
-        "threads",
-        "verbose",
-        "quiet",
-        "as_json",
-        "suggest",
-    }
-    others |= {"as_uri", "checkpoint", "resume", "checkpoint_every", "report"}
-    return settings_from({key: value for key, value in given.items() if key not in others})
+    return settings_from({key: value for key, value in given.items() if key in NAMES})
 
 
 @pytest.mark.parametrize("given", CASES, ids=lambda given: "-".join(given) or "nothing")

@@ -89,7 +89,7 @@ def test_no_improvement_changes_nothing(device: str) -> None:
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_splines_of_own_files_stay_splines(device: str, kind: Kind) -> None:
-    """As cubics they would take twice as many numbers."""
+    """Cubics would take twice as many numbers."""
     scene = random_scene(kind, count=6, width=48, height=40, seed=2, basis=Basis.SPLINE)
     target = render(scene, backend=Backend.on(device))
     noise = np.random.default_rng(0).normal(0, 0.5, scene.points.shape)
@@ -105,7 +105,7 @@ def test_splines_of_own_files_stay_splines(device: str, kind: Kind) -> None:
 
 
 def test_an_own_file_of_both_bases_is_refined(device: str) -> None:
-    """Also of an image of another size than the file says."""
+    """The image has another size than the file."""
     outlines = [(Kind.FILL, basis, n) for n in (3, 5) for basis in Basis]
     text = write_svg(ragged_scene(outlines, 48, 40, seed=1), per_pixel=3)
     target = np.full((80, 96, 3), 0.4, np.float32)
@@ -151,7 +151,7 @@ SHEET = re.compile(r'<svg xmlns="\S+" width="(\S+)" height="(\S+)" viewBox="([^"
     ids=str,
 )
 def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) -> None:
-    """Its paths are those that it has without the sheet, on which it lies as before, whatever the grid."""
+    """The paths are the same as without the sheet, and the picture lies in the same place on it."""
     target = np.ascontiguousarray(picture()[:36, :48])
     settings = make_settings(curves=6, iterations=20, **sheet)
     scene = random_scene(Kind.FILL, count=6, width=48, height=36, seed=2)
@@ -169,7 +169,7 @@ def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) ->
 
 
 def test_what_has_margins_of_its_own_is_all_picture(device: str) -> None:
-    """It begins as a file on a sheet, but others wrote it."""
+    """The file looks like one on a sheet, but was not written by warpsplat."""
     head = '<svg xmlns="http://www.w3.org/2000/svg" width="24px" height="24px" viewBox="-2 -2 24 24">'
     text = f'{head}<rect x="-2" y="-2" width="24" height="24"/><path d="M0 0h9v9z" fill="red"/></svg>'
     target = np.zeros((24, 24, 3), np.float32)
@@ -193,7 +193,7 @@ def test_what_lies_around_kept_elements_is_fitted_to_what_is_seen(device: str) -
 
 
 def test_what_blends_is_seen_as_well(device: str) -> None:
-    """What is multiplied with it comes from the file as a viewer shows it."""
+    """Paths are fitted below an element that is multiplied with them."""
     blend = '<path d="M8 2h24v26h-24z" fill="#fa0" style="mix-blend-mode:multiply"/>'
     text = f'{HEAD}width="40" height="30"><rect width="40" height="30" fill="#eee"/>%s{blend}</svg>'
     target = (on_white(render_svg(text % '<path d="M5 5h30v12h-30z" fill="#4ac"/>')) / 255).astype(np.float32)
@@ -219,7 +219,7 @@ def test_a_transparent_image_keeps_the_file_transparent(device: str) -> None:
 
 
 def test_backgrounds(device: str) -> None:
-    """That of the file lies behind a transparent image; others are asked for."""
+    """The file's lies behind a transparent image, unless another is asked for."""
     path = '<path d="M5 5h20v20h-20z" fill="#c00"/>'
     behind = '<rect width="40" height="30" fill="#ff0"/>'
     target = clear(f'{HEAD}width="40" height="30">{path.replace("h20v20", "h25v18")}</svg>')

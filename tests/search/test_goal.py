@@ -56,7 +56,7 @@ def test_a_file_with_a_surplus_is_cut_and_one_that_lacks_grows(scene: Scene) -> 
     assert next_change([made(scene, 10_000, 27.02)], settings) is None
 
 
-def test_a_cut_that_failed_bounds_thenext_change(scene: Scene) -> None:
+def test_a_cut_that_failed_bounds_the_next_change(scene: Scene) -> None:
     tried = [made(scene, 10_000, 27.2), made(scene, 9_000, 26.9)]
     change = next_change(tried, goal(target_psnr=27.0))
     assert change

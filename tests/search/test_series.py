@@ -1,4 +1,4 @@
-"""Fits of several numbers of shapes: where they begin, what they hand on."""
+"""Fits of several numbers of shapes that continue from each other."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_a_fit_begins_where_its_schedule_has_as_many_shapes(few: int, share: flo
         assert shapes_at(settings, begin) == pytest.approx(1.5 * few, rel=0.1)
 
 
-def test_a_fit_begins_anew_where_too_few_turns_would_be_left() -> None:
+def test_a_fit_starts_from_scratch_where_few_steps_would_be_left() -> None:
     assert begin_of(make_settings("draft", curves=100), 75) == 0
     assert begin_of(make_settings(curves=100, density={"interval": 0}), 75) == 0
 
@@ -69,7 +69,7 @@ def test_shapes_go_on_with_their_past() -> None:
 
 
 def test_without_a_past_shapes_take_large_steps() -> None:
-    """What is handed on is what keeps the shapes in place."""
+    """The optimiser's state keeps the shapes in place."""
     run, series = Run(Backend.on("cpu", 1)), Series(quick(), (4, 8))
     fit(Problem(picture(), series.next(4)[0]), series.part(4, run))
     _, start = series.next(8)

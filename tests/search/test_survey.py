@@ -16,7 +16,7 @@ from warpsplat.search.survey import BEND, EFFORT_GAIN, STEEPEST, expected, expec
 
 
 def test_it_goes_through_what_was_measured() -> None:
-    """With the gain of a longer run, and what doublings gain in those."""
+    """The gains of longer runs are added."""
     worth = expected(1024, (256, 30.0), (64, 25.0), 0.4, 30_000)
     there = float(worth.psnr(256))
     assert there == pytest.approx(30.4)

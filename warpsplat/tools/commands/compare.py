@@ -140,7 +140,7 @@ def command(
         prepare_folder(output, result_names(images, settings, tracer), images, overwrite=overwrite)
     from warpsplat.cli.run import progress_bar
     from warpsplat.cli.signals import Interrupt
-    from warpsplat.drawing.subjects import choose_subject
+    from warpsplat.run.prepare import choose_subject
     from warpsplat.files.image import load_image
     from warpsplat.files.output import write_result
     from warpsplat.fit.problem import Problem, Run
