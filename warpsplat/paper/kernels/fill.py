@@ -33,6 +33,31 @@ def chain_point(
     return position
 
 
+@wp.func
+def measure_strip(points: wp.array[wp.vec2], start: wp.int32, cubics: wp.int32, scale: wp.float32) -> wp.vec3:
+    """Return the length of the longer chain of an outline, the mean width of the strip between its chains,
+    and twice its signed area.
+    """
+    count = constants.PLAN_SAMPLES * cubics
+    a0 = scale * points[start]
+    b0 = a0
+    length_a = float(0.0)
+    length_b = float(0.0)
+    width = float(0.0)
+    doubled_area = float(0.0)
+    for i in range(1, count + 1):
+        t = float(i) / float(constants.PLAN_SAMPLES)
+        a1 = scale * chain_point(points, start, 0, t, cubics)
+        b1 = scale * chain_point(points, start, 1, t, cubics)
+        length_a += wp.length(a1 - a0)
+        length_b += wp.length(b1 - b0)
+        width += wp.length(a1 - b1)
+        doubled_area += cross(a0, a1) - cross(b0, b1)
+        a0 = a1
+        b0 = b1
+    return wp.vec3(wp.max(length_a, length_b), width / float(count), doubled_area)
+
+
 @wp.kernel
 def plan_fill(
     # In:
@@ -55,31 +80,15 @@ def plan_fill(
         return
     start = point_first[shape]
     cubics = chain_cubics(point_first, shape)
-    count = constants.PLAN_SAMPLES * cubics
-    a0 = scale * points[start]
-    b0 = a0
-    length_a = float(0.0)
-    length_b = float(0.0)
-    width = float(0.0)
-    doubled_area = float(0.0)
-    for i in range(1, count + 1):
-        t = float(i) / float(constants.PLAN_SAMPLES)
-        a1 = scale * chain_point(points, start, 0, t, cubics)
-        b1 = scale * chain_point(points, start, 1, t, cubics)
-        length_a += wp.length(a1 - a0)
-        length_b += wp.length(b1 - b0)
-        width += wp.length(a1 - b1)
-        doubled_area += cross(a0, a1) - cross(b0, b1)
-        a0 = a1
-        b0 = b1
-    rows = row_plan(width / float(count))
-    stations = station_plan(wp.max(length_a, length_b))
+    strip = measure_strip(points, start, cubics, scale)
+    rows = row_plan(strip[1])
+    stations = station_plan(strip[0])
     shape_stations[shape] = stations
     shape_runs[shape] = 1
     shape_rows[shape] = int(rows[0])
     shape_reach[shape] = rows[1]
     gaussian_count[shape] = bounded_product(stations, int(rows[0]))
-    shape_sign[shape] = wp.sign(doubled_area)
+    shape_sign[shape] = wp.sign(strip[2])
 
 
 @wp.kernel

@@ -19,9 +19,10 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights
 from warpsplat.kernels.ranges import bounded_product, find_range
-from warpsplat.paper.kernels.fill import chain_cubics, chain_point
+from warpsplat.paper.kernels.fill import chain_cubics, measure_strip
 from warpsplat.paper.kernels.gaussians import difference, straightness
 from warpsplat.paper.kernels.strips import row_plan, station_plan
+from warpsplat.paper.kernels.stroke import longest_segment
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -56,46 +57,19 @@ def plan_soft(
     shape_runs[shape] = 1
     if kind[shape] == constants.STROKE:
         segments = (point_first[shape + 1] - start) / 3
-        longest = float(0.0)
-        for segment in range(segments):
-            before = points[start + 3 * segment]
-            length = float(0.0)
-            for i in range(1, constants.PLAN_SAMPLES + 1):
-                weights = cubic_weights(float(i) / float(constants.PLAN_SAMPLES))
-                here = wp.vec2(0.0, 0.0)
-                for j in range(4):
-                    here += weights[j] * points[start + 3 * segment + j]
-                length += wp.length(here - before)
-                before = here
-            longest = wp.max(longest, length)
+        longest = longest_segment(points, start, segments, 1.0)
         shape_stations[shape] = bounded_product(segments, soft_stations(longest, density))
         shape_rows[shape] = 1
         shape_reach[shape] = 0.0
         shape_sign[shape] = 0.0
     else:
         cubics = chain_cubics(point_first, shape)
-        count = constants.PLAN_SAMPLES * cubics
-        a0 = points[start]
-        b0 = a0
-        length_a = float(0.0)
-        length_b = float(0.0)
-        width = float(0.0)
-        doubled_area = float(0.0)
-        for i in range(1, count + 1):
-            t = float(i) / float(constants.PLAN_SAMPLES)
-            a1 = chain_point(points, start, 0, t, cubics)
-            b1 = chain_point(points, start, 1, t, cubics)
-            length_a += wp.length(a1 - a0)
-            length_b += wp.length(b1 - b0)
-            width += wp.length(a1 - b1)
-            doubled_area += cross(a0, a1) - cross(b0, b1)
-            a0 = a1
-            b0 = b1
-        rows = row_plan(width / float(count))
-        shape_stations[shape] = soft_stations(wp.max(length_a, length_b), density)
+        strip = measure_strip(points, start, cubics, 1.0)
+        rows = row_plan(strip[1])
+        shape_stations[shape] = soft_stations(strip[0], density)
         shape_rows[shape] = wp.max(2, int(wp.ceil(density * rows[0])))
         shape_reach[shape] = rows[1]
-        shape_sign[shape] = wp.sign(doubled_area)
+        shape_sign[shape] = wp.sign(strip[2])
     gaussian_count[shape] = bounded_product(shape_stations[shape], shape_rows[shape])
 
 

@@ -24,6 +24,26 @@ def cap_plan(rows: wp.int32) -> wp.int32:
     return wp.max(1, rows / 2)
 
 
+@wp.func
+def longest_segment(
+    points: wp.array[wp.vec2], start: wp.int32, segments: wp.int32, scale: wp.float32
+) -> wp.float32:
+    """Return the length of the longest cubic of a stroke."""
+    longest = float(0.0)
+    for segment in range(segments):
+        before = scale * points[start + 3 * segment]
+        length = float(0.0)
+        for i in range(1, constants.PLAN_SAMPLES + 1):
+            weights = cubic_weights(float(i) / float(constants.PLAN_SAMPLES))
+            here = wp.vec2(0.0, 0.0)
+            for j in range(4):
+                here += scale * weights[j] * points[start + 3 * segment + j]
+            length += wp.length(here - before)
+            before = here
+        longest = wp.max(longest, length)
+    return longest
+
+
 @wp.kernel
 def plan_stroke(
     # In:
@@ -46,18 +66,7 @@ def plan_stroke(
         return
     start = point_first[shape]
     segments = (point_first[shape + 1] - start) / 3
-    longest = float(0.0)
-    for segment in range(segments):
-        before = scale * points[start + 3 * segment]
-        length = float(0.0)
-        for i in range(1, constants.PLAN_SAMPLES + 1):
-            weights = cubic_weights(float(i) / float(constants.PLAN_SAMPLES))
-            here = wp.vec2(0.0, 0.0)
-            for j in range(4):
-                here += scale * weights[j] * points[start + 3 * segment + j]
-            length += wp.length(here - before)
-            before = here
-        longest = wp.max(longest, length)
+    longest = longest_segment(points, start, segments, scale)
     rows = row_plan(scale * widths[shape])
     stations = bounded_product(segments, station_plan(longest) + 2 * cap_plan(int(rows[0])))
     shape_stations[shape] = stations
