@@ -140,13 +140,12 @@ def command(
         prepare_folder(output, result_names(images, settings, tracer), images, overwrite=overwrite)
     from warpsplat.cli.run import progress_bar
     from warpsplat.cli.signals import Interrupt
-    from warpsplat.run.prepare import choose_subject
     from warpsplat.files.image import load_image
     from warpsplat.files.output import write_result
     from warpsplat.fit.problem import Problem, Run
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
-    from warpsplat.run.prepare import PreparedImage
+    from warpsplat.run.prepare import PreparedImage, choose_subject
     from warpsplat.run.vectorize import make_result
     from warpsplat.tools.compare import Comparison, compare, warm_up
 
