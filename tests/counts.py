@@ -58,8 +58,9 @@ def parameters(function: Function) -> list[str]:
 
 
 def is_device_code(function: Function) -> bool:
-    """Tell whether Warp compiles the function."""
-    return any("wp." in ast.unparse(decorator) for decorator in function.decorator_list)
+    """Tell whether Warp compiles the function, or one that it makes."""
+    inner = (node for node in ast.walk(function) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)))
+    return any("wp." in ast.unparse(decorator) for node in inner for decorator in node.decorator_list)
 
 
 def is_option_list(function: Function) -> bool:

@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
 @dataclass(frozen=True)
 class Extension:
-    """What a folder adds to the core, all by name."""
+    """Everything that a folder adds to the core, by name."""
 
     commands: Mapping[str, Command] = field(default_factory=dict)
     renderers: Mapping[str, str] = field(default_factory=dict)

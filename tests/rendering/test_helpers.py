@@ -54,10 +54,10 @@ class LateHelpers:
     count = 1
 
     def __init__(self) -> None:
-        self.asked: list[helpers.Request] = []
+        self.asked: list[helpers.LaunchRequest] = []
 
-    def ask(self, work: Callable[[], None]) -> helpers.Request:
-        self.asked.append(helpers.Request(work))
+    def ask(self, work: Callable[[], None]) -> helpers.LaunchRequest:
+        self.asked.append(helpers.LaunchRequest(work))
         return self.asked[-1]
 
 
@@ -77,7 +77,7 @@ def test_helpers_that_come_too_late_are_not_waited_for(monkeypatch: pytest.Monke
 
 def test_what_is_withdrawn_is_not_begun() -> None:
     done: list[int] = []
-    request = helpers.Request(lambda: done.append(1))
+    request = helpers.LaunchRequest(lambda: done.append(1))
     request.settle()
     request.serve()
     assert not done
@@ -91,7 +91,7 @@ def test_what_has_begun_is_waited_for() -> None:
         may_end.wait(10)
         done.append(1)
 
-    request = helpers.Request(work)
+    request = helpers.LaunchRequest(work)
     helper = threading.Thread(target=request.serve)
     helper.start()
     begun.wait(10)

@@ -129,7 +129,7 @@ class Layout:
     """Indices of half widths, 0 for fills, shape (row,); None: there are no strokes of one width."""
     gradients: Gradients | None
     spec: RenderSpec
-    """Of the engine that renders the scene without premultiplying its colours."""
+    """Specification of the engine that renders the scene without premultiplying its colours."""
 
     @functools.cached_property
     def outlines(self) -> Scene:

@@ -52,7 +52,7 @@ class Path:
     """A sequence of lines, quadratics and cubics."""
 
     num_control_points: Tensor
-    """Of each segment: 0 of a line, 1 of a quadratic, 2 of a cubic; shape (segment,)."""
+    """Control points of each segment: 0 for a line, 1 for a quadratic, 2 for a cubic; shape (segment,)."""
     points: Tensor
     """End and control points [shape units], shape (point, 2). A closed path does not repeat its first one."""
     is_closed: bool

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable
 
 
-class Request:
+class LaunchRequest:
     """Work for one helper thread."""
 
     def __init__(self, work: Callable[[], None]) -> None:
@@ -49,7 +49,7 @@ class Helpers:
     """
 
     def __init__(self, count: int) -> None:
-        self.requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
+        self.requests: queue.SimpleQueue[LaunchRequest] = queue.SimpleQueue()
         self.count = 0
         with contextlib.suppress(RuntimeError):
             for _ in range(count):
@@ -60,9 +60,9 @@ class Helpers:
         while True:
             self.requests.get().serve()
 
-    def ask(self, work: Callable[[], None]) -> Request:
+    def ask(self, work: Callable[[], None]) -> LaunchRequest:
         """Have one helper do ``work``."""
-        request = Request(work)
+        request = LaunchRequest(work)
         self.requests.put(request)
         return request
 

@@ -14,7 +14,7 @@ from typing import Any
 import warp as wp
 
 from warpsplat.rendering.device_lock import exclusive
-from warpsplat.rendering.helpers import Request, helpers
+from warpsplat.rendering.helpers import LaunchRequest, helpers
 from warpsplat.rendering.kernel_cache import load
 
 PIECES_PER_THREAD = 4
@@ -119,7 +119,7 @@ class Program:
             for piece in pieces:
                 piece()
 
-        requests: list[Request] = []
+        requests: list[LaunchRequest] = []
         if len(launch.pieces) > 1:
             crew = helpers(self.threads)
             requests = [crew.ask(work) for _ in range(min(crew.count, len(launch.pieces) - 1))]

@@ -99,7 +99,7 @@ class Attribute:
     name: str
     """Name of the field of ``Scene``."""
     per: Literal["point", "shape", "stop"]
-    """What has a row: each control point, each shape, or each stop of a gradient."""
+    """The unit of rows: control points, shapes, or stops of gradients."""
     size: int
     """Numbers in a row."""
     rate: float

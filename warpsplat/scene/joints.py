@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Joint(IntEnum):
-    """What a control point of a drawing's outline is."""
+    """Kind of a control point on a drawing's outline."""
 
     FREE = 0
     """A handle, or a point without conditions."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.line_art import CROSS, TEE, drawn, shown, traced
-from warpsplat.drawing.strokes.centerlines import Line, find_lines
+from warpsplat.drawing.strokes.centerlines import CenterLine, find_lines
 from warpsplat.drawing.strokes.ink import find_ink
 from warpsplat.drawing.strokes.lines import rejoined
 from warpsplat.drawing.strokes.pens import find_pens, width_steps
@@ -17,11 +17,11 @@ from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.svg.write import write_svg
 
 
-def lines_of(paths: str) -> list[Line]:
+def lines_of(paths: str) -> list[CenterLine]:
     return find_lines(find_ink(drawn(paths))).lines
 
 
-def away(line: Line, start: tuple[float, float], end: tuple[float, float]) -> float:
+def away(line: CenterLine, start: tuple[float, float], end: tuple[float, float]) -> float:
     """Largest distance of a line's points from a straight one."""
     way = np.subtract(end, start) / np.hypot(*np.subtract(end, start))
     off = line.points - start

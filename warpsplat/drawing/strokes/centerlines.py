@@ -29,8 +29,8 @@ from warpsplat.scene import FloatArray
 
 
 @dataclass(frozen=True)
-class Line:
-    """What is drawn without lifting the pen."""
+class CenterLine:
+    """A line drawn without lifting the pen."""
 
     points: Floats
     """Places on the centre line [px], shape (point, 2); the first one of a ring is not repeated."""
@@ -45,7 +45,7 @@ class Line:
 class Strokes:
     """Lines, what they are drawn with, and filled areas where these were asked for."""
 
-    lines: list[Line]
+    lines: list[CenterLine]
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
     areas: Areas | None
@@ -58,7 +58,7 @@ class _Split:
     """Ink by how it is drawn."""
 
     thin: Ink
-    """What is drawn along its centre lines."""
+    """The ink that is drawn along its centre lines."""
     rings: list[Floats] = field(default_factory=list)
     """Closed lines that fill what is broad, shape (point, 2) each [px]."""
     ring_width: float = 0.0
@@ -103,7 +103,7 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Strokes:
     edge_pens, ring_pens, area_pens, dot_pens = np.split(owners, bounds)
     lines = _center_lines(ink, split, graph, radii, fine, edge_pens)
     for ring, pen in zip(split.rings, ring_pens.tolist(), strict=True):
-        lines.append(Line(*smoothed(ring, np.full(len(ring), split.ring_width), closed=True), pen))
+        lines.append(CenterLine(*smoothed(ring, np.full(len(ring), split.ring_width), closed=True), pen))
     lines += [_dot(dot, pen) for dot, pen in zip(split.dots, dot_pens.tolist(), strict=True)]
     if len(pens) and not ink.textured:
         broadest = 2 * BROAD * pen_width(ink.mask)
@@ -116,7 +116,9 @@ def find_lines(ink: Ink, *, mixed: bool = False) -> Strokes:
     return Strokes(lines, pens, split.areas, area_pens)
 
 
-def _center_lines(ink: Ink, split: _Split, graph: Graph, radii: Floats, fine: int, pens: Ints) -> list[Line]:
+def _center_lines(
+    ink: Ink, split: _Split, graph: Graph, radii: Floats, fine: int, pens: Ints
+) -> list[CenterLine]:
     """Return the lines along a skeleton that is ``fine`` times as large as the ink; ``pens``: its edges'."""
     around = cv2.dilate(ink.cover - split.thin.cover, np.ones((5, 5), np.uint8)) > 0
     away = None if split.apart is None else distance_from(split.apart)
@@ -135,12 +137,12 @@ def _center_lines(ink: Ink, split: _Split, graph: Graph, radii: Floats, fine: in
             continue
         if away is not None and not closed:
             points, widths = with_ends_in_areas(points, widths, away)
-        lines.append(Line(points, widths, closed, pen))
+        lines.append(CenterLine(points, widths, closed, pen))
     return lines
 
 
-def _dot(dot: Dot, pen: int) -> Line:
-    return Line(dot.ends, np.full(2, dot.width), False, pen)
+def _dot(dot: Dot, pen: int) -> CenterLine:
+    return CenterLine(dot.ends, np.full(2, dot.width), False, pen)
 
 
 def _pen_at(dot: Dot, ink: Ink, pens: FloatArray) -> int:

@@ -15,7 +15,7 @@ from warpsplat.scene import FloatArray
 
 @dataclass(frozen=True)
 class Ink:
-    """What is drawn on paper."""
+    """The ink of a drawing."""
 
     cover: FloatArray
     """Inked share of each pixel, shape (height, width)."""
@@ -36,7 +36,7 @@ class Ink:
 
 @dataclass(frozen=True)
 class _Limits:
-    """What tells ink from specks and textures."""
+    """Thresholds that tell ink from specks and textures."""
 
     seed: float
     """Contrast that a line must reach somewhere, over that of strong ink."""
@@ -50,7 +50,7 @@ class _Limits:
 
 PLAIN = _Limits(seed=0.35, share=0.0, speck=0.7, full=0.9)
 TEXTURED = _Limits(seed=0.45, share=0.6, speck=4.0, full=0.7)
-"""Of an image that is coloured in, where crayons leave a texture."""
+"""Thresholds for a coloured image, where crayons leave a texture."""
 
 FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 """Least contrast of ink with the paper around it, in [0, 1], and in standard deviations of the noise."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.drawing.strokes.areas import Areas
-from warpsplat.drawing.strokes.centerlines import Line, find_lines
+from warpsplat.drawing.strokes.centerlines import CenterLine, find_lines
 from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.strokes.pens import width_steps
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
@@ -31,7 +31,7 @@ class TracedLines:
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
     areas: Areas | None
-    """What is filled besides."""
+    """Areas that are filled."""
     area_pens: Ints
     """The pen of each area."""
 
@@ -90,7 +90,7 @@ def rejoined(before: Scene, after: Scene) -> Scene:
     return replace(after, points=points)
 
 
-def _strokes(line: Line, *, thin: bool) -> list[_Stroke]:
+def _strokes(line: CenterLine, *, thin: bool) -> list[_Stroke]:
     """Return a line in parts of one width, which may be less than a pixel if ``thin``."""
     length = float(hypot(*np.diff(line.points, axis=0).T).sum())
     steps = width_steps(line.widths, length / max(1, len(line.points) - 1))

@@ -1,4 +1,4 @@
-"""What lines are drawn with: the colours of the pens, and widths in steps."""
+"""Pens of line art: their colours, and widths in steps."""
 
 from __future__ import annotations
 

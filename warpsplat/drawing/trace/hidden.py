@@ -1,4 +1,4 @@
-"""What lies above a region and hides it, and the shortest paths under it."""
+"""The cover of a region, which hides parts of it, and the shortest paths under it."""
 
 from __future__ import annotations
 

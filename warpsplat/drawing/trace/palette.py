@@ -21,7 +21,7 @@ SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, a
 
 @dataclass(frozen=True)
 class Coloring:
-    """What a region is painted with: premultiplied, 0..255."""
+    """Paint of a region: premultiplied, 0..255."""
 
     color: Floats
     """Mean colour, shape (4,)."""

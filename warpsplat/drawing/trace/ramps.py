@@ -33,9 +33,9 @@ class Ramp:
     frame: Floats
     """Origin and two axes [px], shape (6,)."""
     offsets: Floats
-    """Of the stops, ascending, in 0..1; shape (stop,)."""
+    """Offsets of the stops, ascending, in 0..1; shape (stop,)."""
     colors: Floats
-    """Of the stops, shape (stop, channel)."""
+    """Colours of the stops, shape (stop, channel)."""
     residual: float
     """Root mean square of the error over all channels [levels]."""
 

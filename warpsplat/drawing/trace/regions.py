@@ -29,7 +29,7 @@ class Regions:
     """An image as connected regions."""
 
     image: Floats
-    """What the regions are of, smoothed if it was noisy: premultiplied, 0..255, shape (height, width, 4)."""
+    """The segmented image, smoothed if it was noisy: premultiplied, 0..255, shape (height, width, 4)."""
     labels: Ints
     """The region of each pixel, shape (height, width)."""
     fills: Floats

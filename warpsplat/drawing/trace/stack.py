@@ -20,7 +20,7 @@ from warpsplat.portable.elementary import cos, hypot, sin
 from warpsplat.portable.linear import principal_direction
 
 SEEN, EDGE, HIDDEN = range(3)
-"""What lies across a crack: something lower, the outside of the image, something higher."""
+"""The side across a crack: a lower region, the outside of the image, a higher region."""
 
 DOT = 8  # cracks of the largest loop that is a dot, whose shape cannot be told
 STILL = 0.02  # [px] offset below which a boundary lies where the pixels meet
@@ -33,17 +33,17 @@ Outline = list[Polyline | Floats]
 """A contour before its curves are fitted: runs, and corners (point, 2) between one run and the next."""
 
 Stretch = tuple[int, Ints]
-"""What lies across some cracks in a row, and the cracks."""
+"""The side across some cracks in a row, and the cracks."""
 
 
 @dataclass(frozen=True)
 class OutlineTracer:
-    """What outlines are made of."""
+    """The parts that outlines are made of."""
 
     loops: Loops
     boundary: Boundary
     ranks: Ints
-    """Of each region in the order of painting, shape (region,)."""
+    """Rank of each region in the order of painting, shape (region,)."""
     hiding: Ints
     """The same, -1 for regions under which nothing may lie, shape (region,)."""
     cover: Cover

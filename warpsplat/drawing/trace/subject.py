@@ -18,7 +18,7 @@ Subject = Literal["photo", "drawing", "line", "pixel"]
 
 @dataclass(frozen=True)
 class Guess:
-    """What an image shows."""
+    """The subject that an image was taken for."""
 
     subject: Subject
     why: str

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """What a server accepts and holds at most."""
+    """Limits of what a server accepts and keeps in memory."""
 
     upload: int = 50_000_000
     """Size of an image's file [bytes]."""
