@@ -63,7 +63,7 @@ def chords(angle: float, half: float) -> int:
 
 
 def polygons(line: torch.Tensor, corners: list[bool], closed: bool, style: Style) -> list[Polygon]:
-    """Return a contour's polygons; ``line``: its vertices, [vertex, 2]; ``corners``: of the segments' starts."""
+    """Return polygons of a contour; ``line``: [vertex, 2]; ``corners``: of the segments' starts."""
     pieces, corner = [], False
     for a, b, flag in zip(line[:-1], line[1:], corners, strict=True):
         corner |= flag
