@@ -132,7 +132,7 @@ def blue_backward(
     # Out:
     image_grad: wp.array3d[column],  # [tile_count, 3, TILE] added to
 ):
-    """Of ``weight`` x (1 - the mean of blue)."""
+    """Add the gradient of ``weight`` x (1 - the mean of blue)."""
     tile = offset + wp.tid()
     for x in range(TILE):
         image_grad[tile, 2, x] = image_grad[tile, 2, x] - weight / float(value_count) * inside[tile, x]
@@ -146,7 +146,7 @@ def thin_backward(
     # Out:
     opacities_grad: wp.array[wp.float32],  # [shape_count] added to
 ):
-    """Of ``weight`` x the sum of the opacities."""
+    """Add the gradient of ``weight`` x the sum of the opacities."""
     shape = offset + wp.tid()
     opacities_grad[shape] = opacities_grad[shape] + weight
 

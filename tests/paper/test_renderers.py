@@ -1,4 +1,4 @@
-"""What a fit asks of the two renderers."""
+"""The paper's two renderers, as a fit uses them."""
 
 from __future__ import annotations
 

@@ -266,7 +266,7 @@ def test_mixed_scenes(device: str, seed: int, through_scales: bool) -> None:
 
 @pytest.mark.parametrize("kind", list(Kind))
 def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
-    """Of strong contrast: a splat's plateau is a little below its opacity."""
+    """The contrast is strong: a splat's plateau is a little below its opacity."""
     scene = random_scene(kind, count=10, width=96, height=80, seed=3)
     shown = on_white(render_svg(write_svg(scene, opacity_scale=PLATEAU)))
     mine = render(scene, model=SPLAT, backend=Backend.on(device)).astype(np.float64) * 255

@@ -90,7 +90,7 @@ def stroke_coverage(contours: Lines, half: torch.Tensor, width: int, height: int
 def coverages(
     scene: Scene, p: Tensors, pieces: list[list[int]], width: int, height: int, scale: float
 ) -> list[torch.Tensor]:
-    """Of each shape, [height, width]; ``pieces`` of each shape's Béziers."""
+    """Return each shape's coverage, [height, width]; ``pieces`` of each shape's Béziers."""
     covers = []
     for shape, count in enumerate(pieces):
         basis = Basis(int(scene.basis[shape]))
@@ -119,7 +119,7 @@ def coverages(
 
 
 def style_of(scene: Scene, shape: int, half: torch.Tensor, scale: float) -> stroker.Style | None:
-    """Of a stroke that is not round throughout."""
+    """Return the coverage of a stroke that is not round throughout."""
     cap, join, row = Cap(int(scene.cap[shape])), Join(int(scene.join[shape])), int(scene.dash[shape])
     if cap == Cap.ROUND and join == Join.ROUND and row == NO_DASHES:
         return None

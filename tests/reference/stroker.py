@@ -20,7 +20,7 @@ Polygon = list[torch.Tensor]
 
 @dataclass(frozen=True)
 class Style:
-    """Of a stroke; lengths in pixels."""
+    """Width, caps, joins and dashes of a stroke [px]."""
 
     half: torch.Tensor
     cap: Cap
@@ -41,7 +41,7 @@ class Piece:
     corner: bool
     """Whether two Béziers meet where it starts."""
     share: float = 1.0
-    """Of its segment: how long it is, as a number."""
+    """Its length [px], as a number."""
 
 
 def number(value: torch.Tensor) -> float:
@@ -63,7 +63,7 @@ def chords(angle: float, half: float) -> int:
 
 
 def polygons(line: torch.Tensor, corners: list[bool], closed: bool, style: Style) -> list[Polygon]:
-    """Of a contour, whose vertices are ``line``, [vertex, 2]; ``corners``: of the segments' starts."""
+    """Return polygons of a contour; ``line``: [vertex, 2]; ``corners``: of the segments' starts."""
     pieces, corner = [], False
     for a, b, flag in zip(line[:-1], line[1:], corners, strict=True):
         corner |= flag

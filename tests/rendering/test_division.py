@@ -86,3 +86,12 @@ def test_scenes_that_outgrow_the_arrays(device: str, case: str) -> None:
     small = renderer_for(scene, device, model=model, capacity=Capacity(50, 5))
     assert small.capacity.samples >= small.needed_samples.numpy()[0] > 50
     np.testing.assert_array_equal(small.read_image(), render(scene, model=model, backend=Backend.on(device)))
+
+
+@pytest.mark.parametrize("scene", [mixed_scene(seed=1), PAINTED], ids=["plain", "painted"])
+def test_the_adjoint_of_opaque_shapes_is_the_usual_one_of_translucent_shapes(
+    device: str, scene: Scene
+) -> None:
+    usual, found = (adjoint(renderer_for(scene, device, opaque=opaque), 0.7) for opaque in (False, True))
+    for name, gradient in found.items():
+        assert relative_error(gradient, usual[name]) < 1e-4, name

@@ -1,4 +1,4 @@
-"""What a further model of coverage takes: here axis-parallel boxes, which no file of the package knows.
+"""Adding a model of coverage: here axis-parallel boxes, which no file of the package knows.
 
 A shape covers the box of its control points. The area of a pixel inside a box is a product of two clamped
 differences, so that image and gradients have short formulas to be held against.
@@ -66,7 +66,7 @@ class BoxGeometry:
 
 
 class BoxCoverage:
-    """What compositing asks for."""
+    """Coverage as compositing reads it."""
 
     mapping = constants.AREA
 

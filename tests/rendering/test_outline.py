@@ -84,7 +84,7 @@ def test_a_polyline_encloses_what_its_curve_does(basis: Basis) -> None:
     [(k, Basis.SPLINE, n) for k, n in SPLINES] + [(Kind.FILL, Basis.CUBIC, 3), (Kind.STROKE, Basis.CUBIC, 3)],
 )
 def test_weights_of_points(kind: Kind, basis: Basis, beziers: int) -> None:
-    """What the adjoint weighs by is the derivative of the outline by its points."""
+    """The adjoint's weights are the derivative of the outline by its points."""
     count = point_count(kind, basis, beziers)
     points = torch.zeros((count, 2), dtype=torch.float64, requires_grad=True)
     of_point = range(4 if basis == Basis.CUBIC else 3)

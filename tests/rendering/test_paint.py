@@ -50,7 +50,7 @@ def test_ramps(device: str, lanes: int, clear: bool) -> None:
 @pytest.mark.parametrize("clear", [False, True])
 @pytest.mark.parametrize("offsets", [(0.15, 0.3, 0.42, 0.5, 0.95), (0.15, 0.4, 0.4, 0.6, 0.6)])
 def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[float, ...]) -> None:
-    """Of which columns reach one interval, several, or lie beyond either end; two in one place."""
+    """Gradients whose columns reach one interval, several, or lie beyond either end; two in one place."""
     scene = with_stops(random_scene(Kind.FILL, 6, seed=12), offsets, seed=13)
     compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
 

@@ -49,7 +49,7 @@ def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scen
 
 
 def test_layout(device: str) -> None:
-    """What kernels find a shape's points and Béziers by."""
+    """Check the indices by which kernels find a shape's points and Béziers."""
     scene = mixed_scene()
     parameters = Parameters(scene, Backend.on(device))
     arrays = {name: array.numpy() for name, array in parameters.arrays.items()}

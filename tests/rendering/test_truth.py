@@ -26,7 +26,7 @@ def psnr(a: FloatArray, b: FloatArray) -> float:
 
 
 def truth(svg: str) -> FloatArray:
-    """What a viewer shows, reduced."""
+    """Return a viewer's picture, reduced."""
     large = warpsplat.render(svg, renderer="viewer", scale=FINER)
     height, width = (side // FINER for side in large.shape[:2])
     return np.asarray(large.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)), np.float32)

@@ -26,7 +26,7 @@ def folded_scene() -> Scene:
 
 
 def test_gradient(device: str) -> None:
-    """Of folded fills, between strokes, which may fold."""
+    """Folded fills between strokes, which may fold."""
     scene = folded_scene().append(random_scene(Kind.STROKE, 2)).append(folded_scene())
     weight = 3.0
     renderer = renderer_for(scene, device, model=SplatModel(fold=weight))

@@ -52,7 +52,7 @@ def coverages(
     softness: float,
     detach: bool,
 ) -> list[torch.Tensor]:
-    """Of each shape, opacities included, [height, width]."""
+    """Return each shape's coverage, opacities included, [height, width]."""
     covers = []
     for shape, plan in enumerate(plans):
         points = points_of(scene, p, shape)

@@ -76,7 +76,7 @@ def coverage(
 def coverages(
     scene: Scene, p: Tensors, plans: list[Plan], width: int, height: int, scale: float, detach: bool
 ) -> list[torch.Tensor]:
-    """Of each shape, [height, width]; ``detach``: no gradient flows through scales and angles."""
+    """Return coverages of the shapes, [height, width]; ``detach``: no gradient through scales and angles."""
     return [
         coverage(grid, width, height, detach, runs_of(scene, shape))
         for shape, grid in enumerate(grids(scene, p, plans, scale))
