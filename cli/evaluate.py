@@ -21,7 +21,7 @@ from warpsplat.errors import UsageError
 @overwrite_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(image: Path, svg: Path, **given: Any) -> None:
-    """Measure SVG (any, not only ours) against IMAGE, as a viewer shows it.
+    """Compare any SVG, as a viewer shows it, with IMAGE.
 
     The SVG is rendered at the image's size, on white; where the image has
     opacity, on black and on white, and the lower figures are given.

@@ -38,7 +38,7 @@ class Done:
 
     request: Request
     data: bytes | Path
-    """The image itself."""
+    """The image: its bytes, or its path if no hook needs the bytes."""
     made: Sequence[tuple[Path, Result | bytes | Path]]
     """Files with their results; of ``eval``, the SVG that was measured."""
     command: str = ""

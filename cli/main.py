@@ -85,7 +85,7 @@ class LazyGroup(click.Group):
             raise click.exceptions.Abort from error  # or click would print an empty line
         except BrokenPipeError as error:
             silence(sys.stdout)
-            raise OutputError("standard output: nobody reads it any more") from error
+            raise OutputError("standard output: closed by its reader") from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list without importing the commands."""
@@ -136,7 +136,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 def json_stream(arguments: list[str]) -> Literal["stdout", "stderr"] | None:
     """Return where ``--json`` prints: stderr if a file goes to stdout. None without the flag.
 
-    Found in the words themselves, since they may not parse.
+    Reads the raw arguments, since it is needed even if they cannot be parsed.
     """
     words = arguments[: arguments.index("--")] if "--" in arguments else arguments
     if "--json" not in words:

@@ -27,7 +27,7 @@ threads_option = click.option(
     "--threads",
     type=click.IntRange(min=1),
     metavar="N",
-    help="CPU threads, 8 a core at most; the result is the same for any number.  [default: all cores]",
+    help="CPU threads, at most 8 per core; the result does not depend on them.  [default: all cores]",
 )
 
 importance_option = click.option(
@@ -38,7 +38,7 @@ importance_option = click.option(
 )
 
 overwrite_option = click.option(
-    "--overwrite", is_flag=True, help="Replace files that warpsplat did not write as well."
+    "--overwrite", is_flag=True, help="Also replace files that warpsplat did not write."
 )
 
 
@@ -56,7 +56,7 @@ def checkpoint_options(function: Function) -> Function:
             "--checkpoint",
             type=FILE,
             metavar="FILE",
-            help="Keep the state of the run in FILE until it is done, also when it is stopped by a signal.",
+            help="Save the state of the run in FILE, which is removed when the run is done.",
         ),
         click.option(
             "--resume",
@@ -106,7 +106,7 @@ class Numbers(click.ParamType):
             return value
         words = str(value).split(",")
         if not all(re.fullmatch(r"[+-]?\d{1,18}", word.strip(), re.ASCII) for word in words):
-            self.fail(f"{shown(value)} is not a whole number, nor several as 50,200,1000", param, ctx)
+            self.fail(f"{shown(value)} is neither a whole number nor a list such as 50,200,1000", param, ctx)
         numbers = tuple(int(word) for word in words)
         if len(numbers) == 1:
             return numbers[0]

@@ -34,15 +34,22 @@ from warpsplat.fit.settings import make_settings
     help="SVG to write, or .svgz, .png, .pdf; - is the standard output.",
 )
 @overwrite_option
-@click.option("--iterations", type=int, default=200, show_default=True, metavar="N", help="Steps.")
 @click.option(
-    "--max-memory", metavar="SIZE", help="Memory to stay below, as 4GB: an image that takes more is refused."
+    "--iterations",
+    type=int,
+    default=200,
+    show_default=True,
+    metavar="N",
+    help="Number of optimisation steps.",
+)
+@click.option(
+    "--max-memory", metavar="SIZE", help="Memory limit, such as 4GB; an image that needs more is refused."
 )
 @refine_options
 @click.option(
     "--keep",
     is_flag=True,
-    help="Keep text, images, filters ... as they are, in their place, instead of refusing them.",
+    help="Leave text, images, filters ... unchanged; without this, an SVG that has them is refused.",
 )
 @checkpoint_options
 @hook_options("refine")
@@ -61,7 +68,7 @@ def command(
     """Improve SVG (ours, VTracer's ...) against IMAGE by gradient descent.
 
     Its paths are kept, none is added: outlines, colours, opacities and
-    widths move. A result that is no better is not taken. Either of SVG and
+    widths move. If the result is no better, the SVG is written unchanged. Either of SVG and
     IMAGE may be - for the standard input. The figures go to stderr where the
     SVG goes to stdout.
     """

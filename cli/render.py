@@ -28,7 +28,7 @@ from warpsplat.extensions import renderer_names
     type=click.Choice(["viewer", *renderer_names()]),
     default="viewer",
     show_default=True,
-    help="viewer: resvg. exact, splat: those that shapes are fitted with, for SVGs of paths.",
+    help="viewer: resvg, for any SVG. exact, splat: the renderers of fits, for SVGs with paths only.",
 )
 @click.option(
     "--device",
@@ -40,7 +40,7 @@ from warpsplat.extensions import renderer_names
 def command(
     svg: Path, output: Path, overwrite: bool, scale: float, renderer: Any, device: str, threads: int | None
 ) -> None:
-    """Render SVG (any, not only ours; - for the standard input) to a PNG, or its paths to a PDF."""
+    """Convert any SVG to a PNG, or its paths to a PDF; - is the standard input."""
     from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.marks import mark_png
     from warpsplat.files.output import check_output, write_result

@@ -30,11 +30,11 @@ SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing",
 """Subjects as messages call them."""
 
 BAR_LENGTH = 1000
-"""Length of a progress bar: thousandths of the work."""
+"""Units of the progress bar, each a thousandth of the work."""
 
 
 class Bar:
-    """The text beside a progress bar, whose decibels never fall."""
+    """The text beside the progress bar; the PSNR it shows never decreases."""
 
     def __init__(self) -> None:
         self._time = TimeLeft()
@@ -118,7 +118,7 @@ def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int
     """Print what the image was taken for, and what else may be unexpected."""
     name, count, traced = input_name(source), len(result.scene), result.subject != "photo"
     if result.why and (traced or verbose):
-        other = "; --subject photo fits translucent shapes" if traced else ""
+        other = "; use --subject photo to fit translucent shapes instead" if traced else ""
         echo(f"warpsplat: {name}: taken for a {SUBJECTS[result.subject]}: {result.why}{other}", err=True)
     has_goal = settings.target_psnr or settings.max_bytes
     if not traced and settings.simplify and not has_goal and count < settings.curves:

@@ -96,7 +96,7 @@ def _error_at(output: Path | None) -> ErrorAt:
 
 
 def _literal(text: str) -> str:
-    """Escape a text for a pattern of names."""
+    """Escape the braces of a text, so that a name pattern contains it literally."""
     return text.replace("{", "{{").replace("}", "}}")
 
 

@@ -58,7 +58,7 @@ def command(
 
     The figures are those of the file as a viewer shows it: PSNR and SSIM
     against the image, number of paths, size. They go to stderr where the SVG
-    goes to stdout. Several images are made as batch makes them. Several numbers
+    goes to stdout. Several images are processed as by batch. Several numbers
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
     hooks = Hooks("vectorize", given)
@@ -80,7 +80,7 @@ def command(
             raise UsageError("--data-uri takes one image")
         vectorize_images = dict(declared("provides")).get("vectorize_images")
         if vectorize_images is None:
-            raise UsageError("several images need warpsplat's folder batch, which is not installed")
+            raise UsageError("several images need the extension batch, which is not installed")
         load(vectorize_images)(images, request, given, hooks.values)
     elif numbers:
         hooks.check_mode("several numbers")

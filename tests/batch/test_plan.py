@@ -150,8 +150,8 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, x]}\n", 3, "curves"),
     ("jobs:\n  - images: in/a.png\n    matrix: {rates: [3]}\n", 3, "unknown key 'rates' in matrix"),
     ("jobs:\n  - images: in/a.png\n    matrix: {curves: [3, 4]}\n", 2, "2 results would be"),
-    ("jobs:\n  - images: in/a.png\n    output: '{curvs}.svg'\n", 3, "'{curvs}' is no field"),
-    ("jobs:\n  - images: in/a.png\n    output: '{.svg'\n", 3, "'{' is no field"),
+    ("jobs:\n  - images: in/a.png\n    output: '{curvs}.svg'\n", 3, "'{curvs}' is not a field"),
+    ("jobs:\n  - images: in/a.png\n    output: '{.svg'\n", 3, "'{' is not a field"),
     ("jobs:\n  - images: in/a.png\n    output: '{stem}'\n", 3, "names of results end with .svg"),
     (f"jobs:\n  - images: in/a.png\n    matrix: {{curves: {[*range(1, 1002)]}}}\n", 3, "combinations"),
 ]

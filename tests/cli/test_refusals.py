@@ -95,10 +95,10 @@ USAGE = [
     # Several numbers of shapes
     ("vectorize photo.png --curves 5,5", "5 is given twice"),
     ("vectorize photo.png --curves 0,5", "curves must be a whole number from 1"),
-    ("vectorize photo.png --curves 5,x", "not a whole number, nor several"),
+    ("vectorize photo.png --curves 5,x", "neither a whole number nor a list"),
     ("vectorize photo.png --curves 5,9 -o -", "several files: give -o 'NAME-{curves}.svg'"),
     ("vectorize photo.png --curves 5,9 -o same-{stem}.svg", "2 results would be same-photo.svg"),
-    ("vectorize photo.png --curves 5,9 -o new/{curves}-{x}.svg", "'{x}' is no field"),
+    ("vectorize photo.png --curves 5,9 -o new/{curves}-{x}.svg", "'{x}' is not a field"),
     ("vectorize photo.png --curves 5,9 -o new/{curves}.svg --report no/a.html", "no does not exist"),
     ("vectorize photo.png --curves 5,9 -o photo.png/{curves}.svg", "photo.png is a file, not a folder"),
     ("vectorize photo.png --curves 3,9 -o foreign-{curves}.svg", "foreign-9.svg: exists and was not written"),

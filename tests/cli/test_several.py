@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ def test_a_file_for_each_number(
     assert lines[0].split() == ["shapes", "dB", "SSIM", "kB", "gzip", "kB", "seconds"]
     assert [line.split()[:2] for line in lines[1:]] == [["photo-9.svg", "9"], ["photo-3.svg", "3"]]
     page = Path("both.html").read_text()
-    assert page.count('class="card version') == 2 and "--curves 9,3" in page
+    assert page.count('class="card version') == 2 and "--curves 9,3" in re.sub("<[^>]*>", "", page)
     assert run("vectorize", image, "--curves", "3", "-o", "alone.svg", "-q", *FEW) == 0
     assert Path("alone.svg").read_bytes() == Path("photo-3.svg").read_bytes()
 

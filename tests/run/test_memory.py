@@ -181,7 +181,7 @@ def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
     assert (made.scene.canvas.width, made.scene.canvas.height) == (WIDTH, HEIGHT)
     assert f"{WIDTH}x{HEIGHT} pixels take about" in made.reduced and "max-memory is" in made.reduced
     measured = "full" if whole and mode != "I;16" else "that"
-    assert made.reduced.endswith(f"worked on at 33x25, measured at {measured} size")
+    assert made.reduced.endswith(f"processed at 33x25, measured at {measured} size")
     assert made.as_dict()["reduced"] == made.reduced
     own = warpsplat.score(made.svg, data)
     assert made.score and made.score.bytes == own.bytes and made.score.gzip_bytes == own.gzip_bytes
@@ -211,7 +211,7 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.Mo
     monkeypatch.setattr("warpsplat.run.prepare.load_importance", noted)
     made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most - 1, name="big.png")
     assert sizes == [(25, 33)]
-    assert "worked on at 33x25" in made.reduced
+    assert "processed at 33x25" in made.reduced
     warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most)
     assert sizes[1:] == [(HEIGHT, WIDTH)]
 

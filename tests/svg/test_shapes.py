@@ -38,7 +38,7 @@ LOST = {
     "<style>@media print{path{fill:red}}</style>": "@-rules",
     "<style>@keyframes a{to{fill:red}}</style>": "take the still SVG",
     "<style>@import url(a.css);</style>": "@-rules",
-    "<style>.a{fi 9:red;fill:red}</style>": "broken",
+    "<style>.a{fi 9:red;fill:red}</style>": "is invalid",
     '<path d="M1 1h9v9z" style="fill:var(--a)"/>': "variables",
     '<rect style="width:9px" height="9"/>': "width by style",
     '<path d="M1 1h9v9z" fill="lab(50% 9 9)"/>': "'lab(50% 9 9)' is not a colour",

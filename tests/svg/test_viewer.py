@@ -30,7 +30,7 @@ def test_crashes_of_resvg_are_one_line(name: str, tmp_path: Path, capfd: pytest.
     Image.new("RGB", (40, 30)).save(image)
     for arguments in (("render", svg, "-o", tmp_path / "b.png"), ("eval", image, svg)):
         assert run(*arguments) == 3
-        message = f"warpsplat: {svg}: cannot be rendered: the renderer fails on what it draws"
+        message = f"warpsplat: {svg}: cannot be rendered: the renderer crashed"
         assert one_line(capfd.readouterr().err) == message
     assert run("refine", svg, image, "-o", tmp_path / "b.svg") == 3
     assert one_line(capfd.readouterr().err).startswith(f"warpsplat: {svg}: ")

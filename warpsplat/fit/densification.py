@@ -18,7 +18,7 @@ from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas, bounds
 
 SURPLUS_ROUNDS = 4
-"""Rounds in which ``remove_surplus`` removes shapes: of two that hide each other the costs are 0 until one is
+"""Rounds in which ``remove_surplus`` removes shapes: if two shapes hide each other, both cost 0 until one is
 gone."""
 
 

@@ -48,7 +48,7 @@ class Fit:
 
     scene: Scene
     per_pixel: float
-    """View box units per pixel that the scene is rounded to, or may be."""
+    """View box units per pixel of the grid that the scene is rounded to, or can be."""
     render_psnr: float
     """PSNR of the last training render, at its size [dB]."""
     estimated_psnr: float
@@ -65,7 +65,7 @@ class Start:
     """Shapes that a fit starts from; by default new ones, as many as the settings ask for."""
 
     scene: Scene | None = None
-    """Shapes whose number stays, unless they have a ``past``."""
+    """Shapes to start from; their number is kept, unless ``past`` is given."""
     past: Past | None = None
     """Optimizer state of these shapes: with it their number follows the schedule."""
     begin: int = 0
@@ -193,7 +193,7 @@ class _Training:
                 self.run.report(self.progress())
 
     def _recover(self) -> None:
-        """Find numbers that are not finite before the values are used."""
+        """Reset shapes with non-finite numbers, where that is due."""
         step, settings, done = self.step, self.step.settings, self.step.state.step
         if self._is_due() or done % CHECK_INTERVAL == 0 or stage_at(settings, done) is not None:
             densifies = done < settings.density.stop * settings.iterations
@@ -270,7 +270,7 @@ class _Training:
         """Return the shapes as they are now, as the result of an uninterrupted fit."""
         self.step = step = recover(self.step, replaces=False, last=True)
         state, most = step.state, step.state.base + step.settings.curves
-        if self.grows and state.parameters.shape_count > most:  # it was ended while it had a surplus
+        if self.grows and state.parameters.shape_count > most:  # stopped before the surplus was pruned
             self.step = step = remove_surplus(step, most)
         if self.rounding and not state.rounding:
             state.per_pixel = choose_grid(step, staged=False)

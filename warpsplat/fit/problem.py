@@ -50,7 +50,7 @@ class Run:
     backend: Backend
     on_progress: Callback | None = None
     stop: Callable[[], bool] | None = None
-    """Asked after every step; once true, the shapes as they are make the result."""
+    """Called after every step; once it returns True, the current shapes are the result."""
     deadline: float = math.inf
     """Time at which a fit has to end (``time.monotonic``): it takes as many steps as there is time for."""
     checkpoint: Checkpoint | None = None

@@ -62,7 +62,7 @@ def stage_at(settings: Settings, step: int) -> int | None:
 
 
 def opacities_at(settings: Settings) -> int:
-    """Return the steps after which opacities are frozen: densification is over, the image at its finest."""
+    """Return the number of steps after which opacities are frozen: densification is over, at full size."""
     share = max(settings.density.stop, settings.coarse)
     return min(round(share * settings.iterations) + 1, settings.iterations - STAGES * stage_steps(settings))
 

@@ -144,16 +144,16 @@ class Density:
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything but the image that decides the result. Fields without help follow from other options."""
+    """Everything but the image that decides the result. Fields without help are set by other options."""
 
     curves: int = option(
         512,
-        "Number of shapes; with a goal the most.",
+        "Number of shapes; with a goal, the maximum.",
         (1, 100_000),
         shown_default="512; fewer for a simple image",
     )
     subject: Subject = option(
-        "auto", "What the image shows: to a photo shapes are fitted, the others are traced."
+        "auto", "Kind of image: photos are fitted with shapes, the other kinds are traced."
     )
     kind: Kind = option(
         Kind.FILL,
@@ -165,12 +165,12 @@ class Settings:
     )
     mixed: bool = option(
         False,
-        "Fills, and strokes where they remove more error; of line art, fills where it is filled.",
+        "Fills and strokes together, whichever suits better; in line art, fills for filled areas.",
         subjects=(*FITTED, "line"),
     )
     iterations: int = option(
         1000,
-        "Steps; overrides the effort's number.",
+        "Number of steps, instead of that of --quality.",
         (1, 1_000_000),
         shown_default="",
         shorthands=(
@@ -181,18 +181,18 @@ class Settings:
     )
     renderer: str = option(
         "exact",
-        "How the fit sees shapes: as viewers do, as Gaussians much like that, or as the paper's soft ones.",
+        "How a fit renders shapes: as viewers do, as Gaussians close to that, or as the paper's soft ones.",
         subjects=FITTED,
         choices=renderer_names(),
     )
     paint: Painting = option(
         "flat",
-        "A colour for each shape, a gradient for each, or whichever is worth its bytes.",
+        "A flat colour for each shape, a gradient, or whichever is worth its bytes.",
         subjects=FITTED,
     )
     levels: tuple[int, ...] = option(
         (),
-        "Numbers of shapes up to the end of each group of --layered, as 64,256,1024.",
+        "Total number of shapes after each level, such as 64,256,1024.",
         subjects=FITTED,
         metavar="N,N",
         parse=parse_levels,
@@ -200,59 +200,63 @@ class Settings:
             Option(
                 name="layered",
                 type=bool,
-                help="Groups from coarse to fine, each with those before it a picture of its own.",
+                help="Levels from coarse to fine, as groups; those up to any one form a complete picture.",
             ),
         ),
     )
-    colors: int | None = option(
-        None, "No more than N colours; the fills are opaque then.", (1, MOST_COLOR_COUNT)
-    )
+    colors: int | None = option(None, "At most N colours; the shapes are then opaque.", (1, MOST_COLOR_COUNT))
     palette: tuple[str, ...] = option(
         (), "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS", parse=parse_palette
     )
     opaque: bool = option(False, "No translucent shapes.")
     target_psnr: float | None = option(
-        None, "The smallest file with a PSNR of at least DB.", subjects=FITTED, metavar="DB"
+        None, "Make the smallest file with a PSNR of at least DB.", subjects=FITTED, metavar="DB"
     )
     time_budget: float | None = option(
-        None, "As many steps as end within 60s, 2m ...", metavar="TIME", parse=parse_duration, refine=True
+        None,
+        "Time limit, such as 60s or 2m; the number of steps is adapted to it.",
+        metavar="TIME",
+        parse=parse_duration,
+        refine=True,
     )
     max_bytes: int | None = option(
         None,
-        "The best file of no more than 100KB, 1MB ...",
+        "Make the best file of at most this size, such as 100KB or 1MB.",
         subjects=(*FITTED, "drawing"),
         metavar="SIZE",
         parse=parse_bytes,
     )
     max_memory: int | None = option(
         None,
-        "Memory to stay below, as 4GB: a larger image is worked on at a smaller size.",
+        "Memory limit, such as 4GB; an image that needs more is processed at a reduced size.",
         metavar="SIZE",
         parse=parse_bytes,
     )
     seed: int = option(0, "Random seed.", (0, 2**32 - 1))
     background: str = option(
         "auto",
-        "auto: transparent where the image is; none; or a colour (#rrggbb).",
+        "auto (transparent where the image is), none, or a colour (#rrggbb).",
         pattern=f"auto|none|{COLOR}",
         wanted="auto, none or a colour as #ffffff",
         metavar="COLOR",
         refine=True,
     )
     title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
-    size: str = option("", "For plotters: size that the picture fills, as 200x150mm.", metavar="WxH")
-    page: str = option(
-        "", "For plotters: sheet that it fills but for margins: a3, a4, a5, letter.", metavar="NAME"
-    )
-    units: str = option("", "Units in which the file says its size: mm, cm, in, pt, px.", metavar="UNIT")
+    size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
+    page: str = option("", "For plotters: paper size, with margins: a3, a4, a5, letter.", metavar="NAME")
+    units: str = option("", "Unit of the size in the file: mm, cm, in, pt, px.", metavar="UNIT")
     ids: bool = option(
-        False, "Name paths by their colours, and group neighbours of one, for editors.", refine=True
+        False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
     minify: bool = option(
-        False, "Smallest text: no line breaks, no mark that warpsplat wrote it.", refine=True
+        False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
     )
     precision: int | None = option(
-        None, "Most decimals of a pixel in coordinates.", (0, 6), shown_default="auto", refine=True
+        None,
+        "Maximum precision of coordinates, in decimals of a pixel.",
+        (0, 6),
+        shown_default="auto",
+        refine=True,
     )
     simplify: bool = option(False)
     basis: Basis = research(
@@ -344,7 +348,7 @@ RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
     (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
     (
         lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),
-        "levels must be numbers of shapes that ascend, not {0.levels}",
+        "levels must be ascending numbers of shapes, not {0.levels}",
     ),
     (
         lambda s: s.levels and s.levels[-1] != s.curves,

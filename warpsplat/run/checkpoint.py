@@ -37,7 +37,7 @@ VALUE_CHARACTERS = 40
 
 @dataclass(frozen=True)
 class CheckpointFile:
-    """The file in which a run saves its state, and what becomes of a file that is there."""
+    """The file in which a run saves its state, and what to do with an existing one."""
 
     path: Path
     resume: bool = False
@@ -48,7 +48,7 @@ class CheckpointFile:
     """Time between two saves [s]."""
 
     def check(self, *others: Path) -> None:
-        """Check before the work whether the file can be written, and may be.
+        """Check before the run that the file can be written, and that nothing else is replaced.
 
         ``others``: files that it must not replace.
 
@@ -95,8 +95,8 @@ class CheckpointFile:
             header = {"version": __version__, "device": device, "run": run, **content.numbers}
             try:
                 write_atomically(self.path, pack(header, content.arrays))
-            except OutputError as error:  # hours of work are not to end for it
-                log.warning("%s: continues without it", error)
+            except OutputError as error:  # a failed save must not end hours of work
+                log.warning("%s; the run continues without this checkpoint", error)
 
         checkpoint = Checkpoint(str(self.path), write, self.every, saved)
         if saved and checkpoint.is_empty:
@@ -111,9 +111,11 @@ class CheckpointFile:
         before = header.get("run")
         for name, was, now in differences(before if isinstance(before, dict) else {}, run):
             detail = f" ({was}, now {now})" if name not in DIGESTS else ""
-            raise UsageError(f"{self.path}: is of another run: {name} differs{detail}")
+            raise UsageError(f"{self.path}: belongs to another run: {name} differs{detail}")
         if header.get("device") != device:
-            log.warning("%s: made on another device: continues, but not to the same bytes", self.path)
+            log.warning(
+                "%s: was made on another device; the run continues, but its bytes will differ", self.path
+            )
         return Content(header, arrays)
 
     def remove(self) -> None:

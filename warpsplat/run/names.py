@@ -122,7 +122,9 @@ def filled_in(item: ResultRequest) -> Path:
             return found[0][0]
         if found[1] not in fields:
             named = shown(found[0])
-            raise item.error(f"output: {named} is no field; they are stem, name, folder, and all keys")
+            raise item.error(
+                f"output: {named} is not a field; fields are stem, name, folder and all option names"
+            )
         text = _text(fields[found[1]])
         return text if found[1] == "folder" else text.replace("/", "_").replace(os.sep, "_")
 

@@ -23,9 +23,9 @@ class PreparedImage:
 
     problem: Problem
     why: str = ""
-    """Why it has its subject; empty if that was given."""
+    """Why this subject was chosen; empty if it was given."""
     reduction: Reduction | None = None
-    """To the size that memory allows, if that is smaller."""
+    """How the image was reduced to fit into memory; None if it was not."""
     name: str = "the image"
     """Its name in messages."""
 

@@ -64,7 +64,7 @@ class Reduction:
     def words(self) -> str:
         """Return a message about the reduction."""
         small = f"{-(-self.width // self.factor)}x{-(-self.height // self.factor)}"
-        return f"{self.why}: worked on at {small}, measured at {'full' if self.whole else 'that'} size"
+        return f"{self.why}: processed at {small}, measured at {'full' if self.whole else 'that'} size"
 
 
 @dataclass(frozen=True)

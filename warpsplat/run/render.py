@@ -74,7 +74,7 @@ def render(
 def _zoom(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:
     """Return the pixels per unit of a picture of ``size`` that is drawn with this width, height or scale."""
     if scale is not None and (width is not None or height is not None):
-        raise UsageError("a scale, and a width or height besides")
+        raise UsageError("give either a scale, or a width and height")
     for what, side in (("width", width), ("height", height)):
         if side is not None and (isinstance(side, bool) or not 1 <= side <= MOST_SIDE or int(side) != side):
             raise UsageError(f"{what} must be a whole number from 1 to {MOST_SIDE}, not {shown(side)}")

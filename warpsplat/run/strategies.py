@@ -1,4 +1,4 @@
-"""The strategies by which the shapes of a file are made. A further one is a row in ``STRATEGIES``."""
+"""Strategies: functions that make the shapes of a file. To add one, add a row to ``STRATEGIES``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Strategy(NamedTuple):
     """A function that makes shapes, and what its shapes are like."""
 
     make: Callable[[Problem, Run], Fit]
-    sorts: bool = False
-    """Whether the order of its shapes is final; else it is changed to make the file small."""
+    keeps_order: bool = False
+    """Whether the order of its shapes is kept; else they are reordered to make the file small."""
     traces: bool = False
     """Whether it leaves transparent pixels empty."""
 
@@ -41,10 +41,10 @@ def fit_shapes(problem: Problem, run: Run) -> Fit:
 STRATEGIES = {
     "fit": Strategy(fit_shapes),
     "layers": Strategy(fit_layered),
-    "goal": Strategy(search_goal, sorts=True),
-    "drawing": Strategy(draw_regions, sorts=True, traces=True),
-    "line": Strategy(draw_lines, sorts=True, traces=True),
-    "pixel": Strategy(draw_pixels, sorts=True, traces=True),
+    "goal": Strategy(search_goal, keeps_order=True),
+    "drawing": Strategy(draw_regions, keeps_order=True, traces=True),
+    "line": Strategy(draw_lines, keeps_order=True, traces=True),
+    "pixel": Strategy(draw_pixels, keeps_order=True, traces=True),
 }
 
 
@@ -62,7 +62,7 @@ def arranged(made: Fit, problem: Problem, strategy: Strategy, backend: Backend) 
     settings = problem.settings
     # Soft Gaussians reach beyond the outlines that decide which shapes may change places.
     soft = renderer_of(settings.renderer).soft
-    if not strategy.sorts and not soft:
+    if not strategy.keeps_order and not soft:
         made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     if problem.target.shape[2] == 4 and not strategy.traces and not made.interrupted:
         clear = clear_empty(made.scene, problem.target, settings, backend, made.per_pixel)

@@ -77,13 +77,13 @@ def vectorize(
     Args:
         image: a path, the bytes of an image file, a file open for reading, a Pillow image, or an array of
             shape (height, width[, channels]) of uint8, uint16, bool, or floats in [0, 1].
-        curves: number of shapes; of drawings and with a goal, the most.
+        curves: number of shapes; for drawings, and with a goal, the maximum.
         settings: all options at once, made by ``make_settings``; no further ones may be given then.
         importance: mask of the image's proportions, in any of the image's forms: how much errors count.
         output: file to write the SVG to, before it is measured, or what its name ends with (``Result.save``);
             ``-`` is the standard output.
         device: ``auto``, ``cpu``, ``cuda`` or ``cuda:N``.
-        threads: of a CPU, default one a core; they do not change the result.
+        threads: of the CPU, by default one per core; the result does not depend on them.
         callback: see ``Callback``.
         stop: called after every step; once it returns true, the current shapes make the file.
         name: how messages call the image; default: its file's name.
@@ -130,7 +130,7 @@ def make_result(
     makes it a plain fit from these shapes, in place of the settings' strategy.
 
     Raises:
-        ImageError: something about the image that only the work itself finds out.
+        ImageError: a problem with the image that shows only during the work.
     """
     begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
     problem, reduction = image.problem, image.reduction

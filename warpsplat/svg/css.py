@@ -54,7 +54,7 @@ def declarations(text: str) -> Iterator[Declaration]:
         if not part.strip():
             continue
         if not name.replace("-", "").replace("_", "").isalnum():
-            raise ImageError(f"style {part.strip()[:40]!r} is broken")
+            raise ImageError(f"style {part.strip()[:40]!r} is invalid")
         found = IMPORTANT.search(value)
         yield Declaration(name, value[: found.start()].strip() if found else value.strip(), found is not None)
 

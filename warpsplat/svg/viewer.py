@@ -120,7 +120,7 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
         raise ImageError(f"cannot be rendered with {memory >> 20} MiB of memory")
     if -done.returncode in LIMIT_SIGNALS:
         raise ImageError(f"cannot be rendered within {seconds} s of processor time")
-    raise ImageError("cannot be rendered: the renderer fails on what it draws")
+    raise ImageError("cannot be rendered: the renderer crashed")
 
 
 CPU_SECONDS = 4.0
