@@ -192,7 +192,7 @@ def test_sizes_of_a_render(device: str) -> None:
     assert abs(viewed - warpsplat.render(scene, scale=2, device=device)).mean() < 0.005
     with pytest.raises(warpsplat.UsageError, match="proportions"):
         warpsplat.render(scene, 40, 40)
-    with pytest.raises(warpsplat.UsageError, match="besides"):
+    with pytest.raises(warpsplat.UsageError, match="either a scale"):
         warpsplat.render(scene, 40, scale=2)
 
 

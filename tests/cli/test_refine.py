@@ -54,7 +54,7 @@ def test_kept_elements_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert capsys.readouterr().err == ""
     svg.write_text(f'{HEAD}width="40" height="30">{KEPT}</svg>')
     assert run(*arguments, "--keep") == 3
-    assert "no path that can be refined: <path> (filter)" in one_line(capsys.readouterr().err)
+    assert "contains no path to refine: <path> (filter)" in one_line(capsys.readouterr().err)
 
 
 def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

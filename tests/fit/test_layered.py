@@ -123,7 +123,7 @@ def test_levels_are_checked() -> None:
     for given, cause in (
         ({"levels": "5,5"}, "ascend"),
         ({"levels": "5,x"}, "numbers of shapes"),
-        ({"levels": "0,4"}, "levels must be numbers of shapes"),
+        ({"levels": "0,4"}, "levels must be ascending numbers of shapes"),
         ({"levels": "4,8", "curves": 9}, "differ"),
         ({"levels": "4,8", "max_bytes": "4KB"}, "max-bytes"),
         ({"layered": "yes"}, "true or false"),

@@ -201,8 +201,8 @@ TEXT = "<path d='M2 2h9v9z'/><text>a</text>"
 @pytest.mark.parametrize(
     ("root", "body", "message"),
     [
-        ("", "<text>a</text>", "no path that can be refined: <text>"),
-        ("", '<rect width="40" height="30" fill="red"/><text>a</text>', "no path that can be refined"),
+        ("", "<text>a</text>", "contains no path to refine: <text>"),
+        ("", '<rect width="40" height="30" fill="red"/><text>a</text>', "contains no path to refine"),
         ("", f"<style>text + text{{fill:red}}</style>{TEXT}", "'text \\+ text'"),
         ("", f"<style>path:first-child{{x:y}}</style>{TEXT}", "first-child"),
         ('filter="url(#f)"', TEXT, "filter"),

@@ -67,7 +67,7 @@ REFUSED = {f'{HEAD}width="40" height="30">{body}</svg>': cause for body, cause i
     "hello": "cannot be rendered",
     HEAD + 'width="40" height="30"/>': "draws no",
     f'{HEAD}width="40" height="40">{PATH}': "proportions",
-    f'{HEAD}width="40" height="30" viewBox="1e308 0 1 5">{PATH}': "viewBox lies farther",
+    f'{HEAD}width="40" height="30" viewBox="1e308 0 1 5">{PATH}': "viewBox is too far",
     f'{HEAD}width="nan" height="nan">{PATH}': "neither its size",
     f'{HEAD}width="a" height="b" viewBox="nan nan nan nan">{PATH}': "neither its size",
     f"{HEAD}>{PATH}": "neither its size",

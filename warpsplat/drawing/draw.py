@@ -62,7 +62,7 @@ def draw_pixels(problem: Problem, run: Run) -> Fit:
 
 
 def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:
-    """Return a drawing; of an image of few rows or columns, another one if that shows more."""
+    """Return the drawing or, for an image of few rows or columns, a better one if there is one."""
     across, down = margins(problem.target, THIN_SIDE)
     if not (across or down):
         return made

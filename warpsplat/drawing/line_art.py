@@ -35,7 +35,7 @@ FILLED_END, FIT_END = 0.4, 0.9
 """Shares of the progress at which filled areas, and the refinement of strokes, are done."""
 
 THIN_STROKE = 1.0
-"""Width below which a stroke keeps it [px]: the least of a fit."""
+"""Strokes thinner than this [px] keep their width: it is the minimum of a fit."""
 
 STROKE_PIXELS = 1_000_000
 """Largest image size of the refinement [pixels]."""
@@ -44,7 +44,7 @@ STROKE_PIXELS = 1_000_000
 def draw_lines(problem: Problem, run: Run) -> Fit:
     """Trace line art as strokes, and refine them against its ink.
 
-    What a pen draws is a layer, ``pen-1-rrggbb`` of the one that is used most: its filled areas, if the
+    Each pen gets a layer, ``pen-1-rrggbb`` for the most used one: its filled areas, if the
     settings are mixed, and strokes ordered to minimise pen-up travel.
 
     Raises:
@@ -126,7 +126,7 @@ def _paper(ink: Ink) -> FloatArray:
 def inked(ink: Ink, traced: Scene) -> FloatArray:
     """Return the ideal picture of the strokes, even ink on even paper, shape (height, width, 3).
 
-    So nothing but the position of the ink pulls at them.
+    Only the position of the ink then influences the strokes.
     """
     color = _nearest_colors(traced, ink) if traced.layer.max() > 0 else traced.colors[:1]
     paper = _paper(ink)

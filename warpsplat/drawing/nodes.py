@@ -109,7 +109,7 @@ class Outlines:
         self._is_smooth: list[bool] = (drawing.joints == Joint.SMOOTH).tolist()
 
     def edits(self, refused: Set[Key] = frozenset()) -> list[Edit]:
-        """Return all candidates but the ``refused`` ones, which become more with every round."""
+        """Return all candidates except the ``refused`` ones, whose number grows with each round."""
 
         def is_open(kind: str, point: int) -> bool:
             return key_of(kind, self._at(point)) not in refused

@@ -29,7 +29,7 @@ TIDY_ROUNDS, FEWEST_ROUNDS = 16, 4
 """Most rounds in which edits are tried, and how many are left of these for large images."""
 
 ROUND_PIXELS = 26_000_000
-"""Most pixels evaluated by all rounds together: of a large image each takes long, and the first find most."""
+"""Most pixels evaluated by all rounds together: on a large image each takes long, and the first find most."""
 
 REFIT = Refinement(steps=50, point_rate=0.1)
 """Refinement after each round."""

@@ -18,7 +18,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.scene import Scene
 
 EARLIER, LAST = 0.75, 1.25
-"""Steps of an earlier level's fit and of the last one's, over those of a fit without levels: the last one has
+"""Steps for an earlier level and for the last one, relative to a fit without levels: the last one has
 to move the shapes of all."""
 
 

@@ -11,7 +11,7 @@ from warpsplat.files.output import SVG_ENDINGS, svg_bytes, write_result
 from warpsplat.svg.viewer import draw_pdf, draw_png
 
 PICTURE_ENDINGS = (".png", ".pdf")
-"""Endings of an SVG's pictures: pixels as a viewer shows it, and the same shapes for printers."""
+"""Endings of results other than SVG: a PNG as a viewer shows it, and a PDF of its paths."""
 
 ENDINGS = (*SVG_ENDINGS, *PICTURE_ENDINGS)
 """Endings of results."""

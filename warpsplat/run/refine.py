@@ -216,7 +216,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
         raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")
     alike = likeness(given, read)
     if alike < MIN_ALIKE:
-        raise ImageError(f"shows something that is not supported ({alike:.1f} dB from what could be read)")
+        raise ImageError(f"contains something that is not supported ({alike:.1f} dB from what could be read)")
 
 
 def likeness(one: Image.Image, other: Image.Image) -> float:

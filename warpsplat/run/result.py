@@ -100,7 +100,7 @@ class Result:
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
             "estimated_psnr": round(self.estimated_psnr, 3),
             "shapes": shapes,
-            "curves": shapes,  # what it was called at first
+            "curves": shapes,  # an older name, kept for scripts
             "iterations": self.iterations,
             "seconds": round(self.seconds, 2),
             "stopped": self.stopped,

@@ -38,7 +38,7 @@ def recorded(run: Run, history: list[Progress]) -> Run:
 
 
 def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
-    """Report that the training is done, where the last report could not know."""
+    """Report the end of the training, unless the last report already did."""
     if history and history[-1].work < 1 and not made.interrupted:
         scene = made.scene
         snapshot = Snapshot(lambda: scene, lambda: render(scene, backend=run.backend))

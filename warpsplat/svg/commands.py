@@ -55,7 +55,7 @@ def minus(a: Pair, b: Pair) -> Pair:
 
 
 def row(numbers: Sequence[int], separated: bool) -> str:
-    """Return numbers with the fewest separators; ``separated``: also from what stands before."""
+    """Return numbers with the fewest separators; ``separated``: also before the first."""
     text = " ".join(map(str, numbers)).replace(" -", "-")  # a sign separates
     return f" {text}" if separated and numbers[0] >= 0 else text
 

@@ -269,7 +269,7 @@ class StyleSheet:
         text = sum(map(len, element.attrib.values())) // CHARACTERS
         self._work += sum(1 + text * one.reads_attributes + depth * (len(one.compounds) - 1) for one in asked)
         if self._work > MAX_WORK:
-            raise ImageError("has a style sheet of too many rules for its elements")
+            raise ImageError("has too many style rules for its number of elements")
         matching = [rule for rule in asked if rule.matches(element, parents, self._classes_of)]
         self._work += DECLARATION_WORK * len(matching)
         return [d for rule in sorted(matching, key=lambda rule: rule.order) for d in rule.declarations]

@@ -25,7 +25,7 @@ ENTITY = re.compile(r"&([^&;\s]+);")
 
 STYLE_OF_ROOTS = re.compile(r"(?<![\w-])(?:x|y|width|height|overflow)\s*:[^;\"']*;?")
 OF_ROOTS = frozenset({"x", "y", "width", "height", "version", "baseProfile", "overflow"})
-"""Style properties and attributes that mean something else once the root is an inner element."""
+"""Style properties and attributes that change their meaning when the root becomes an inner element."""
 
 RELATIVE = re.compile(r"[+~](?!=)|:(?!hover|active|focus|visited|link)")
 """Selectors that depend on siblings, which may be missing in an excerpt."""

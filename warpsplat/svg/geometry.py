@@ -149,7 +149,7 @@ def view_box_map(attributes: Mapping[str, str], width: float, height: float) -> 
     with np.errstate(all="ignore"):
         view[:2, 2] = shift - fit * (x, y)
         if not np.isfinite(view).all():
-            raise ImageError("its viewBox lies farther than can be drawn")
+            raise ImageError("its viewBox is too far from the origin to be drawn")
     return view
 
 

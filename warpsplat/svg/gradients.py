@@ -50,7 +50,7 @@ Colouring = FlatColor | Gradient
 
 GRADIENTS = {"linearGradient", "radialGradient"}
 BLACK = FlatColor((0.0, 0.0, 0.0))
-"""The paint in place of an invalid colour, the only one that viewers agree on."""
+"""Paint for an invalid colour: the only fallback that viewers agree on."""
 
 LINK = re.compile(r"""url\(\s*(["']?)\s*#?""")
 ENDS = {quote: re.compile(rf"{quote}\s*\)") for quote in ("", "'", '"')}

@@ -153,7 +153,7 @@ def inspect_svg(text: str) -> SvgFacts:
         nonlocal longest
         longest = max(longest, len(value or ""))
         if "&" in (value or "") or longest * references > MAX_EXPANSION:
-            raise ImageError(f"the entity {name[:40]!r} multiplies; such SVGs are not read")
+            raise ImageError(f"the entity {name[:40]!r} expands to too much text, so the SVG is refused")
 
     data = text.encode("utf-8", "surrogatepass")
     if len(data) > MAX_BYTES:

@@ -45,7 +45,7 @@ class Keeping:
         return Kept(element, str(error), blends)
 
     def isolates(self, group: Element) -> bool:
-        """Return whether a group's content blends with nothing below the group; clips aside."""
+        """Return whether a group isolates its content from what lies below it, clips not considered."""
         return self._isolates or "isolation" in group.get("style", "")
 
     def inside(self, parts: list[Part], clip: Points | None) -> list[Part]:

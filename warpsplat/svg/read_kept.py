@@ -65,7 +65,7 @@ def load_kept(text: str, width: int, height: int, name: str, *, background_apart
         scene, has_background = scene_of(shapes, width, height, background_apart)
         if (scene.paint == Paint.PICTURE).all():
             causes = f": {_in_words(kept)}" if kept else ""
-            raise ImageError(f"has no path that can be refined{causes}")
+            raise ImageError(f"contains no path to refine{causes}")
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
     numbers = {element: number for number, element in enumerate(document.root.iter())}
@@ -113,7 +113,9 @@ def _with_pictures(
     shared = excerpts.style(scope) + (f"<defs>{definitions}</defs>" if definitions else "")
     runs = [list(run) for _, run in groupby(parts, lambda part: isinstance(part, Kept))]
     if sum(isinstance(run[0], Kept) for run in runs) > MAX_PICTURES:
-        raise ImageError(f"has what no path can show in more than {MAX_PICTURES} places between paths")
+        raise ImageError(
+            f"contains elements other than paths in more than {MAX_PICTURES} places between paths"
+        )
     shapes: list[Shape] = []
     is_first = True
     for run in runs:
@@ -132,7 +134,7 @@ def _with_pictures(
 def _drawn(markup: str, size: tuple[float, float], extent: tuple[int, int], *, blends: bool) -> FloatArray:
     """Render markup: premultiplied sRGB and opacity, shape (height, width, 4).
 
-    If it ``blends``, these are the paint and opacity that fit what it makes of black and of white.
+    If it ``blends``, colour and opacity are computed from its renders on black and on white.
     """
     head = f'<svg xmlns="{NAMESPACE}" width="{extent[0]}" height="{extent[1]}" preserveAspectRatio="none"'
     head += f' viewBox="0 0 {size[0]:.9g} {size[1]:.9g}">'

@@ -328,7 +328,7 @@ class _Walk:
         parts = self._shapes[end.first :]
         self._work += len(parts) + (len(parts) ** 2 // PAIRS if end.opacity < 1 else 0)
         if self._work > MAX_WORK:
-            raise ImageError("has too many shapes in too many groups, one in the other, that clip or fade")
+            raise ImageError("has too many shapes in nested groups with clips or opacity")
         if self._keep:
             parts = self._keep.inside(parts, end.clip)
         elif end.clip is not None:
@@ -349,7 +349,7 @@ class _Walk:
         if style["background"] != "none":
             color = parse_color(style["background"])
             if color is None:
-                raise ImageError("uses a background that is no colour, not supported")
+                raise ImageError("uses a background other than a colour, which is not supported")
         if color is None or color[1] == 0:
             return
         box = view_box(self._document.root.attrib)

@@ -138,7 +138,7 @@ LIMIT_SIGNALS = (9, 24)
 
 
 def _shown_pixels(text: str, width: int | None, height: int | None, zoom: float | None) -> float:
-    """Return the number of pixels that ``draw_png`` draws; 0 if that is unknown before.
+    """Return the number of pixels that ``draw_png`` draws; 0 if it is not known before rendering.
 
     Raises:
         ImageError: Not an SVG, or more than ``MAX_PIXELS``.

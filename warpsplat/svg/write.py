@@ -203,7 +203,7 @@ APART = 1.0
 
 
 def _joined(scene: Scene, shapes: list[int], paths: list[PathElement]) -> list[PathElement]:
-    """Return the paths with adjacent fitted fills of the same attributes that lie apart joined into one.
+    """Join adjacent fitted fills into one path if their attributes are equal and they do not touch.
 
     Those of drawings, where a path is a region, stay.
     """

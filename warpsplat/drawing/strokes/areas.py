@@ -61,7 +61,7 @@ def _inner(inside: Bools) -> Bools:
 def split_areas(ink: Ink) -> tuple[Ink, Areas | None]:
     """Return ink without its filled areas, and these; None where there are none.
 
-    An area is somewhere much broader than the lines and nowhere as narrow, except at corners and tips.
+    An area is much broader than the lines in one place, and only at corners and tips as narrow.
     """
     width = min(pen_width(ink.mask), 2 * max(LINE, LINE_SHARE * max(ink.mask.shape)))
     away = depth(ink.mask).astype(np.float64)
@@ -116,7 +116,7 @@ def _tips(rest: Bools, away: Floats, reach: float) -> Bools:
 
 
 def is_beside(points: Floats, widths: Floats, away: Floats) -> bool:
-    """Return whether a line leaves the areas by no more than its width: it is what is left of a corner.
+    """Return whether a line leaves the areas by no more than its width: it is the rest of a corner.
 
     Args:
         points: Shape (point, 2) [px].

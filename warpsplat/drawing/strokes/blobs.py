@@ -31,7 +31,7 @@ def hollowed(ink: Ink) -> tuple[Ink, list[Floats], float]:
     """
     width = max(pen_width(ink.mask), FILLING)
     away = depth(ink.mask)
-    # Not along the lines that an area goes over into.
+    # Not along lines that an area continues as.
     core = (away > BROAD * width).astype(np.uint8)
     side = 2 * round(BROAD * width) + 1
     near_core = cv2.dilate(core, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))) > 0

@@ -25,7 +25,7 @@ class Edge:
     """Pixels between two nodes."""
 
     points: Floats
-    """Places [px of the skeleton], with the nodes', shape (point, 2); of a ring the last is the first."""
+    """Places [px of the skeleton], with the nodes', shape (point, 2); in a ring the last is the first."""
     nodes: tuple[int, int]
     """Where it begins and ends; a ring has a node of its own."""
 
@@ -118,7 +118,7 @@ def _graph(thin: Bools, radii: Floats) -> Graph:
 
 
 def _merged(places: Floats, radii: Floats, owners: Ints, count: int) -> tuple[Floats, Floats]:
-    """Return the mean place and the largest radius of each of ``count`` nodes, of what they are made of."""
+    """Return the mean place and the largest radius of each of ``count`` nodes, from its pixels."""
     sizes = np.maximum(np.bincount(owners, minlength=count), 1)
     means = np.stack([np.bincount(owners, places[:, axis], count) / sizes for axis in (0, 1)], axis=1)
     largest = np.zeros(count)

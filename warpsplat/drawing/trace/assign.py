@@ -96,7 +96,7 @@ def without_specks(image: Floats, painted: Ints, fills: Floats, noise: float) ->
             mixed = np.bincount(owner, visible == 0, len(sizes))
             gone |= (mixed >= MOSTLY * sizes)[owner] & (visible == 0)
         rows, columns, label = rows[gone], columns[gone], mixtures.label[gone]
-        # A pixel that is not mixed at all is no accident, though the region of its colour is beyond a line.
+        # A pixel of a pure colour is intended, even if the region of that colour lies beyond a line.
         off = np.abs(image[rows, columns] - fills[rows, columns]).max(axis=1)
         own = (label == painted[rows, columns]) & (off <= MIXED + noise)
         painted[rows, columns], fills[rows, columns] = label, mixtures.color[gone]

@@ -160,7 +160,7 @@ def _sorted(siblings: list[int], votes: dict[int, dict[int, int]], sizes: Ints, 
     above_minus_below = np.maximum(above - above.T, 0)
     left, result = list(range(len(by_size))), []
     while left:
-        # The next one has the fewest of the others below it.
+        # Next comes the region with the fewest remaining regions below it.
         sums = above_minus_below[np.ix_(left, left)].sum(axis=1)
         result.append(by_size[left.pop(int(np.argmin(sums)))])
     return result

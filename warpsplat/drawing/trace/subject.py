@@ -27,7 +27,7 @@ class Guess:
 
 TINY_PIXELS = 64
 TINY_SIDE, TINY_SIDE_PIXELS = 2, 1024
-"""Pixels, or rows or columns and their pixels, up to which an image is pixel art rather than a photograph."""
+"""Largest side and number of pixels at which an image counts as pixel art."""
 
 
 def guess_subject(image: FloatArray) -> Guess:
