@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -91,7 +90,7 @@ class Noting(RunHook):
 
 def test_a_hook(found: dict[str, Extension]) -> None:
     found.clear()
-    found["own"] = replace(Extension(), run_hooks=("tests.test_extensions:Noting",))
+    found["own"] = Extension(run_hooks=("tests.test_extensions:Noting",))
 
     @click.command()
     @hook_options("vectorize")

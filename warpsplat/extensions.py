@@ -9,7 +9,6 @@ import functools
 import importlib
 import importlib.util
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,18 +24,17 @@ class Command(NamedTuple):
     """The click command, as "module:attribute"."""
 
 
-@dataclass(frozen=True)
-class Extension:
+class Extension(NamedTuple):
     """Everything that a folder adds to the core, by name."""
 
-    commands: Mapping[str, Command] = field(default_factory=dict)
-    renderers: Mapping[str, str] = field(default_factory=dict)
+    commands: Mapping[str, Command] = {}
+    renderers: Mapping[str, str] = {}
     """Instances of ``fit.renderers.FitRenderer``, by the name that ``--renderer`` has for them."""
     run_hooks: tuple[str, ...] = ()
     """Classes of ``cli.hooks.RunHook``, which add options to ``vectorize``, ``refine`` and ``eval``."""
-    provides: Mapping[str, str] = field(default_factory=dict)
+    provides: Mapping[str, str] = {}
     """Functions that the core asks for by name."""
-    api: Mapping[str, str] = field(default_factory=dict)
+    api: Mapping[str, str] = {}
     """Names that ``warpsplat`` offers -> the modules they are in."""
     requires: tuple[str, ...] = ()
     """Extensions without which this one is left out."""

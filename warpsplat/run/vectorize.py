@@ -20,9 +20,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
+from warpsplat.fit.export import finished
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback, Progress
@@ -37,17 +40,12 @@ from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
 from warpsplat.run.tracking import recorded, report_end, timed
 from warpsplat.run.typed import Options
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-
-import numpy as np
-
-from warpsplat.fit.export import finished
 from warpsplat.scene import Scene
 from warpsplat.scene.geometry import areas
 from warpsplat.svg.page import placed
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 @takes(Options)

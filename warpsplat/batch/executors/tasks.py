@@ -22,7 +22,7 @@ class Task:
     number: int
     """Identifies the task: its outcome has the same number."""
     key: str
-    """Key of the result, see ``run.keys.job_key``."""
+    """Key of the result, see ``run.result.job_key``."""
     image: bytes = field(repr=False)
     name: str
     """Name of the image in messages."""
