@@ -27,7 +27,6 @@ from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.run import memory
 from warpsplat.run.memory import factor_for, mask_factor, memory_limit, need
-from warpsplat.scene import Kind
 
 HUGE = ImageFacts(12_000, 9_000, 3, 4, drafts=True)
 QUICK = {"iterations": 2, "curves": 4, "subject": "photo", "device": "cpu"}
@@ -60,21 +59,18 @@ def bare(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_need_grows_with_all_that_takes_memory() -> None:
-    base = need(HUGE, Settings()).most
+    base = need(HUGE, Settings())
     assert 2 << 30 < base < 4e9
-    assert need(HUGE, Settings(), 2).most < base / 1.5
+    assert need(HUGE, Settings(), 2) < base / 1.5 < base < need(replace(HUGE, kept=6), Settings())
     small = ImageFacts(1200, 900, 3, 4, drafts=False)
-    plain = need(small, Settings()).working
     for more in (
         {"curves": 8000},
-        {"kind": Kind.STROKE},
+        {"open": True},
         {"paint": "auto"},
-        {"levels": "8,64,512"},
+        {"levels": "8,512"},
         {"subject": "line"},
     ):
-        assert need(small, make_settings(**more)).working > plain, more
-    progressive = replace(small, kept=6)
-    assert need(progressive, Settings()).reading > need(small, Settings()).reading
+        assert need(small, make_settings(**more)) > need(small, Settings()), more
 
 
 def test_the_size_is_the_largest_within_the_limit() -> None:
@@ -82,21 +78,17 @@ def test_the_size_is_the_largest_within_the_limit() -> None:
         settings = make_settings(max_memory=limit)
         factor = factor_for(HUGE, settings, "huge.jpg")
         most = settings.max_memory
-        assert most and memory_limit(settings) == most and need(HUGE, settings, factor).most <= most
-        assert factor == 1 or need(HUGE, settings, factor // 2).most > most
+        assert most and memory_limit(settings) == most and need(HUGE, settings, factor) <= most
+        assert factor == 1 or need(HUGE, settings, factor // 2) > most
     with pytest.raises(ResourceError, match=r"^huge\.jpg: at least \d+ MB are needed, max-memory is 1 MB$"):
         factor_for(HUGE, make_settings(max_memory="1MB"), "huge.jpg")
 
 
 def test_without_a_limit_it_is_the_machines(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "machine_memory", lambda: 10**9)
-    assert memory_limit(Settings()) == 9 * 10**8
-    assert factor_for(HUGE, Settings(), "huge.jpg") > 1
-    monkeypatch.setattr(memory._Process, "sharers", 1)
-    memory.share_machine(3)
-    assert memory_limit(Settings()) == 3 * 10**8
-    monkeypatch.setattr(memory, "machine_memory", lambda: None)
-    assert memory_limit(Settings()) is None
+    for found, processes, limit in ((10**9, 1, 9 * 10**8), (10**9, 3, 3 * 10**8), (None, 1, None)):
+        monkeypatch.setattr(memory, "machine_memory", lambda found=found: found)
+        monkeypatch.setattr(memory.Sharing, "processes", processes)
+        assert memory_limit(Settings()) == limit
     assert factor_for(HUGE, Settings(), "huge.jpg") == 1
 
 
@@ -172,7 +164,7 @@ def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
     data = encoded(pixels(mode))
     facts = image_facts(data)
     assert facts
-    limit = need(facts, make_settings(curves=4)).most - 1
+    limit = need(facts, make_settings(curves=4)) - 1
     monkeypatch.setattr("warpsplat.run.reduction.whole_score", lambda *_: limit + (not whole))
     output = tmp_path / "out.svg"
     made = warpsplat.vectorize(data, **QUICK, max_memory=limit, output=output, name="big.png")
@@ -198,8 +190,7 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.Mo
     assert facts and of_mask
     settings = make_settings(curves=4)
     whole = need(facts, settings, mask=of_mask)
-    assert whole.most > need(facts, settings).most
-    assert whole.reading > 16 * WIDTH * HEIGHT
+    assert whole > need(facts, settings)
     sizes: list[tuple[int, ...]] = []
     usual = load_importance
 
@@ -209,10 +200,10 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image(monkeypatch: pytest.Mo
         return found
 
     monkeypatch.setattr("warpsplat.run.prepare.load_importance", noted)
-    made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most - 1, name="big.png")
+    made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole - 1, name="big.png")
     assert sizes == [(25, 33)]
     assert "processed at 33x25" in made.reduced
-    warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole.most)
+    warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=whole)
     assert sizes[1:] == [(HEIGHT, WIDTH)]
 
 

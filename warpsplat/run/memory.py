@@ -7,7 +7,7 @@ beside the image: reading it, fitting or tracing, and measuring the file.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from PIL import Image
@@ -70,43 +70,24 @@ LEAST_REDUCED_SIDE = 32
 """Least side of a reduced image [px]."""
 
 
-@dataclass(frozen=True)
-class MemoryNeed:
-    """Memory that a run at one size needs [bytes]."""
+def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None) -> int:
+    """Estimate the peak of a run [bytes] from above: for photographs within a quarter.
 
-    reading: int
-    working: int
-    """For fitting or tracing."""
-    scoring: int
-
-    @property
-    def most(self) -> int:
-        """The peak."""
-        return PROGRAM + max(self.reading, self.working, self.scoring)
-
-
-def need(
-    facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None
-) -> MemoryNeed:
-    """Estimate the memory of a run from above: within a quarter for photographs, more roughly for drawings.
-
-    ``factor``: how many times smaller the image is read, in each direction.
+    ``factor``: how many times smaller the image is read, in each direction; ``mask``: facts of a mask.
     """
     pixels = facts.width * facts.height
     worked = pixels / factor**2
-    image = 4 * facts.channels * worked
     drafted = min(factor, 8) ** 2 if facts.drafts else 1
-    reading = image + facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
-    working = image + (
-        TRACED[settings.subject] * worked if settings.subject in TRACED else _fitting(facts, settings, factor)
-    )
-    scoring = image + _scoring(facts, settings, worked)
+    reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
+    traced = TRACED.get(settings.subject)
+    working = traced * worked if traced else _fitting(facts, settings, factor)
+    scoring = _scoring(facts, settings, worked)
     if mask:  # which is read beside the image, and held
         masked = mask.width * mask.height / mask_factor(facts, mask, factor) ** 2
         whole = (mask.decoded + mask.kept) * mask.width * mask.height
-        reading = max(reading, image + whole + (MASK_READ + MASK) * masked + STRIPS)
+        reading = max(reading, whole + (MASK_READ + MASK) * masked + STRIPS)
         working, scoring = working + MASK * masked, scoring + MASK * masked
-    return MemoryNeed(*(round(x) for x in (reading, working, scoring)))
+    return round(PROGRAM + 4 * facts.channels * worked + max(reading, working, scoring))
 
 
 def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
@@ -157,16 +138,22 @@ def whole_score(facts: ImageFacts, settings: Settings, factor: int) -> int:
     return round(PROGRAM + held + _scoring(facts, settings, pixels))
 
 
-def facts_of(source: ImageSource) -> ImageFacts | None:
-    """Return the facts of an image file's bytes, a Pillow image or an array; None if they are unknown."""
+def facts_of(source: ImageSource, background: str = "auto") -> ImageFacts | None:
+    """Return the facts of an image file's bytes, a Pillow image or an array; None for what cannot be read.
+
+    ``background``: as in the settings, which decides whether the image has opacity.
+    """
+    facts = None
     if isinstance(source, bytes):
-        return image_facts(source)
-    if isinstance(source, np.ndarray) and source.ndim in {2, 3}:
-        channels = source.shape[2] if source.ndim == 3 else 1
-        return ImageFacts(source.shape[1], source.shape[0], 4 if channels in {2, 4} else 3, 12, drafts=False)
-    if isinstance(source, Image.Image):
-        return ImageFacts(source.width, source.height, 4, 4, drafts=False)
-    return None
+        facts = image_facts(source)
+    elif isinstance(source, np.ndarray) and source.ndim in {2, 3}:
+        channels = 4 if source.ndim == 3 and source.shape[2] in {2, 4} else 3
+        facts = ImageFacts(source.shape[1], source.shape[0], channels, 12, drafts=False)
+    elif isinstance(source, Image.Image):
+        facts = ImageFacts(source.width, source.height, 4, 4, drafts=False)
+    if facts and background != "auto":
+        facts = replace(facts, channels=4 if background == "none" else 3)
+    return facts
 
 
 def memory_limit(settings: Settings) -> int | None:
@@ -174,19 +161,13 @@ def memory_limit(settings: Settings) -> int | None:
     if settings.max_memory:
         return settings.max_memory
     found = machine_memory()
-    return None if found is None else round(SHARE * found / _Process.sharers)
+    return None if found is None else round(SHARE * found / Sharing.processes)
 
 
-class _Process:
-    """State of this process."""
-
-    sharers = 1
+class Sharing:
     """Number of processes that vectorize images on this machine at the same time."""
 
-
-def share_machine(processes: int) -> None:
-    """Set the number of processes that vectorize images on this machine at the same time."""
-    _Process.sharers = processes
+    processes = 1
 
 
 def limit_words(settings: Settings, limit: int) -> str:
@@ -195,18 +176,15 @@ def limit_words(settings: Settings, limit: int) -> str:
 
 
 def factor_for(
-    facts: ImageFacts, settings: Settings, name: str, least: int = 1, mask: ImageFacts | None = None
+    facts: ImageFacts | None, settings: Settings, name: str, mask: ImageFacts | None = None, least: int = 1
 ) -> int:
-    """Return how many times an image has to be reduced: a power of two, at least ``least``.
-
-    Other arguments are those of ``need``.
+    """Return how many times an image has to be reduced: a power of two, at least ``least``; see ``need``.
 
     Raises:
         ResourceError: the limit is too small for any size; the message begins with ``name``.
     """
-    limit = memory_limit(settings)
-    factor = least
-    while limit is not None and (wanted := need(facts, settings, factor, mask).most) > limit:
+    limit, factor = memory_limit(settings), least
+    while facts and limit is not None and (wanted := need(facts, settings, factor, mask)) > limit:
         factor *= 2
         if min(facts.width, facts.height) < LEAST_REDUCED_SIDE * factor:
             needed = f"at least {in_words(wanted)} are needed"
@@ -218,7 +196,7 @@ def need_refined(facts: ImageFacts, settings: Settings) -> int:
     """Return the bytes of refining an SVG of as many shapes as usual."""
     pixels = facts.width * facts.height
     cleared = PROGRAM + CLEARED * pixels if facts.channels == 4 else 0
-    return max(need(facts, settings).most + REFINED * pixels, cleared)
+    return max(need(facts, settings) + REFINED * pixels, cleared)
 
 
 def check_refined(source: ImageSource, settings: Settings, name: str) -> None:

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
+from warpsplat.files.image import boxed
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, make_settings, solid_color
 from warpsplat.native import release_memory
-from warpsplat.run.reduction import Memory, Reduction
+from warpsplat.run.memory import factor_for, facts_of, mask_factor
+from warpsplat.run.reduction import Reduction, reduction_for
 from warpsplat.run.result import job_key
 from warpsplat.scene import FloatArray, Kind, Scene
 
@@ -60,17 +62,21 @@ def prepare(
         assert isinstance(source, bytes), "pixels have no key"
         assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    memory = Memory.of(source, settings, importance)
-    factor = memory.factor(name, settings)
-    target = load_target(source, name, settings.background, factor)
+    facts = facts_of(source, settings.background)
+    mask_facts = None if importance is None else facts_of(importance)
+    first = factor_for(facts, settings, name, mask_facts)
+    target = load_target(source, name, settings.background, first)
     chosen, why = choose_subject(target, settings)
-    target, factor = memory.smaller(target, name, chosen, factor)
+    factor = factor_for(facts, chosen, name, mask_facts, first)
+    if factor > first:
+        target = boxed(target, factor // first)
     release_memory()
-    reduction = memory.reduction(factor, target, chosen)
+    reduction = reduction_for(source, facts, mask_facts, target, chosen, factor)
     prepared = PreparedImage(Problem(target, chosen, metadata=key), why, reduction, name)
     if importance is None:
         return prepared
-    mask = load_importance(importance, *prepared.size, mask_name, memory.mask_factor(factor))
+    mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1
+    mask = load_importance(importance, *prepared.size, mask_name, mask_reduced)
     return replace(prepared, problem=replace(prepared.problem, importance=mask))
 
 

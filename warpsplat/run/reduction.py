@@ -6,22 +6,14 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from warpsplat.files.image import ImageFacts, boxed, load_rows
+from warpsplat.files.image import ImageFacts, load_rows
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.options import limits_of
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import Rows, Score, score_svg
 from warpsplat.rendering.memory import in_words
-from warpsplat.run.memory import (
-    factor_for,
-    facts_of,
-    limit_words,
-    mask_factor,
-    memory_limit,
-    need,
-    whole_score,
-)
+from warpsplat.run.memory import limit_words, memory_limit, need, whole_score
 from warpsplat.scene import FloatArray
 from warpsplat.scene.geometry import enlarged
 from warpsplat.svg.write import resized
@@ -67,53 +59,22 @@ class Reduction:
         return f"{self.why}: processed at {small}, measured at {'full' if self.whole else 'that'} size"
 
 
-@dataclass(frozen=True)
-class Memory:
-    """Facts of an image before it is read, and how much it has to be reduced."""
-
-    facts: ImageFacts | None
-    """None if they are unknown: then the image is not reduced."""
-    source: ImageSource
-    mask: ImageFacts | None = None
-    """Facts of the mask, if there is one."""
-
-    @staticmethod
-    def of(source: ImageSource, settings: Settings, importance: ImageSource | None = None) -> Memory:
-        """Inspect ``source`` and the mask: bytes of a file, a Pillow image or an array."""
-        facts = facts_of(source)
-        if facts:
-            channels = {"none": 4, "auto": facts.channels}.get(settings.background, 3)
-            facts = replace(facts, channels=channels)
-        return Memory(facts, source, None if importance is None else facts_of(importance))
-
-    def factor(self, name: str, settings: Settings, least: int = 1) -> int:
-        """Return how many times the image has to be reduced with ``settings``; at least ``least``.
-
-        Raises:
-            ResourceError: there is too little memory at any size; the message begins with ``name``.
-        """
-        return factor_for(self.facts, settings, name, least, self.mask) if self.facts else 1
-
-    def mask_factor(self, factor: int) -> int:
-        """Return how many times smaller to read the mask of an image that is reduced ``factor`` times."""
-        return mask_factor(self.facts, self.mask, factor) if self.facts and self.mask else 1
-
-    def smaller(
-        self, target: FloatArray, name: str, settings: Settings, factor: int
-    ) -> tuple[FloatArray, int]:
-        """Reduce ``target``, read ``factor`` times smaller, further if need be; return its factor too."""
-        wanted = self.factor(name, settings, factor)
-        return (target if wanted == factor else boxed(target, wanted // factor)), wanted
-
-    def reduction(self, factor: int, target: FloatArray, settings: Settings) -> Reduction | None:
-        """Return the reduction to ``target``; None if that has the image's own size."""
-        facts, source, limit = self.facts, self.source, memory_limit(settings)
-        if facts is None or factor == 1 or limit is None:
-            return None
-        paper, channels = solid_color(settings.background), target.shape[2]
-        whole = None
-        if isinstance(source, bytes) and not facts.deep and whole_score(facts, settings, factor) <= limit:
-            whole = functools.partial(load_rows, source, paper, channels)
-        takes = in_words(need(facts, settings, mask=self.mask).most)
-        why = f"{facts.width}x{facts.height} pixels take about {takes}, {limit_words(settings, limit)}"
-        return Reduction(factor, facts.width, facts.height, whole, why)
+def reduction_for(
+    source: ImageSource,
+    facts: ImageFacts | None,
+    mask: ImageFacts | None,
+    target: FloatArray,
+    settings: Settings,
+    factor: int,
+) -> Reduction | None:
+    """Return the reduction of ``source`` to ``target``; None if that has the image's own size."""
+    limit = memory_limit(settings)
+    if facts is None or factor == 1 or limit is None:
+        return None
+    whole = None
+    if isinstance(source, bytes) and not facts.deep and whole_score(facts, settings, factor) <= limit:
+        paper = solid_color(settings.background)
+        whole = functools.partial(load_rows, source, paper, target.shape[2])
+    takes = in_words(need(facts, settings, mask=mask))
+    why = f"{facts.width}x{facts.height} pixels take about {takes}, {limit_words(settings, limit)}"
+    return Reduction(factor, facts.width, facts.height, whole, why)
