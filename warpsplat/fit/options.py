@@ -12,20 +12,18 @@ import functools
 import math
 import re
 import types
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 from warpsplat.errors import UsageError, shown
 
-DURATION_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|sec|m|min|h)?", re.IGNORECASE)
+QUANTITY = re.compile(r"(\d+(?:\.\d+)?)\s*([a-z]*)", re.IGNORECASE)
 
-SIZE_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(k|kb|kib|m|mb|mib|g|gb|gib|b)?", re.IGNORECASE)
-
-TIME_UNITS = {"ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
+TIME_UNITS = {"": 1, "ms": 1e-3, "s": 1, "sec": 1, "m": 60, "min": 60, "h": 3600}
 
 SIZE_UNITS = {
-    **{"b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
+    **{"": 1, "b": 1, "k": 1e3, "kb": 1e3, "kib": 1024, "m": 1e6, "mb": 1e6, "mib": 1024**2},
     **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
 }
 
@@ -85,21 +83,13 @@ class Option:
         return {bool: "true or false", dict: "a mapping"}.get(self.type, f"a {self.type.__name__}")
 
     def parsed(self, value: Any) -> Any:
-        """Return a value as users write it as one of the option's type.
-
-        Raises:
-            UsageError: it is not accepted.
-        """
+        """Return a value as users write it in the option's type; raise ``UsageError`` if it is not accepted."""
         value = self.parse(value) if self.parse else value
         self.check(value)
         return value
 
     def check(self, value: Any, prefix: str = "") -> None:
-        """Check the type and range of a value; messages name ``prefix`` and the option.
-
-        Raises:
-            UsageError: it is not accepted.
-        """
+        """Raise ``UsageError``, which names ``prefix`` and the option, unless a value is accepted."""
         if isinstance(value, dict) and self.type is dict:
             number = dataclasses.replace(self, name="", type=float)
             for key, inner in value.items():
@@ -186,35 +176,26 @@ def _is_list(value: object) -> TypeGuard[Iterable[object]]:
 
 
 def parse_duration(value: str | float) -> float:
-    """Return the seconds of ``60``, ``60s``, ``2m`` or ``1.5h``.
-
-    Raises:
-        UsageError: none of these.
-    """
-    found = DURATION_PATTERN.fullmatch(_words(value).strip())
-    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
-        raise UsageError(f"not a time: {shown(value)}; write 60s or 2m")
-    return float(found[1]) * TIME_UNITS[(found[2] or "s").lower()]
+    """Return the seconds of ``60``, ``60s``, ``2m`` or ``1.5h``; raise ``UsageError`` for anything else."""
+    return _quantity(value, TIME_UNITS, "time", "60s or 2m")
 
 
 def parse_bytes(value: str | int) -> int:
-    """Return the bytes of ``100000``, ``100KB`` or ``1MiB``.
+    """Return the bytes of ``100000``, ``100KB`` or ``1MiB``; raise ``UsageError`` for anything else."""
+    return int(_quantity(value, SIZE_UNITS, "size", "100KB, 1MB or 1GB"))
 
-    Raises:
-        UsageError: none of these.
-    """
-    found = SIZE_PATTERN.fullmatch(_words(value).strip())
-    if isinstance(value, bool) or not found or len(found[1]) > MAX_DIGITS:
-        raise UsageError(f"not a size: {shown(value)}; write 100KB, 1MB or 1GB")
-    return int(float(found[1]) * SIZE_UNITS[(found[2] or "b").lower()])
+
+def _quantity(value: object, units: Mapping[str, float], what: str, examples: str) -> float:
+    """Return a number with a unit in the smallest of ``units``."""
+    found = QUANTITY.fullmatch(_words(value).strip())
+    unit = units.get(found[2].lower()) if found else None
+    if found is None or unit is None or len(found[1]) > MAX_DIGITS:
+        raise UsageError(f"not a {what}: {shown(value)}; write {examples}")
+    return float(found[1]) * unit
 
 
 def parse_levels(value: object) -> tuple[int, ...]:
-    """Return the numbers of ``64,256,1024``, or of a list.
-
-    Raises:
-        UsageError: something else.
-    """
+    """Return the numbers of ``64,256,1024``, or of a list; raise ``UsageError`` for anything else."""
     parts = value if _is_list(value) else _words(value).split(",")
     try:
         return tuple(int(str(part)) for part in parts)
@@ -225,8 +206,7 @@ def parse_levels(value: object) -> tuple[int, ...]:
 def parse_palette(value: object) -> tuple[str, ...]:
     """Return ``#f00,#00ff00``, or a list, as ``("#ff0000", "#00ff00")``: each once, in order.
 
-    Raises:
-        UsageError: something else.
+    Raises ``UsageError`` for anything else.
     """
     parts = value if _is_list(value) else re.split(r"[,\s]+", _words(value).strip(", \t\n"))
     colors: dict[str, None] = {}

@@ -79,8 +79,7 @@ def default_rates() -> dict[str, float]:
 def known_keys(name: str, known: Iterable[str], value: object) -> object:
     """Return a mapping with underscores in its keys; anything else as it is, for ``Option.check`` to refuse.
 
-    Raises:
-        UsageError: a key is not ``known``.
+    Raises ``UsageError`` if a key is not ``known``.
     """
     if not isinstance(value, Mapping):
         return value
@@ -106,11 +105,7 @@ def parse_basis(value: object) -> object:
 
 
 def check_fields(settings: Any, prefix: str = "") -> None:
-    """Check types and ranges; messages name ``prefix`` and the option.
-
-    Raises:
-        UsageError: a value is not accepted.
-    """
+    """Check types and ranges; raise ``UsageError``, which names ``prefix`` and the option."""
     for each in options_of(settings.__class__):
         each.check(getattr(settings, each.field), prefix)
 
@@ -134,11 +129,7 @@ class Density:
     replace: float = research(0.1, "Least fraction replaced in each densification step.", FRACTION)
 
     def __post_init__(self) -> None:
-        """Check ranges.
-
-        Raises:
-            UsageError: a value is out of its range.
-        """
+        """Check ranges, see ``check_fields``."""
         check_fields(self, "density ")
 
 
@@ -300,11 +291,7 @@ class Settings:
     )
 
     def __post_init__(self) -> None:
-        """Check types, ranges and contradictions.
-
-        Raises:
-            UsageError: a value is out of its range, or two contradict each other.
-        """
+        """Check types, ranges and contradictions, see ``check_fields``."""
         check_fields(self)
         for is_broken, message in RULES:
             if is_broken(self):
@@ -334,12 +321,10 @@ class Settings:
         return names
 
     def fingerprint(self) -> str:
-        """Return a short hash of all that decides the result."""
-        values = asdict(self)
-        if self.max_memory is None:  # which few runs depend on
-            del values["max_memory"]
-        text = json.dumps(values, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        """Return a short hash of all that decides the result; a new option, not used, does not change it."""
+        default = asdict(Settings())
+        given = {name: value for name, value in asdict(self).items() if value != default[name]}
+        return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:16]
 
 
 RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
@@ -403,11 +388,7 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
 
 
 def expand(given: dict[str, Any]) -> None:
-    """Replace shorthands among the ``given`` options by what they stand for, and add what options require.
-
-    Raises:
-        UsageError: shorthands that contradict each other.
-    """
+    """Replace shorthands among the ``given`` options by what they stand for, and add what options require."""
     closed, is_open = given.pop("closed", None), given.pop("open", None)
     if closed and is_open:
         raise UsageError("closed and open do not go together")
@@ -422,11 +403,7 @@ def expand(given: dict[str, Any]) -> None:
 
 
 def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
-    """Return the defaults that suit the ``given`` options, and all rates.
-
-    Raises:
-        UsageError: an option needs another value of one that is given.
-    """
+    """Return the defaults that suit the ``given`` options, and all rates."""
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     rates = dict(preset.rates)
     renderer = given.get("renderer", "exact")
