@@ -76,7 +76,7 @@ def test_a_spoiled_shape_is_reset(what: str, name: str, where: str) -> None:
     poison(step, name, where)
     step.advance()
     assert recover(step, replaces=False) is step
-    assert step.state.recovered == 1
+    assert step.state.renewed == 1
     assert all_finite(step)
     scene = step.state.scene()
     for attribute in ATTRIBUTES:
@@ -88,7 +88,7 @@ def test_a_spoiled_shape_is_reset(what: str, name: str, where: str) -> None:
     if where == "grad":
         del step.programs[-1].launches[0]
     step.advance()
-    assert recover(step, replaces=False) is step and step.state.recovered == 1, "it is over"
+    assert recover(step, replaces=False) is step and step.state.renewed == 1, "it is over"
     assert all_finite(step)
 
 
@@ -116,7 +116,7 @@ def test_twins_are_reset_together() -> None:
     poison(step, "points", "value")
     step.advance()
     recover(step, replaces=False)
-    assert step.state.recovered == 2
+    assert step.state.renewed == 2
     made = step.state.scene()
     np.testing.assert_array_equal(made.points_of(2), made.points_of(3))
 
@@ -127,7 +127,7 @@ def test_frozen_values_are_checked_in_the_end() -> None:
     poison(step, "opacities", "value")
     step.advance()
     recover(step, replaces=False, last=True)
-    assert all_finite(step) and step.state.recovered >= 1
+    assert all_finite(step) and step.state.renewed >= 1
 
 
 @pytest.mark.parametrize("at", [10, 60, 90, 100])

@@ -6,6 +6,7 @@ sequence: it takes the results of the fits that were finished, and continues the
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -42,16 +43,13 @@ class Checkpoint:
         every: float = SAVE_INTERVAL,
         saved: Content | None = None,
     ) -> None:
-        """Begin a new run, or resume one.
+        """Begin a new run, or resume ``saved``; raise ``CheckpointError`` if that is damaged.
 
         Args:
             name: of the file of ``saved``, for messages.
             write: saves the state of the run.
             every: time between two saves [s].
             saved: state of the run to resume.
-
-        Raises:
-            CheckpointError: ``saved`` is damaged.
         """
         self._name, self._write, self._every = name, write, every
         self._results: list[Content] = []
@@ -70,11 +68,7 @@ class Checkpoint:
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Turn errors about saved content into a ``CheckpointError``.
-
-        Raises:
-            CheckpointError: the content is damaged.
-        """
+        """Turn errors about saved content into a ``CheckpointError``."""
         try:
             yield
         except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
@@ -116,31 +110,13 @@ class Checkpoint:
         self._due = now + max(self._every, LEAST_SAVE_RATIO * (now - began))
 
 
-def whole(numbers: Mapping[str, Any], name: str, low: int, high: int) -> int:
-    """Return a whole number by its name.
-
-    Raises:
-        ValueError: it is missing, of another type, or out of range.
-    """
+def number(
+    numbers: Mapping[str, Any], name: str, kind: type, low: float = -math.inf, high: float = math.inf
+) -> Any:
+    """Return a number of a type by its name; raise ``ValueError`` if it is missing, or out of range."""
     value = numbers.get(name)
-    if type(value) is not int or not low <= value <= high:
-        raise ValueError(f"{name} is no whole number from {low} to {high}")
-    return value
-
-
-def real(numbers: Mapping[str, Any], name: str, low: float, high: float) -> float:
-    """Return a number, see ``whole``."""
-    value = numbers.get(name)
-    if not isinstance(value, (int, float)) or not low <= value <= high:
-        raise ValueError(f"{name} is no number from {low:g} to {high:g}")
-    return float(value)
-
-
-def flag(numbers: Mapping[str, Any], name: str) -> bool:
-    """Return a boolean, see ``whole``."""
-    value = numbers.get(name)
-    if type(value) is not bool:
-        raise ValueError(f"{name} is neither true nor false")
+    if type(value) is not kind or not low <= value <= high:
+        raise ValueError(f"{name} is no {kind.__name__} from {low:g} to {high:g}")
     return value
 
 
@@ -158,8 +134,8 @@ def _split(content: Content) -> tuple[list[Content], Content | None]:
         raise ValueError("fits are no list of tables")
     parts = [Content(numbers, {}) for numbers in fits]
     for name, array in content.arrays.items():
-        number, _, rest = name.partition("/")
-        if not number.isdecimal() or int(number) >= len(parts):
+        index, _, rest = name.partition("/")
+        if not index.isdecimal() or int(index) >= len(parts):
             raise ValueError("an array belongs to no fit")
-        parts[int(number)].arrays[rest] = array
-    return (parts[:-1], parts[-1]) if flag(content.numbers, "under way") and parts else (parts, None)
+        parts[int(index)].arrays[rest] = array
+    return (parts[:-1], parts[-1]) if number(content.numbers, "under way", bool) and parts else (parts, None)

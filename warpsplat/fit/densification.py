@@ -190,7 +190,7 @@ def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:
         return step
     scene = state.scene()
     reset = _with_twins(scene, invalid if invalid.any() else flagged)
-    state.recovered += int(reset.sum())
+    state.renewed += int(reset.sum())
     parameters.reset(reset)
     if state.projection:
         state.projection.project()

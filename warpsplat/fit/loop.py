@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.fit.budget import Budget, affordable
-from warpsplat.fit.checkpoint import Content, real, whole
+from warpsplat.fit.checkpoint import Content, number
 from warpsplat.fit.densification import densify, recover, remove_surplus
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
@@ -284,7 +284,7 @@ class _Training:
             estimated,
             done,
             interrupted=False,
-            renewed=state.recovered,
+            renewed=state.renewed,
         )
 
 
@@ -302,21 +302,21 @@ def work_done(settings: Settings, plan: list[Phase], step: int, begin: int = 0) 
     return (work(step) - work(begin)) / (work(settings.iterations) - work(begin))
 
 
-SAVED_LIMIT = 1_000_000_000
+SAVED_LIMIT = 1e9
 """Largest figure that is read from a checkpoint."""
 
-SAVED_FIGURES = ("per_pixel", "render_psnr", "estimated_psnr")
+SAVED = {"per_pixel": float, "render_psnr": float, "estimated_psnr": float, "iterations": int, "renewed": int}
+"""Figures of a fit that a checkpoint holds."""
 
 
 def _fit_content(made: Fit) -> Content:
     """Return a result as numbers and arrays."""
-    numbers = {name: getattr(made, name) for name in (*SAVED_FIGURES, "iterations", "renewed")}
-    return Content(numbers, to_arrays(made.scene))
+    return Content({name: kind(getattr(made, name)) for name, kind in SAVED.items()}, to_arrays(made.scene))
 
 
 def _fit_from(content: Content, start: Scene) -> Fit:
     """Return the result of a fit that began with ``start``."""
-    figures = {name: real(content.numbers, name, -SAVED_LIMIT, SAVED_LIMIT) for name in SAVED_FIGURES}
-    iterations, renewed = (whole(content.numbers, name, 0, SAVED_LIMIT) for name in ("iterations", "renewed"))
-    scene = from_arrays(content.arrays, start)
-    return Fit(scene, iterations=iterations, interrupted=False, renewed=renewed, **figures)
+    figures = {
+        name: number(content.numbers, name, kind, -SAVED_LIMIT, SAVED_LIMIT) for name, kind in SAVED.items()
+    }
+    return Fit(from_arrays(content.arrays, start), interrupted=False, **figures)

@@ -83,7 +83,7 @@ class Option:
         return {bool: "true or false", dict: "a mapping"}.get(self.type, f"a {self.type.__name__}")
 
     def parsed(self, value: Any) -> Any:
-        """Return a value as users write it in the option's type; raise ``UsageError`` if it is not accepted."""
+        """Return a value as users write it in the option's type; see ``check``."""
         value = self.parse(value) if self.parse else value
         self.check(value)
         return value

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpsplat.fit.checkpoint import Content, flag, real, whole
+from warpsplat.fit.checkpoint import Content, number
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
@@ -17,8 +17,8 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.saved import parameter_arrays, parameters_from
 from warpsplat.rendering.tiles import from_tiles
-from warpsplat.scene import FloatArray, Scene
-from warpsplat.scene.arrays import Array, between, typed
+from warpsplat.scene import Scene
+from warpsplat.scene.arrays import between, typed
 
 SPARE_CAPACITY = 64
 """Largest capacity over what the shapes need: more than any run keeps from times when it had more shapes."""
@@ -40,10 +40,10 @@ def step_content(step: Step) -> Content:
         "step": state.step,
         "began": step.began,
         "curves": step.settings.curves,
-        "per_pixel": state.per_pixel,
+        "per_pixel": float(state.per_pixel),
         "settled": state.opacities_frozen,
         "rounding": state.rounding,
-        "renewed": state.recovered,
+        "renewed": state.renewed,
         "colored": state.colored == state.parameters.revision,
         "generator": state.rng.bit_generator.state,
         "room": [_capacity(renderer) for renderer in step.renderers],
@@ -69,37 +69,42 @@ def step_from(
     The fit began with the scene ``start`` and ``settings`` at the step ``begin``; ``base`` is the number of
     shapes of earlier levels, and ``target`` returns the target of the step after a number of steps.
 
-    Raises:
-        ValueError, TypeError, KeyError, OverflowError: it is not the state of such a fit.
+    Raises one of the errors of ``Checkpoint.reading`` if it is not the state of such a fit.
     """
     numbers = content.numbers
-    done = whole(numbers, "step", begin + 1, settings.iterations - 1)
-    settings = replace(settings, curves=whole(numbers, "curves", 1, settings.curves))
+    done = number(numbers, "step", int, begin + 1, settings.iterations - 1)
+    settings = replace(settings, curves=number(numbers, "curves", int, 1, settings.curves))
     parameters = parameters_from(content.arrays, start, backend)
     if base > parameters.shape_count:
         raise ValueError("shapes of earlier levels are missing")
+    rng = np.random.default_rng(0)
+    rng.bit_generator.state = numbers["generator"]
     clock = backend.array(wp.int32, 1)
     clock.fill_(done)
     state = FitState(
         parameters,
         clock,
-        _generator(numbers["generator"]),
+        rng,
         done,
-        real(numbers, "per_pixel", 1e-3, FINEST),
+        number(numbers, "per_pixel", float, 1e-3, FINEST),
         base=base,
-        opacities_frozen=flag(numbers, "settled"),
-        rounding=flag(numbers, "rounding"),
-        recovered=whole(numbers, "renewed", 0, MOST_RENEWED),
-        colored=parameters.revision if flag(numbers, "colored") else -1,
+        opacities_frozen=number(numbers, "settled", bool),
+        rounding=number(numbers, "rounding", bool),
+        renewed=number(numbers, "renewed", int, 0, MOST_RENEWED),
+        colored=parameters.revision if number(numbers, "colored", bool) else -1,
     )
-    step = Step(state, settings, target(settings, done - 1), began=whole(numbers, "began", 0, done))
+    step = Step(state, settings, target(settings, done - 1), began=number(numbers, "began", int, 0, done))
     capacities = numbers["room"]
     if not isinstance(capacities, list) or len(capacities) != len(step.renderers):
         raise ValueError("room does not match the renderers")
     for renderer, capacity in zip(step.renderers, capacities, strict=True):
         _restore_capacity(renderer, capacity)
     if "target" in content.arrays:
-        step.loss_target.assign(_target(content.arrays, step.target.image))
+        shifted = typed(content.arrays, "target", np.float32)
+        if shifted.shape != step.target.image.shape:
+            raise ValueError(f"target has shape {shifted.shape}, not {step.target.image.shape}")
+        between("target", shifted, -TARGETS, TARGETS)
+        step.loss_target.assign(shifted)
     step.record()
     return step
 
@@ -121,20 +126,8 @@ def _restore_capacity(renderer: Renderer, saved: Any) -> None:
     now, _ = renderer.capacity_and_need()
     samples, slots = SPARE_CAPACITY * now.samples, SPARE_CAPACITY * now.slots
     renderer.restore_capacity(
-        Capacity(whole(saved, "samples", 1, samples), whole(saved, "slots", 1, slots)),
-        Capacity(whole(saved, "needed samples", 0, samples), whole(saved, "needed slots", 0, slots)),
+        Capacity(number(saved, "samples", int, 1, samples), number(saved, "slots", int, 1, slots)),
+        Capacity(
+            number(saved, "needed samples", int, 0, samples), number(saved, "needed slots", int, 0, slots)
+        ),
     )
-
-
-def _generator(state: Any) -> np.random.Generator:
-    generator = np.random.default_rng(0)
-    generator.bit_generator.state = state
-    return generator
-
-
-def _target(arrays: dict[str, Array], image: FloatArray) -> FloatArray:
-    found = typed(arrays, "target", np.float32)
-    if found.shape != image.shape:
-        raise ValueError(f"target has shape {found.shape}, not {image.shape}")
-    between("target", found, -TARGETS, TARGETS)
-    return found

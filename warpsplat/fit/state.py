@@ -50,7 +50,7 @@ class FitState:
     """Whether coordinates are being rounded and held, in stages."""
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: none so far."""
-    recovered: int = 0
+    renewed: int = 0
     """How often a shape was reset because of a number that was not finite (``fit.densification``)."""
 
     @staticmethod
