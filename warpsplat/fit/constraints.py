@@ -43,11 +43,7 @@ class Drawing:
     (point,)."""
 
     def __post_init__(self) -> None:
-        """Check the arrays.
-
-        Raises:
-            ValueError: their shapes differ, or the scene has other shapes than fills of cubics.
-        """
+        """Raise ``ValueError`` unless shapes agree, and the scene has fills of cubics only."""
         count = len(self.scene.points)
         for name, values in (("joints", self.joints), ("same", self.same)):
             if values.shape != (count,):

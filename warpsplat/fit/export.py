@@ -44,9 +44,5 @@ def shown_paths(scene: Scene, settings: Settings) -> Scene:
 
 
 def show(text: str, scene: Scene) -> Image.Image:
-    """Draw the file ``text`` of ``scene`` as a viewer does, with precautions if it embeds foreign markup.
-
-    Raises:
-        ImageError: the embedded markup cannot be drawn.
-    """
+    """Draw the file ``text`` of ``scene`` as a viewer does, with precautions if it embeds foreign markup."""
     return render_svg(text) if scene.pictures else render_own(text)

@@ -30,11 +30,7 @@ class FitRenderer:
         return preset
 
     def check(self, settings: Settings) -> None:
-        """Check that settings go together with this renderer.
-
-        Raises:
-            UsageError: they do not.
-        """
+        """Raise ``UsageError`` if the settings do not go together with this renderer."""
 
     def model(self, settings: Settings, step: int, slack: float) -> Model:
         """Return the model of coverage after ``step`` steps; ``slack``: see ``ExactModel``."""
@@ -45,11 +41,7 @@ class FitRenderer:
         return scene
 
     def drawable(self, scene: Scene) -> Scene:
-        """Return any scene in a form that this renderer can draw.
-
-        Raises:
-            ValueError: there is none; the message names what it cannot draw.
-        """
+        """Return any scene in a form that this renderer can draw; ``ValueError`` names what it cannot."""
         return scene
 
     def split(self, scene: Scene, keep: IndexArray, most: int) -> tuple[IndexArray, Scene]:
@@ -61,11 +53,7 @@ EXACT = FitRenderer()
 
 
 def renderer_of(name: str) -> FitRenderer:
-    """Return a renderer by its name.
-
-    Raises:
-        UsageError: there is none of that name.
-    """
+    """Return a renderer by its name; raise ``UsageError`` if there is none."""
     found = load_renderer(name)
     if not isinstance(found, FitRenderer):
         raise UsageError(f"renderer {name} is no FitRenderer")

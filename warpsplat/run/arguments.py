@@ -36,11 +36,7 @@ def takes(options: type) -> Callable[[Function], Function]:
 
 
 def check_keywords(function: Callable[..., Any], options: Mapping[str, object]) -> None:
-    """Check that a function decorated by ``takes`` has all of the keywords that it was given.
-
-    Raises:
-        TypeError: it does not have one; the message suggests the nearest.
-    """
+    """Raise ``TypeError`` for keywords that a function decorated by ``takes`` does not have."""
     known = inspect.signature(function).parameters
     for name in options:
         if name not in known:
@@ -50,9 +46,7 @@ def check_keywords(function: Callable[..., Any], options: Mapping[str, object]) 
 def settings_given(function: Callable[..., Any], settings: Settings | None, **options: Any) -> Settings:
     """Return the settings, or those that the options of ``function`` make.
 
-    Raises:
-        TypeError: see ``check_keywords``.
-        UsageError: both are given, or an option cannot be used as given.
+    Raises ``TypeError`` for unknown options, and ``UsageError`` if both are given or an option is not valid.
     """
     check_keywords(function, options)
     if settings is None:
@@ -64,11 +58,7 @@ def settings_given(function: Callable[..., Any], settings: Settings | None, **op
 
 @contextmanager
 def backend_on(device: str, threads: int | None) -> Iterator[Backend]:
-    """Hold the device, and return its backend.
-
-    Raises:
-        UsageError: no such device, or number of threads.
-    """
+    """Hold the device, and return its backend; raise ``UsageError`` for an unknown one."""
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
     start_warp()

@@ -48,12 +48,9 @@ class CheckpointFile:
     """Time between two saves [s]."""
 
     def check(self, *others: Path) -> None:
-        """Check before the run that the file can be written, and that nothing else is replaced.
+        """Raise ``UsageError`` unless the file can be written without replacing anything else.
 
         ``others``: files that it must not replace.
-
-        Raises:
-            UsageError: it cannot, is a file of another kind, or a checkpoint that was not asked for.
         """
         if self.path == STANDARD:
             raise UsageError("a checkpoint is a file, not the standard output")
@@ -82,9 +79,8 @@ class CheckpointFile:
 
         ``run``: everything that decides its result (``identity``).
 
-        Raises:
-            UsageError: the checkpoint is that of another run.
-            CheckpointError: it is damaged, or of another version.
+        Raises ``UsageError`` if the checkpoint is that of another run or version, and ``CheckpointError`` if
+        it is damaged.
         """
         device = backend.device.name
         saved = self._read(run, device) if self.resume and self.path.exists() else None
@@ -131,11 +127,7 @@ def open_checkpoint(
     resume: bool,
     overwrite: bool,
 ) -> CheckpointFile | None:
-    """Return the checkpoint of a run, if it is to have one, checked against ``others`` that are paths.
-
-    Raises:
-        UsageError: it is one of these, or there is nothing to resume from.
-    """
+    """Return the checkpoint of a run, if it is to have one, checked against ``others`` that are paths."""
     if path is None:
         if resume:
             raise UsageError("to resume, a run needs a checkpoint")

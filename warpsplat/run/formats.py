@@ -21,11 +21,7 @@ PDF_PACKAGE = "typst"
 
 
 def check_format(path: Path) -> None:
-    """Check that what makes a file of this name is installed.
-
-    Raises:
-        UsageError: it is not; the message names the package.
-    """
+    """Raise ``UsageError`` if what makes a file of this name is not installed."""
     if path.suffix.lower() == ".pdf" and importlib.util.find_spec(PDF_PACKAGE) is None:
         raise UsageError(
             f"{path}: PDFs need a package that is not installed: "
@@ -42,10 +38,7 @@ def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> b
     """Return the bytes of a result's file, in the format of the name.
 
     ``key``: of the job that made it, for pictures, as an SVG's text contains its own; ``zoom``: of a picture.
-
-    Raises:
-        UsageError: see ``check_format``.
-        ImageError: an SVG that cannot be drawn.
+    Raises ``UsageError`` as ``check_format``, and ``ImageError`` for an SVG that cannot be drawn.
     """
     ending = path.suffix.lower()
     if ending == ".png":
@@ -57,12 +50,8 @@ def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> b
 
 
 def write_named(path: Path, text: str, *, zoom: float = 1.0) -> None:
-    """Write an SVG, or its picture, atomically in the format of the name; ``-`` is the standard output.
+    """Write ``named_bytes`` atomically; ``-`` is the standard output.
 
-    Arguments are those of ``named_bytes``.
-
-    Raises:
-        UsageError, ImageError: see ``named_bytes``.
-        OutputError: it could not be written.
+    Raises its errors, and ``OutputError`` if the file cannot be written.
     """
     write_result(path, named_bytes(path, text, zoom=zoom))

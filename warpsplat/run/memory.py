@@ -200,11 +200,7 @@ def need_refined(facts: ImageFacts, settings: Settings) -> int:
 
 
 def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
-    """Check that there is memory to refine an SVG against an image at full size.
-
-    Raises:
-        ResourceError: there is not; the message begins with ``name``.
-    """
+    """Raise ``ResourceError`` if there is no memory to refine an SVG against an image at full size."""
     facts, limit = facts_of(source), memory_limit(settings)
     if facts is None or limit is None:
         return

@@ -72,12 +72,10 @@ def fields_of(settings: Settings, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def name_results(wanted: Sequence[ResultRequest], masks: Iterable[Path] = ()) -> list[Path]:
-    """Return the path of each result; all are different, and none is an image or one of the ``masks``.
+    """Return the path of each result; raise ``UsageError`` for an unknown field, and where paths collide.
 
-    In a folder, a result has the image's name, including its ending if there are both a.png and a.jpg.
-
-    Raises:
-        UsageError: an unknown field, or several results with one path.
+    All are different, and none is an image or one of the ``masks``. In a folder, a result has the image's
+    name, including its ending if there are both a.png and a.jpg.
     """
     folders = {
         (item.output or item.image.path.parent, item.image.path)
@@ -107,11 +105,7 @@ def name_results(wanted: Sequence[ResultRequest], masks: Iterable[Path] = ()) ->
 
 
 def filled_in(item: ResultRequest) -> Path:
-    """Return the name of a result by its pattern.
-
-    Raises:
-        UsageError: an unknown field.
-    """
+    """Return the name of a result by its pattern; raise ``UsageError`` for an unknown field."""
     path, root = item.image
     away = is_remote(path)
     folder = path.parent.relative_to(root).as_posix() if away else os.path.relpath(path.parent, root)

@@ -35,11 +35,7 @@ RESEARCH_KEYS: tuple[str, ...] = tuple(o.name for o in _declared if o.research a
 
 
 def read_palette(path: Path) -> str:
-    """Read the colours in a text file.
-
-    Raises:
-        UsageError: it cannot be read, or is too long.
-    """
+    """Read the colours in a text file; raise ``UsageError`` if it cannot be read, or is too long."""
     try:
         with path.open("rb") as file:
             found = file.read(PALETTE_BYTES + 1)
@@ -54,11 +50,7 @@ def read_palette(path: Path) -> str:
 
 
 def settings_from(given: Mapping[str, Any]) -> Settings:
-    """Return settings from keywords of ``make_settings``, in which a palette may be the name of a file.
-
-    Raises:
-        UsageError: as ``make_settings``; or the file cannot be read.
-    """
+    """Return ``make_settings`` of keywords in which a palette may be the name of a file."""
     palette = given.get("palette")
     if isinstance(palette, str) and "#" not in palette:
         given = {**given, "palette": read_palette(Path(palette))}

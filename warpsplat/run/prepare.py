@@ -83,10 +83,7 @@ def prepare(
 def load_target(source: ImageSource, name: str | None, background: str, factor: int = 1) -> FloatArray:
     """Read an image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
 
-    ``factor``: how many times smaller to read it.
-
-    Raises:
-        ImageError: as ``image_of``.
+    ``factor``: how many times smaller to read it. Errors are those of ``image_of``.
     """
     color = solid_color(background)
     image = image_of(source, name, paper=color, factor=factor)

@@ -97,12 +97,7 @@ def _with_opacity(image: npt.NDArray[np.float32]) -> FloatArray:
 def _draw_svg(
     text: str, size: tuple[float, float], renderer: str, scale: float, backend: Backend
 ) -> FloatArray:
-    """Draw an SVG of a ``size`` at the size that resvg gives it, as ``Renderer.read_image`` returns images.
-
-    Raises:
-        ImageError: an SVG with something that the model cannot show.
-        UsageError: a scale that leaves no pixel or too many, or a renderer that cannot draw files.
-    """
+    """Draw an SVG of a ``size`` as large as resvg does; the image is one of ``Renderer.read_image``."""
     check_draws_files(renderer)
     check_scale(size, scale)
     if renderer == "viewer":
@@ -125,22 +120,13 @@ def _draw_svg(
 
 
 def check_draws_files(renderer: str) -> None:
-    """Check that a renderer, or the viewer resvg, can draw the scene of a file.
-
-    Raises:
-        UsageError: it cannot, or there is none of that name.
-    """
+    """Raise ``UsageError`` unless a renderer, or the viewer resvg, can draw the scene of a file."""
     if renderer != "viewer" and (why := renderer_of(renderer).cannot_draw_files):
         raise UsageError(why)
 
 
 def check_scale(size: tuple[float, float], scale: float) -> None:
-    """Check that a picture of ``size``, magnified, has pixels, and not too many.
-
-    Raises:
-        UsageError: it does not.
-        ImageError: it has too many by itself.
-    """
+    """Raise ``UsageError`` unless a picture of ``size``, magnified, has pixels, and not too many."""
     if not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"scale must be a positive number, not {scale}")
     pixels = max(size[0], 1.0) * max(size[1], 1.0)

@@ -37,11 +37,7 @@ OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
 
 
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
-    """Check that there can be a run with several numbers of shapes.
-
-    Raises:
-        UsageError: a number is given twice or out of range, or other settings decide the number of shapes.
-    """
+    """Raise ``UsageError`` unless there can be a run with several numbers of shapes."""
     if not 1 <= len(numbers) <= MOST_NUMBERS:
         raise UsageError(f"curves: from 1 to {MOST_NUMBERS} numbers, not {len(numbers)}")
     for number in numbers:

@@ -93,11 +93,7 @@ class Suggestion:
 
 
 def check_suggesting(settings: Settings) -> None:
-    """Check whether there is anything to suggest.
-
-    Raises:
-        UsageError: the settings decide the number of shapes.
-    """
+    """Raise ``UsageError`` if the settings decide the number of shapes already."""
     if others := settings.counting or ([] if settings.simplify else ["curves"]):
         raise UsageError(f"suggest and {others[0]} both decide the number of shapes: give one of them")
 

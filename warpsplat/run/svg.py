@@ -101,12 +101,7 @@ def svg_name_of(svg: object) -> str:
 
 
 def text_of(svg: SvgSource, name: str) -> str:
-    """Return the text of an SVG, which messages call ``name``.
-
-    Raises:
-        ImageError: it cannot be read.
-        TypeError: it is no ``SvgSource``.
-    """
+    """Return the text of an SVG; raise ``ImageError``, which names it, if it cannot be read."""
     if isinstance(svg, str) and "<" in svg:
         return svg
     if isinstance(svg, (str, bytes)) and not svg.strip():
@@ -117,11 +112,7 @@ def text_of(svg: SvgSource, name: str) -> str:
 
 
 def size_of(text: str, name: str) -> tuple[float, float]:
-    """Return width and height of an SVG [px], which messages call ``name``.
-
-    Raises:
-        ImageError: it is not an SVG, or has no size.
-    """
+    """Return width and height of an SVG [px]; raise ``ImageError``, which names it, without them."""
     try:
         size = svg_size(inspect_svg(text).root)
     except ImageError as error:
