@@ -14,7 +14,7 @@ from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.memory import has_memory_for_ssimulacra2
+from warpsplat.run.memory import PROGRAM, SSIMULACRA2, memory_limit
 from warpsplat.run.reduction import Reduction
 from warpsplat.run.result import LevelScore
 from warpsplat.scene import FloatArray, Scene
@@ -25,23 +25,15 @@ QUICK_PIXELS = 1_000_000
 takes about a second."""
 
 
-def pixels_of(target: FloatArray) -> int:
-    """Return the number of pixels of an image, shape (height, width, channels)."""
-    return target.shape[0] * target.shape[1]
-
-
 def has_time_for_ssimulacra2(settings: Settings, target: FloatArray) -> bool:
     """Return whether a run measures SSIMULACRA2, if it is installed.
 
     Up to ``QUICK_PIXELS`` it takes a twentieth of a run of the default effort, and much memory. Within a time
     budget other things are worth more.
     """
-    pixels = pixels_of(target)
-    return (
-        pixels <= QUICK_PIXELS
-        and settings.time_budget is None
-        and has_memory_for_ssimulacra2(settings, pixels)
-    )
+    pixels, limit = target[..., 0].size, memory_limit(settings)
+    has_memory = limit is None or PROGRAM + (SSIMULACRA2 + 16) * pixels <= limit
+    return pixels <= QUICK_PIXELS and settings.time_budget is None and has_memory
 
 
 def scored(
@@ -54,7 +46,7 @@ def scored(
     interrupted: bool,
 ) -> Score | None:
     """Return the score of a file; None if there is no time for it, or the run was stopped."""
-    quick = pixels_of(target) <= QUICK_PIXELS
+    quick = target[..., 0].size <= QUICK_PIXELS
     eyes = has_time_for_ssimulacra2(settings, target) and not interrupted
     if (interrupted and not quick) or (not interrupted and run.stopped()):
         return None
@@ -94,7 +86,7 @@ def render_score(
     made: Fit, target: FloatArray, settings: Settings, backend: Backend, reduction: Reduction | None
 ) -> tuple[float, float | None]:
     """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
-    small = not reduction and pixels_of(target) <= settings.fine_pixels
+    small = not reduction and target[..., 0].size <= settings.fine_pixels
     if renderer_of(settings.renderer).soft and small:
         return render_figures(made.scene, target, settings, backend)
     return made.render_psnr, None

@@ -125,12 +125,6 @@ def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
     return strips + per_pixel * pixels
 
 
-def has_memory_for_ssimulacra2(settings: Settings, pixels: int) -> bool:
-    """Return whether SSIMULACRA2 of so many ``pixels`` can be measured within the limit."""
-    limit = memory_limit(settings)
-    return limit is None or PROGRAM + (SSIMULACRA2 + 16) * pixels <= limit
-
-
 def whole_score(facts: ImageFacts, settings: Settings, factor: int) -> int:
     """Return the bytes of measuring a file at the image's own size after a run on a reduced one."""
     pixels = facts.width * facts.height

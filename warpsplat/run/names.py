@@ -155,24 +155,21 @@ def check_outputs(errors: Sequence[ErrorAt], outputs: Sequence[Path]) -> None:
             if is_remote(folder):
                 check_remote(folder)
                 continue
+            if not folder.is_dir():
+                _check_missing(folder, output.name)
+                continue
             if folder not in usable:
-                _check_folder(folder)
+                check_folder(folder)
                 usable.add(folder)
-            if folder.is_dir():
-                check_target(output)
-            else:
-                _check_names(folder, output.name)
+            check_target(output)
         except OSError as error:
             raise error_at(f"output: {output} cannot be written: {error.strerror or error}") from error
         except UsageError as error:
             raise error_at(f"output: {error}") from error
 
 
-def _check_folder(folder: Path) -> None:
-    """Check that ``folder`` can be written or made."""
-    if folder.is_dir():
-        check_folder(folder)
-        return
+def _check_missing(folder: Path, name: str) -> None:
+    """Check that a folder that does not exist can be made, for a file of that name."""
     above = folder
     while not os.path.lexists(above):
         above = above.parent
@@ -180,14 +177,6 @@ def _check_folder(folder: Path) -> None:
         raise UsageError(f"{above} is a file, not a folder")
     if not os.access(above, os.W_OK | os.X_OK):
         raise UsageError(f"{folder} cannot be made: no permission to write to {above}")
-    _check_names(folder)
-
-
-def _check_names(folder: Path, name: str = "") -> None:
-    """Check the lengths of names in a folder that does not exist yet."""
-    above = folder
-    while not above.is_dir():
-        above = above.parent
     longest = os.pathconf(above, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
     for part in (*folder.relative_to(above).parts, name):
         if len(os.fsencode(part)) > longest:

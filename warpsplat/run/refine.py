@@ -30,7 +30,7 @@ from warpsplat.run.formats import write_named
 from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
-from warpsplat.run.svg import SvgSource, svg_name_of, text_of
+from warpsplat.run.svg import SvgSource, naming, svg_name_of, text_of
 from warpsplat.run.tracking import recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene
@@ -188,10 +188,8 @@ def _load(text: str, problem: Problem, name: str, *, keep: bool) -> tuple[KeptSc
         base = load_kept(text, width, height, name, background_apart=apart)
     else:
         base = KeptScene(*load_scene(text, width, height, name, background_apart=apart), "")
-    try:
+    with naming(name):
         _check_read(text, base.scene, base.has_background)
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
     background, has_background = base.scene.canvas.background, base.has_background
     color = solid_color(settings.background)
     if color is not None:

@@ -22,7 +22,6 @@ from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import Result
 from warpsplat.run.typed import Options
 from warpsplat.run.vectorize import make_result
-from warpsplat.scene import FloatArray
 from warpsplat.search.series import Series
 
 if TYPE_CHECKING:
@@ -46,14 +45,6 @@ def check_several(settings: Settings, numbers: Sequence[int]) -> None:
             raise UsageError(f"curves: {number} is given twice")
     if settings.counting:
         raise UsageError(f"several numbers of shapes and {settings.counting[0]} do not go together")
-
-
-def can_share(image: FloatArray) -> bool:
-    """Return whether fits to ``image`` lose nothing by continuing from fits with fewer shapes.
-
-    Fits to drawings lose half a decibel or more, wherever they begin (docs/experiments.md).
-    """
-    return guess_subject(image).subject == "photo"
 
 
 @takes(Options)
@@ -117,12 +108,16 @@ def _results(
     ready: Callable[[Result], None] | None,
 ) -> dict[int, Result]:
     """Return the results by their numbers of shapes; only the smaller ones if the run was stopped."""
-    series = Series(image.problem.settings, numbers, shares=can_share(image.problem.target))
+    # Fits to drawings that continue others lose half a decibel or more (docs/experiments.md).
+    shares = guess_subject(image.problem.target).subject == "photo"
+    series = Series(image.problem.settings, numbers, shares=shares)
     results: dict[int, Result] = {}
     for number in sorted(numbers):
         write = functools.partial(write_named, outputs[number]) if number in outputs else None
-        if _has_no_more(image, results):
-            result = results[max(results)]
+        most = max(results, default=0)
+        drawn = image.problem.settings.subject == "drawing"
+        if drawn and most and len(results[most].scene) < most:  # it has all regions already
+            result = results[most]
             if write:
                 write(result.svg)
         else:
@@ -135,9 +130,3 @@ def _results(
         if result.stopped or run.stopped():
             break
     return results
-
-
-def _has_no_more(image: PreparedImage, results: dict[int, Result]) -> bool:
-    """Return whether the last result of a drawing has all of its regions."""
-    most = max(results, default=0)
-    return image.problem.settings.subject == "drawing" and most > 0 and len(results[most].scene) < most

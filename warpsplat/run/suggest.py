@@ -25,8 +25,8 @@ from warpsplat.search.survey import Worth, survey
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-CALLED = {"drawing": "drawing", **OWN_NUMBER}
-"""Subjects that are traced, as messages call them."""
+CALLED = {"photo": "photo", "drawing": "drawing", **OWN_NUMBER}
+"""Subjects as messages call them."""
 
 ROW_RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Shapes of the rows of a table, over the suggested number."""
@@ -144,10 +144,9 @@ def suggest(
         return None
     made = suggestion(worth)
     guess = guess_subject(prepared.problem.target)
-    if guess.subject != "photo":
-        rough = f"It looks like a {CALLED[guess.subject]} ({guess.why}), of which this is a rough guess."
-        made = replace(made, why=f"{made.why} {rough}")
-    return replace(made, seconds=time.monotonic() - run.started)
+    rough = f" It looks like a {CALLED[guess.subject]} ({guess.why}), of which this is a rough guess."
+    why = made.why if guess.subject == "photo" else made.why + rough
+    return replace(made, why=why, seconds=time.monotonic() - run.started)
 
 
 def suggestion(worth: Worth) -> Suggestion:

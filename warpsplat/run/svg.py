@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,8 +90,15 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
     """
     name = svg_name_of(svg)
     target, text = image_of(image), text_of(svg, name)
-    try:
+    with naming(name):
         return score_svg(text, target)
+
+
+@contextlib.contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Begin the messages of ``ImageError`` with a name."""
+    try:
+        yield
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from error
 
@@ -113,10 +122,8 @@ def text_of(svg: SvgSource, name: str) -> str:
 
 def size_of(text: str, name: str) -> tuple[float, float]:
     """Return width and height of an SVG [px]; raise ``ImageError``, which names it, without them."""
-    try:
+    with naming(name):
         size = svg_size(inspect_svg(text).root)
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
-    if size is None:
-        raise ImageError(f"{name}: has neither a size nor a viewBox")
+        if size is None:
+            raise ImageError("has neither a size nor a viewBox")
     return size

@@ -11,16 +11,12 @@ from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.fit.settings import Settings
 from warpsplat.native import release_memory
 from warpsplat.rendering.renderer import render
-from warpsplat.run.figures import pixels_of
 from warpsplat.scene import FloatArray
 
 RELEASE_INTERVAL = 10
 """Progress reports from one release of free memory to the next: a release takes as long as a step does."""
 
-
-TAIL_SECONDS = 0.3
-
-TAIL_PER_PIXEL = 3e-7
+TAIL_SECONDS, TAIL_PER_PIXEL = 0.3, 3e-7
 """Part of a time budget that the last step, exporting and scoring take [s]."""
 
 
@@ -50,5 +46,5 @@ def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
     """Return the run with the deadline that ``time_budget`` sets, which leaves time to write and score."""
     if settings.time_budget is None:
         return run
-    tail = TAIL_SECONDS + TAIL_PER_PIXEL * pixels_of(target)
+    tail = TAIL_SECONDS + TAIL_PER_PIXEL * target[..., 0].size
     return run.derived(deadline=time.monotonic() + settings.time_budget - tail, checkpoint=None)

@@ -1,28 +1,17 @@
-"""Turn an image into an SVG file, from top to bottom.
-
-vectorize               checks options, holds the device, opens the checkpoint
-prepare               reads the image at a size that memory allows, and finds its subject
-make_result           makes the file, and the figures about it:
-strategy.make         makes the shapes: by fitting, a search, or tracing (``STRATEGIES``)
-arranged              orders the shapes so that the file is small
-export_within         writes the SVG, within a limit of bytes
-on_paper              puts it on a sheet
-scored                measures the file as a viewer shows it
-"""
+"""Turn an image into an SVG file, from top to bottom."""
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.export import finished
@@ -38,6 +27,7 @@ from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
+from warpsplat.run.svg import naming
 from warpsplat.run.tracking import recorded, report_end, timed
 from warpsplat.run.typed import Options
 from warpsplat.scene import Scene
@@ -175,15 +165,6 @@ def make_result(
         )
     release_memory()
     return result
-
-
-@contextlib.contextmanager
-def naming(name: str) -> Iterator[None]:
-    """Name the image in errors about it."""
-    try:
-        yield
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
