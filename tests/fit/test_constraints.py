@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import drawing, logo, polygon, seam
+from tests.drawing.drawings import drawing, logo, seam
 from tests.helpers import relative_error
 from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Projection
 from warpsplat.kernels.constants import NONE
@@ -115,36 +115,6 @@ def test_joints_and_ties_of_a_seam() -> None:
         values = made.scene.points.reshape(-1)[group]
         size = np.array([48, 32])[group % 2]
         assert pinned == ((values == 0) | (values == size)).any()
-
-
-def test_level_and_upright_sides_of_a_rounded_square_are_ties() -> None:
-    """Its joints direct no handles by themselves: the tangents are level or upright, and stay so."""
-    made = logo()
-    rows = slice(0, int(made.scene.first[1]))
-    square = (made.scene.points[rows].astype(float), [Joint(j) for j in made.joints[rows]])
-    constraints = Constraints.of(drawing(Canvas(64, 64, None), ((0, 0, 0), [square])))
-    assert len(constraints.joint_point) == 0
-    assert np.diff(constraints.tie_first).tolist() == [4] * 4, "two ends and two handles a side"
-
-
-def test_a_line_of_one_region_is_one_of_all() -> None:
-    made = seam()
-    joints = made.joints.copy()
-    lower = slice(int(made.scene.first[2]), None)
-    joints[lower][joints[lower] == Joint.LINE_HANDLE] = Joint.FREE
-    on, _ = made.links()
-    lines = Drawing(made.scene, joints, made.same).lines()
-    assert lines[on < made.scene.first[2]].sum() == 6
-    assert lines[on >= made.scene.first[2]].sum() == 1
-
-
-@pytest.mark.parametrize("field", ["joints", "same"])
-def test_arrays_of_a_wrong_length(field: str) -> None:
-    made = drawing(Canvas(9, 9, None), ((0, 0, 0), [polygon((1, 1), (8, 1), (4, 8))]))
-    arrays = {"joints": made.joints, "same": made.same}
-    arrays[field] = arrays[field][:-1]
-    with pytest.raises(ValueError, match=field):
-        Drawing(made.scene, **arrays)
 
 
 @pytest.mark.parametrize(("line", "directed"), [(10.0, True), (1.0, False)])

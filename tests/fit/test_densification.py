@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ import pytest
 import warpsplat
 from tests.fit.pictures import picture, step_for
 from tests.scenes import random_scene
-from warpsplat.fit.budget import Budget
 from warpsplat.fit.densification import densify, remove_surplus
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import grid_scene
@@ -26,7 +23,6 @@ from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
-from warpsplat.scene.geometry import areas
 
 CURVES = 12
 USUAL = {"curves": CURVES, "iterations": 100, "seed": 1, "subject": "photo", "device": "cpu"}
@@ -53,26 +49,6 @@ def test_recorded_steps_refuse_to_run_afterwards(device: str) -> None:
     new.advance()
     assert new.state.step == 2
     assert np.isfinite(new.psnr())
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-def test_the_number_stays_or_follows_the_schedule(device: str, kind: Kind) -> None:
-    settings = make_settings(kind=kind, curves=30, iterations=100, density=Density(interval=25))
-    step = grid_step(settings, 10, device)
-    for _ in range(25):
-        step.advance()
-    same = densify(step, grows=False)
-    assert same.state.parameters.shape_count == 10
-    assert 10 < densify(same, grows=True).state.parameters.shape_count < 30
-
-
-def test_small_shapes_are_in_front_with_area_order(device: str) -> None:
-    settings = make_settings(curves=12, iterations=30, order="area", density=Density(interval=10, stop=1.0))
-    step = grid_step(settings, 12, device)
-    step.advance()
-    sizes = areas(densify(step, grows=False).state.scene())
-    assert sizes.max() > sizes.min()
-    assert (np.diff(sizes) <= 1e-3).all()
 
 
 def test_points_follow_the_schedule(device: str) -> None:
@@ -130,26 +106,6 @@ def test_a_run_that_is_stopped_has_the_shapes_asked_for(given: dict[str, Any], s
     assert result.score.paths == most
     if given.get("colors"):
         assert len(np.unique(result.scene.colors, axis=0)) <= 4
-
-
-def test_so_has_one_whose_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    over = after(LATE)
-    monkeypatch.setattr(Budget, "over", lambda self: over())
-    monkeypatch.setattr(
-        Budget, "fit", lambda self, settings, done, slowness: replace(settings, iterations=100)
-    )
-    result = warpsplat.vectorize(picture(), time_budget=600, **USUAL)
-    assert not result.stopped
-    assert max(now.shapes for now in result.history) > CURVES
-    assert len(result.scene) == CURVES
-
-
-def test_a_checkpoint_keeps_the_surplus(tmp_path: Path) -> None:
-    path = tmp_path / "run.checkpoint"
-    stopped = warpsplat.vectorize(picture(), checkpoint=path, stop=after(LATE), **USUAL)
-    assert len(stopped.scene) == CURVES
-    resumed = warpsplat.vectorize(picture(), checkpoint=path, resume=True, **USUAL)
-    assert resumed.svg == warpsplat.vectorize(picture(), **USUAL).svg
 
 
 def test_figures_of_a_stopped_run_are_those_of_what_is_left(device: str) -> None:

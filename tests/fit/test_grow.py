@@ -10,8 +10,7 @@ import pytest
 
 from tests.fit.pictures import empty_scene
 from tests.runs import vectorize
-from warpsplat.errors import UsageError
-from warpsplat.fit.grow import ERROR_LEVELS, ComponentBars, candidates, new_shapes
+from warpsplat.fit.grow import ERROR_LEVELS, candidates, new_shapes
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.settings import make_settings
 from warpsplat.portable import filters
@@ -73,28 +72,6 @@ def bar_and_disc() -> FloatArray:
     return image
 
 
-def bars_of(mask: np.ndarray) -> ComponentBars:
-    row, column = np.nonzero(mask)
-    return ComponentBars.of(row, column, np.ones(len(row), np.intp), 2)
-
-
-def test_a_bar_is_measured_and_an_arc_is_none() -> None:
-    """A straight stroke over an arc would cover other pixels."""
-    mask = np.zeros((64, 96), np.uint8)
-    bar = cv2.RotatedRect((40.0, 30.0), (50.0, 4.0), 30.0)
-    cv2.fillPoly(mask, [np.round(bar.points()).astype(np.int32)], 1)
-    found = bars_of(mask)
-    np.testing.assert_allclose(found.centres[0], (40.5, 30.5), atol=1)
-    assert np.degrees(found.angles[0]) == pytest.approx(30, abs=2)
-    assert found.lengths[0] == pytest.approx(50, rel=0.06)
-    assert found.widths[0] == pytest.approx(4.5, rel=0.2)
-    assert found.shares[0] > 0.9
-    assert found.exceed(np.array([0.05], np.float32))[0]
-    arc = np.zeros((64, 96), np.uint8)
-    cv2.ellipse(arc, (48, 32), (28, 28), 0, 0, 180, 1, 3)
-    assert not bars_of(arc).exceed(np.array([0.02], np.float32))[0]
-
-
 @pytest.mark.parametrize("mixed", [True, False])
 def test_a_bar_gets_a_stroke_and_a_disc_a_fill(mixed: bool) -> None:
     image, settings = bar_and_disc(), make_settings(mixed=mixed)
@@ -112,9 +89,3 @@ def test_a_mixed_run_has_both_kinds(device: str) -> None:
     assert np.isfinite(result.scene.points).all()
     assert result.score
     assert result.score.psnr > 15, "20 to 22 dB over five seeds"
-
-
-@pytest.mark.parametrize("given", [{"kind": Kind.STROKE}])
-def test_mixed_excludes(given: dict[str, object]) -> None:
-    with pytest.raises(UsageError, match="mixed and"):
-        make_settings(mixed=True, **given)

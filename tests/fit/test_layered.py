@@ -12,10 +12,8 @@ from tests.fit.pictures import picture
 from tests.runs import scored, vectorize
 from tests.scenes import mixed_scene
 from warpsplat.errors import UsageError
-from warpsplat.fit.layered import fit_layered
-from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.loop import Start
 from warpsplat.fit.options import parse_levels
-from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import levels_of, make_settings
@@ -26,7 +24,6 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
-from warpsplat.svg.order import by_opacity
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg
 
@@ -91,30 +88,6 @@ def test_hiding_groups_leaves_the_simpler_picture(device: str) -> None:
     assert score.psnr == pytest.approx(result.levels[0].psnr, abs=0.02)
 
 
-def test_an_interrupted_run_has_the_levels_that_it_came_to(device: str) -> None:
-    calls = iter([False] * 10 + [True] * 1000)
-    made = fit_layered(
-        Problem(picture(), make_settings(levels=(4, 12, 30), iterations=40)),
-        Run(Backend.on(device), stop=lambda: next(calls)),
-    )
-    assert made.interrupted
-    assert made.iterations == 11
-    assert len(made.scene) <= 12
-
-
-def test_shapes_stay_in_their_layers() -> None:
-    """Where they may change places for the file's sake."""
-    scene = in_layers(mixed_scene(64, 48, seed=1), 3, 6)
-    scene = replace(scene, opacities=np.tile([0.5, 0.9], len(scene))[: len(scene)].astype(np.float32))
-    assert (np.diff(scene.take(by_opacity(scene)).layer) >= 0).all()
-
-
-def test_without_levels_nothing_is_named() -> None:
-    scene = mixed_scene(64, 48, seed=1)
-    assert " id=" not in write_svg(scene)
-    assert " id=" in write_svg(in_layers(scene, 2))
-
-
 def test_levels_are_checked() -> None:
     assert make_settings(levels="64,256").curves == 256
     assert make_settings(layered=True, curves=512).levels == (32, 128, 512)
@@ -130,14 +103,6 @@ def test_levels_are_checked() -> None:
     ):
         with pytest.raises(UsageError, match=cause):
             make_settings(**given)
-
-
-def test_new_shapes_lie_in_front_of_those_below(device: str) -> None:
-    run = Run(Backend.on(device))
-    below = fit(Problem(picture(), make_settings(curves=5, iterations=20)), run).scene
-    both = fit(Problem(picture(), make_settings(curves=7, iterations=30)), run, Start(below=below)).scene
-    assert len(both) == 12
-    np.testing.assert_array_equal(both.layer, np.repeat([0, 1], [5, 7]))
 
 
 def test_levels_are_read_back_and_refined_as_such() -> None:

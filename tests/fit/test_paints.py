@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.fit.pictures import picture, step_for
 from tests.runs import vectorize
-from tests.scenes import random_scene, with_two_stops
 from warpsplat.fit.paints import choose_paints
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import psnr
@@ -87,19 +84,3 @@ def test_one_kind(device: str, kind: Paint) -> None:
     assert "matrix" not in result.svg
     shown = on_white(render_own(result.svg))
     assert psnr(255 * render(again, backend=Backend.on(device)), shown) > 35, "42 to 47 dB over five seeds"
-
-
-def test_a_circle_stays_one_in_training(device: str) -> None:
-    scene = with_two_stops(random_scene(Kind.FILL, 6, 64, 48, seed=1), seed=2)
-    frames = scene.frames.copy()
-    frames[:4, 4:] = np.stack([-frames[:4, 3], frames[:4, 2]], axis=1)
-    scene = replace(scene, frames=frames)
-    step = step_for(scene, picture(), device)
-    for _ in range(5):
-        step.advance()
-    moved = step.state.scene().frames
-    round_ = (scene.paint == Paint.RADIAL) & (np.arange(6) < 4)
-    assert round_.sum() == 2
-    assert (np.abs(moved - frames)[round_, :4] > 0.1).all()
-    np.testing.assert_array_equal(moved[round_, 4], -moved[round_, 3])
-    np.testing.assert_array_equal(moved[round_, 5], moved[round_, 2])

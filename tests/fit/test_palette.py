@@ -13,7 +13,7 @@ from tests.fit.pictures import picture, step_for
 from tests.runs import vectorize
 from warpsplat.errors import UsageError
 from warpsplat.fit.options import parse_palette
-from warpsplat.fit.palette import Palette, best_colors, main_colors
+from warpsplat.fit.palette import best_colors, main_colors
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.options import settings_from
@@ -78,27 +78,6 @@ def test_the_error_is_least_at_the_best_colour(opacity: float, *, transparent: b
         around = error(best + off), error(best - off)
         assert min(around) > least
         assert around[0] == pytest.approx(around[1], rel=1e-3)
-
-
-def test_shapes_choose_the_colour_with_the_least_error() -> None:
-    """Against all of them, tried one by one."""
-    rng = np.random.default_rng(3)
-    colors = rng.random((4, 3)).astype(np.float32)
-    scene = squares(rng.random((5, 3)).tolist())
-    step = step_for(scene, picture())
-    palette = Palette(colors)
-    palette.choose(step)
-    chosen = step.state.scene().colors
-    parameters = step.state.parameters
-    for i in range(len(scene)):
-        errors = []
-        for color in colors:
-            tried = scene.colors.copy()
-            tried[i] = color
-            parameters.assign(replace(scene, colors=tried))
-            step.render()
-            errors.append(step.square_error())
-        assert (chosen[i] == colors[int(np.argmin(errors))]).all()
 
 
 def test_hidden_shapes_keep_their_colour() -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from warpsplat.fit import place
-from warpsplat.fit.place import background_color, contour_angles, grid_scene, reduced, simple_curves
+from warpsplat.fit.place import contour_angles, grid_scene, reduced, simple_curves
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Kind
 from warpsplat.scene.geometry import areas
@@ -28,39 +28,11 @@ def blobs(height: int, width: int) -> np.ndarray:
     return np.clip(cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC), 0, 1)
 
 
-def test_small_images_are_not_reduced() -> None:
-    target = blobs(60, 80)
-    same, span = reduced(target, 30.0)
-    assert same is target
-    assert span == 1.0
-    assert reduced(np.zeros((512, 768, 3), np.float32), 120.0)[1] == 1.0, "photographs of the Kodak set"
-
-
 @pytest.mark.parametrize(("shape", "sigma"), [((3000, 4000), 5.0), ((60, 80), 1000.0), ((2, 9000), 500.0)])
 def test_reduced_images_are_bounded(shape: tuple[int, int], sigma: float) -> None:
     small, span = reduced(np.zeros((*shape, 1), np.float32), sigma)
     assert small.shape[0] * small.shape[1] <= 1.01 * place.REDUCED_PIXELS
     assert sigma / span <= place.REDUCED_SIGMA * 1.001
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-def test_reduced_colours_and_directions_are_those_of_the_image(
-    kind: Kind, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    target = blobs(192, 256)
-    settings = make_settings(kind=kind)
-    whole = grid_scene(settings, target, 12, np.random.default_rng(1))
-    monkeypatch.setattr(place, "REDUCED_PIXELS", 128 * 96)
-    reduced = grid_scene(settings, target, 12, np.random.default_rng(1))
-    np.testing.assert_allclose(reduced.colors, whole.colors, atol=0.03)
-    np.testing.assert_allclose(reduced.points, whole.points, atol=5 if kind == Kind.STROKE else 0)
-
-
-def test_the_mean_of_many_pixels_is_their_mean() -> None:
-    """A sum of 32 bits over all pixels would stop growing long before their end."""
-    target = np.full((3000, 4000, 3), 0.5, np.float32)
-    target[:, ::2] = [0.2, 0.3, 0.4]
-    np.testing.assert_allclose(background_color(target), [0.35, 0.4, 0.45], atol=0.004)
 
 
 def test_strokes_lie_along_contours() -> None:

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.fit.pictures import empty_scene
-from tests.scenes import mixed_scene, random_scene, with_points
+from tests.scenes import random_scene, with_points
 from warpsplat.fit import densification
 from warpsplat.fit.densification import PAIRS_PER_CHUNK, choose_removed, duplicates, prune_mask
 from warpsplat.fit.place import circle_outlines
-from warpsplat.fit.settings import Density, make_settings
+from warpsplat.fit.settings import Density
 from warpsplat.scene import Kind, Scene
 from warpsplat.scene.geometry import bounds
 
@@ -32,22 +31,6 @@ def test_faint_tiny_and_broken_shapes_are_pruned(progress: float) -> None:
     scene.opacities[0] = 0.1
     scene.points[scene.first[2] + 3] = np.nan
     assert prune_mask(scene, DENSITY, progress).tolist() == [progress < 0.7, True, True, False]
-
-
-@pytest.mark.parametrize("shape", [0, 2, -1])
-def test_broken_shapes_of_any_length_are_pruned(shape: int) -> None:
-    scene = mixed_scene(200, 200, seed=3)
-    shape %= len(scene)
-    scene.points[scene.first[shape + 1] - 1, 1] = np.nan
-    pruned = prune_mask(scene, replace(DENSITY, area=0.0), 0.5)
-    assert np.flatnonzero(pruned).tolist() == [shape]
-
-
-def test_of_two_duplicates_the_lower_one_is_pruned() -> None:
-    scene = circles([(60, 60), (60.5, 60), (60, 60), (140, 140)], [20, 20, 20, 20])
-    scene.colors[:] = [[0.5, 0.5, 0.5], [0.51, 0.5, 0.5], [0.9, 0.5, 0.5], [0.5, 0.5, 0.5]]
-    assert duplicates(scene, DENSITY).tolist() == [True, False, False, False]
-    assert len(duplicates(empty_scene(make_settings(), np.zeros((8, 8, 3), np.float32)), DENSITY)) == 0
 
 
 @pytest.mark.parametrize("chunk", [7, PAIRS_PER_CHUNK])

@@ -15,9 +15,7 @@ from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import (
-    DB_PER_DOUBLING,
     STAGES,
-    byte_worth,
     choose_grid,
     freeze_opacities,
     freeze_stage,
@@ -121,16 +119,6 @@ def test_opacities_are_frozen_at_tenths_or_opaque(device: str) -> None:
     assert (moved.points != after.points).any()
 
 
-def test_a_byte_is_worth_what_more_shapes_gain() -> None:
-    """From ``size`` bytes to twice as many the error falls by so many decibels; scales with both."""
-    size, value = 1000, 1.0
-    for done in range(size, 2 * size):
-        value -= byte_worth(value, done)
-    assert -10 * np.log10(value) == pytest.approx(DB_PER_DOUBLING, rel=2e-3)
-    assert byte_worth(3.0, 500) == pytest.approx(3 * byte_worth(1.0, 500))
-    assert byte_worth(1.0, 500) == pytest.approx(2 * byte_worth(1.0, 1000))
-
-
 @pytest.mark.parametrize("staged", [True, False])
 @pytest.mark.parametrize("loss", [0.003, 0.01, 0.03])
 def test_the_coarsest_grid_within_the_loss(
@@ -156,19 +144,6 @@ def test_the_coarsest_grid_within_the_loss(
     assert grid == next(g for g, cost in costs.items() if cost <= allowed)
     assert GRIDS[0] < grid < GRIDS[-1], "a loss that decides something"
     np.testing.assert_array_equal(step.state.scene().points, scene.points)
-
-
-@pytest.mark.parametrize(("precision", "finest"), [(None, GRIDS[-1]), (0, 1), (1, 10), (2, 100), (3, 1000)])
-def test_no_grid_is_finer_than_the_precision(
-    device: str, precision: int | None, finest: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """However little may be lost; where much may be, the precision does not matter."""
-    step = step_of(mixed_scene(64, 48), device)
-    step.configure(replace(SETTINGS, precision=precision))
-    monkeypatch.setattr(rounding, "MAX_LOSS", -1000.0)
-    assert choose_grid(step, staged=False) == finest
-    monkeypatch.setattr(rounding, "MAX_LOSS", 1000.0)
-    assert choose_grid(step, staged=False) == GRIDS[0]
 
 
 @pytest.mark.parametrize("kind", list(Kind))

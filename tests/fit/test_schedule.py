@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from warpsplat.fit.schedule import (
-    mean_points_at,
-    opacity_threshold,
     phase_at,
     phases,
     shapes_at,
@@ -44,12 +42,6 @@ def test_one_scale_serves_both_sides(width: int, height: int, quality: Quality) 
         assert phase.width * phase.height <= width * height
 
 
-def test_the_opacity_threshold_falls() -> None:
-    values = [opacity_threshold(DENSITY, t) for t in (0, 0.3, DENSITY.stop, 1)]
-    assert values[0] == DENSITY.opacity_start > values[1] > values[2]
-    assert values[2] == values[3] == pytest.approx(DENSITY.opacity_end)
-
-
 def densification_steps(settings: Settings) -> list[int]:
     """Return the steps after which there is densification; 0 for the start."""
     density = settings.density
@@ -72,14 +64,6 @@ def test_the_number_of_shapes_grows_to_a_surplus_and_falls() -> None:
     np.testing.assert_allclose(shares, shares[0], rtol=1e-3)
 
 
-def test_without_a_surplus_the_number_grows_to_all_and_stays() -> None:
-    settings = replace(SETTINGS, density=replace(DENSITY, surplus=1.0))
-    counts = [shapes_at(settings, step) for step in densification_steps(settings)]
-    assert counts == sorted(counts)
-    assert counts[19] < 90
-    assert set(counts[20:]) == {90}
-
-
 @pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("iterations", [1, 26, 30, 60, 100, 101, 333, 1000])
 def test_all_shapes_and_no_more_are_there_in_the_end(quality: Quality, iterations: int) -> None:
@@ -87,11 +71,3 @@ def test_all_shapes_and_no_more_are_there_in_the_end(quality: Quality, iteration
     assert shapes_at(settings, densification_steps(settings)[-1]) == 90
     without = replace(settings, density=replace(settings.density, interval=0))
     assert shapes_at(without, 0) == 90
-
-
-def test_splines_lose_points_once_all_shapes_are_there() -> None:
-    means = {step: mean_points_at(SETTINGS, step) for step in densification_steps(SETTINGS)}
-    assert {means[s] for s in means if s <= 500} == {12}
-    falling = [means[s] for s in means if s >= 500]
-    assert falling == sorted(set(falling), reverse=True)
-    assert falling[-1] == 8

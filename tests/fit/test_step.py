@@ -17,9 +17,8 @@ from warpsplat.extensions import renderer_names
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import evaluate_file
-from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.fit.step import Step, Target
+from warpsplat.fit.step import Step
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
@@ -30,14 +29,6 @@ from warpsplat.svg.viewer import on_white, render_svg
 
 def new_scene(settings: Settings, image: FloatArray) -> Scene:
     return grid_scene(settings, image, settings.curves, np.random.default_rng(0))
-
-
-def test_a_coarse_step_has_fewer_vertices(device: str) -> None:
-    settings, image = make_settings(curves=10), picture()
-    state = step_for(new_scene(settings, image), image, device, settings).state
-    steps = [Step(state, settings, Target(image, Phase(64, 48, slack))) for slack in (1.0, 4.0)]
-    fine, coarse = (int(step.renderer.needed_samples.numpy()[0]) for step in steps)
-    assert 0.4 < coarse / fine < 0.7, "half as many pieces, each rounded up"
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])
@@ -100,23 +91,6 @@ def test_every_kernel_is_in_a_captured_step(device: str) -> None:
     every = {kernel.key for kernel in all_kernels()}
     assert every - launched == NOT_IN_STEPS
     assert launched - every == {"array_scan", "radix_sort_pairs"}
-
-
-def test_a_mixed_scene_comes_nearer_to_the_image(device: str) -> None:
-    """Fills and strokes of different lengths in one optimisation: all move, only strokes have widths."""
-    scene = mixed_scene(64, 48, seed=2)
-    step = step_for(scene, picture(), device, make_settings(iterations=60))
-    step.advance()
-    before = step.psnr()
-    for _ in range(40):
-        step.advance()
-    assert step.psnr() > before + 1
-    after = step.state.scene()
-    np.testing.assert_array_equal(after.first, scene.first)
-    for i in range(len(scene)):
-        assert np.abs(after.points_of(i) - scene.points_of(i)).max() > 0.1
-    assert not after.widths[scene.kind == Kind.FILL].any()
-    assert (after.widths != scene.widths)[scene.kind == Kind.STROKE].all()
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])

@@ -11,14 +11,11 @@ from PIL import Image
 
 import warpsplat
 from tests.runs import scored
-from warpsplat.errors import UsageError
 from warpsplat.files.image import load_image
-from warpsplat.fit.place import grid_scene
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
-from warpsplat.scene import Scene
 from warpsplat.svg.viewer import render_own
 
 
@@ -77,19 +74,3 @@ def test_images_as_a_background_asks_for_them() -> None:
     np.testing.assert_allclose(load_target(badge(), "x", "#ff8000")[0, 0], [1, 128 / 255, 0])
     assert load_target(badge(opaque=True), "x", "auto").shape == (48, 48, 3)
     assert (load_target(badge(opaque=True), "x", "none")[..., 3] == 1).all()
-
-
-def test_first_shapes_lie_where_something_is() -> None:
-    target = load_target(badge(), "x", "auto")
-    scene: Scene = grid_scene(make_settings(curves=9), target, 9, np.random.default_rng(0))
-    assert len(scene) == 9
-    assert scene.canvas.background is None
-    middles = np.array([scene.points_of(i).mean(axis=0) for i in range(9)]).astype(int)
-    assert (np.hypot(*(middles - 24).T) < 22).all()
-    assert scene.colors.min() > 0.9, "and have the picture's colour, not that on black"
-
-
-@pytest.mark.parametrize("background", ["white", "#fff", "", "#12345g"])
-def test_backgrounds_that_are_none(background: str) -> None:
-    with pytest.raises(UsageError, match="background must be"):
-        make_settings(background=background)

@@ -97,23 +97,6 @@ def test_a_run_that_was_killed_goes_on_from_the_last_save(
     assert fitted(checkpoint=path, resume=True).svg == fitted().svg
 
 
-def test_saving_costs_a_hundredth(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [0.0]
-    monkeypatch.setattr("warpsplat.fit.checkpoint.time.monotonic", lambda: now[0])
-    written: list[checkpoint.Content] = []
-
-    def write(content: checkpoint.Content) -> None:
-        written.append(content)
-        now[0] += 2.0
-
-    kept = checkpoint.Checkpoint("f", write, 30.0)
-    kept.begin()
-    for second in range(500):
-        now[0] += 1.0
-        kept.keep(lambda second=second: checkpoint.Content({"step": second}, {}), now=False)  # type: ignore[misc]
-    assert [content.numbers["fits"][0]["step"] for content in written] == [29, 229, 429]
-
-
 def test_a_stopped_file_says_so_and_a_goal_is_stopped_between_its_fits(tmp_path: Path) -> None:
     """Stopped in the last step of a fit, the run that resumes begins the next one."""
     path = tmp_path / "run.checkpoint"
@@ -133,14 +116,10 @@ def test_what_has_no_state_begins_again(
     tmp_path: Path, given: dict[str, Any], caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "run.checkpoint"
-    assert fitted(checkpoint=path, stop=lambda: True, **given).stopped
+    assert fitted(checkpoint=path, resume=True, stop=lambda: True, **given).stopped
+    assert "no checkpoint exists yet" in caplog.text
     assert not fitted(checkpoint=path, resume=True, stop=lambda: "time_budget" in given, **given).missed
     assert "starts from the beginning" in caplog.text
-
-
-def test_where_no_checkpoint_is_a_run_begins(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    fitted(iterations=2, checkpoint=tmp_path / "none", resume=True)
-    assert "no checkpoint exists yet" in caplog.text
 
 
 @pytest.fixture(scope="module")

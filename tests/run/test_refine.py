@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from tests.fit.pictures import picture
 from tests.runs import scored
@@ -15,10 +14,10 @@ from tests.scenes import ragged_scene, random_scene
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.metrics import psnr, score_svg
+from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.refine import likeness, refine_svg
+from warpsplat.run.refine import refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.page import placed
@@ -57,27 +56,6 @@ def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
     assert scored(result).psnr > before + 4
     assert scored(result).paths == 6
     assert scored(result).nodes <= 6 * 6
-
-
-def test_paths_of_different_lengths_stay_as_long(device: str) -> None:
-    text = (
-        HEAD
-        + 'width="40" height="30"><path d="M5 5H35V25Z"/>'
-        + ('<path d="M9 9h2v2h2v2h2v2h2v2h-10z" fill="red"/></svg>')
-    )
-    target = np.full((30, 40, 3), 0.4, np.float32)
-    result, _ = improved(text, target, make_settings(iterations=10), device)
-    assert scored(result).nodes <= 20
-
-
-def test_pictures_are_compared_strip_by_strip(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(0)
-    a, b = (Image.fromarray(rng.integers(0, 256, (23, 40, 4), dtype=np.uint8)) for _ in range(2))
-    whole = psnr(on_white(a), on_white(b))
-    for pixels in (1, 100, 10_000):
-        monkeypatch.setattr("warpsplat.svg.strips.STRIP_PIXELS", pixels)
-        assert likeness(a, b) == pytest.approx(whole, abs=1e-9)
-    assert likeness(a, a) == float("inf")
 
 
 def test_no_improvement_changes_nothing(device: str) -> None:

@@ -9,23 +9,19 @@ import pytest
 
 from tests.fit.pictures import picture
 from tests.scenes import disc, random_scene
-from warpsplat.fit.export import export
-from warpsplat.fit.loop import Fit, Rounding, Start, fit
+from warpsplat.fit.loop import Fit, fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Kind, Scene
 from warpsplat.search.candidate import (
-    FEW_OPACITY,
-    FEW_SHAPES,
     Candidate,
     Change,
     fit_background,
-    for_few,
     smaller,
 )
-from warpsplat.search.goal import AIM_FULL, curves_for, next_change
+from warpsplat.search.goal import AIM_FULL, next_change
 from warpsplat.svg.write import path_sizes
 
 
@@ -85,39 +81,6 @@ def test_without_more_shapes_the_grid_gets_finer(scene: Scene) -> None:
     assert next_change([made(scene, 1000, 26.0, 100.0)], few) is None
 
 
-def test_shapes_that_a_probe_run_needs() -> None:
-    assert curves_for(26.8, {256: 25.0}, 10_000) == 512, "twice the shapes for 1.8 dB"
-    assert curves_for(24.0, {256: 25.0, 128: 23.0}, 10_000) in {181, 182}, "between two, by those"
-    assert curves_for(60.0, {256: 25.0}, 1000) == 1000
-
-
-def test_a_run_can_be_entered_late(scene: Scene) -> None:
-    settings = make_settings(curves=8, iterations=100)
-    start = Start(scene=scene, begin=90)
-    late = fit(Problem(picture(), settings), Run(Backend.on("cpu")), start, Rounding(4.0))
-    assert late.iterations == 10
-    assert late.per_pixel == 4.0
-    half = late.scene.points * 2
-    assert np.abs(half - np.round(half)).max() < 1e-5, "all stages of rounding were done"
-
-
-def test_sizes_of_paths_are_those_in_the_file(scene: Scene) -> None:
-    whole = len(export(scene, Settings(), 4.0))
-    for i in (0, 5):
-        without = len(export(scene.take(np.delete(np.arange(8), i)), Settings(), 4.0))
-        assert whole - without == path_sizes(scene, 4.0)[i]
-
-
-def test_settings_of_few_shapes() -> None:
-    few = for_few(make_settings(curves=10))
-    assert few.opacity == FEW_OPACITY and few.spline_points < make_settings().spline_points
-    assert for_few(make_settings(curves=FEW_SHAPES + 1)) == make_settings(curves=FEW_SHAPES + 1)
-    strokes = for_few(make_settings(curves=10, kind=Kind.STROKE))
-    assert strokes.opacity == make_settings().opacity
-    assert strokes.fine_pixels == few.fine_pixels
-    assert for_few(make_settings(curves=10, opaque=True)).opacity == make_settings().opacity
-
-
 def test_the_ground_is_what_shows_between_shapes(device: str) -> None:
     backend = Backend.on(device)
     scene = disc(10, 30, 15)
@@ -140,9 +103,3 @@ def test_what_is_less_than_a_shape_goes_by_points(excess: float) -> None:
     gone = sizes.sum() - path_sizes(left, 1.0).sum()
     assert 0 < gone < excess + sizes.mean() / 3
     assert len(scene) - len(left) == (np.cumsum(sizes) <= excess).sum()
-
-
-def test_of_cubics_a_whole_shape_goes() -> None:
-    scene = random_scene(Kind.FILL, count=6)
-    left = smaller(scene, np.arange(1, 7, dtype=np.float32), path_sizes(scene, 1.0), 1.0)
-    assert len(left) == 5

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from tests.fit.pictures import picture
-from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import shapes_at
@@ -66,20 +65,3 @@ def test_shapes_go_on_with_their_past() -> None:
     assert len(made.scene) == 8
     assert made.iterations == settings.iterations - start.begin
     assert seen[-1].work == 1
-
-
-def test_without_a_past_shapes_take_large_steps() -> None:
-    """The optimiser's state keeps the shapes in place."""
-    run, series = Run(Backend.on("cpu", 1)), Series(quick(), (4, 8))
-    fit(Problem(picture(), series.next(4)[0]), series.part(4, run))
-    _, start = series.next(8)
-    assert start is not None and start.scene is not None
-    scene, past = start.scene, start.past
-
-    def moved(known: bool) -> float:
-        chosen = make_settings(curves=6, iterations=60, density={"interval": 0}, coarse_pixels=400)
-        again = Start(scene, past if known else None, begin=59)
-        made = fit(Problem(picture(), chosen), run, again, rounding=None)
-        return float(np.abs(made.scene.points - scene.points).mean())
-
-    assert moved(known=True) < 0.5 * moved(known=False)

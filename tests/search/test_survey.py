@@ -34,25 +34,6 @@ def test_more_shapes_are_never_worse(few: float) -> None:
     assert float(decibels[-1] - decibels[0]) < 6 * STEEPEST + 16 * BEND
 
 
-def test_one_measurement_is_a_level() -> None:
-    worth = expected(16, (16, 25.0), (16, 24.0), 0.0, 2000)
-    assert float(worth.psnr(16)) == pytest.approx(25)
-    assert float(worth.psnr(8)) == float(worth.psnr(16))
-
-
-def test_a_picture_without_error_has_a_ceiling() -> None:
-    worth = expected(32, (32, float("inf")), (16, float("inf")), 0.4, 2000)
-    assert 99 < float(worth.psnr(32)) <= 101
-
-
-def test_what_is_hard_to_draw_gains_little() -> None:
-    plan = [Phase(100, 100)]
-    assert expected_gain(20.0, plan) == 0
-    assert (
-        0 < expected_gain(25.0, plan) < expected_gain(30.0, plan) == expected_gain(40.0, plan) == EFFORT_GAIN
-    )
-
-
 def test_what_is_much_larger_than_most_steps_see_gains_little() -> None:
     gains = [expected_gain(30.0, [Phase(100, 100), Phase(side, 100)]) for side in (400, 800, 1600, 9000)]
     assert gains == pytest.approx([EFFORT_GAIN, EFFORT_GAIN / 2, 0, 0])
