@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from warpsplat.fit import place
-from warpsplat.fit.place import contour_angles, grid_scene, reduced, simple_curves
+from warpsplat.fit.place import grid_scene, reduced, shape_angles, simple_curves
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Kind
 from warpsplat.scene.geometry import areas
@@ -37,7 +37,7 @@ def test_reduced_images_are_bounded(shape: tuple[int, int], sigma: float) -> Non
 
 def test_strokes_lie_along_contours() -> None:
     stripes = np.repeat(np.sin(np.arange(96) / 3)[:, None, None], 96, axis=1).repeat(3, axis=2)
-    angle = contour_angles(stripes.astype(np.float32), np.array([[48.0, 48.0]]), 6.0)
+    angle = shape_angles(make_settings(open=True), stripes.astype(np.float32), np.array([[48.0, 48.0]]), 6.0)
     assert abs(np.cos(angle[0])) > 0.99
 
 

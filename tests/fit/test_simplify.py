@@ -16,20 +16,18 @@ SUBPIXELS = 16
 
 
 def removed(outline: FloatArray, k: int, moved: FloatArray) -> FloatArray:
-    """Return a ring or chain without point ``k``, whose neighbours go to ``moved``."""
+    """Return a ring without point ``k``, whose neighbours go to ``moved``."""
     points = outline.copy()
     points[[k - 1, (k + 1) % len(outline)]] = moved
     return np.delete(points, k, axis=0)
 
 
-def between(a: FloatArray, b: FloatArray, kind: Kind = Kind.FILL) -> float:
-    """Return the area between two splined outlines, by counting; chains have the same ends."""
+def between(a: FloatArray, b: FloatArray) -> float:
+    """Return the area between two splined rings, by counting."""
     masks = []
     for points in (a, b):
         mask = np.zeros((64 * SUBPIXELS, 64 * SUBPIXELS), np.uint8)
-        outline = flatten(points[None], kind == Kind.FILL, Basis.SPLINE, pieces=64)[0]
-        if kind == Kind.STROKE:  # closed below the canvas
-            outline = np.concatenate([outline, [[outline[-1, 0], 80], [outline[0, 0], 80]]])
+        outline = flatten(points[None], True, Basis.SPLINE, pieces=64)[0]
         cv2.fillPoly(mask, [np.round(outline * SUBPIXELS).astype(np.int32)], 1)
         masks.append(mask)
     return float((masks[0] != masks[1]).sum()) / SUBPIXELS**2

@@ -23,15 +23,11 @@ BUDGET_MARGIN = 1.25
 MAX_ITERATIONS = 20_000
 """Most steps of a fit with a deadline: more gain nothing."""
 
-
-HEAD_BYTES = 150
-"""Bytes of a file without its shapes."""
+HEAD_BYTES, FRACTION_BYTES = 150, 1.6
+"""Bytes of a file without its shapes, and of a number without its digits before the point."""
 
 STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
 """Bytes of a shape without its coordinates."""
-
-FRACTION_BYTES = 1.6
-"""Bytes of a number without its digits before the point."""
 
 SPARE_CURVES = 1.3
 """Trained shapes over those expected to fit: the excess is removed with the surplus."""

@@ -22,11 +22,9 @@ from warpsplat.svg.write import rounded
 MAX_ROUNDS = 40
 """Nearly all images are clear after ten."""
 
-FIRST_MOVE = 0.2
-"""Maximum move of a point in the first round [px]; spills are a fraction of a pixel wide."""
-
-ROUNDS_PER_MOVE = 8
-"""Rounds after which points may move by ``FIRST_MOVE`` more."""
+FIRST_MOVE, ROUNDS_PER_MOVE = 0.2, 8
+"""Maximum move of a point in the first round [px], as spills are a fraction of a pixel wide, and rounds after
+which it is so much more."""
 
 PROBE_OPACITY = 0.02
 """Opacity of all shapes while spilling is measured: so thin that none hides another."""

@@ -140,11 +140,12 @@ def _level_set(error: FloatArray, threshold: float, mixed: bool) -> Candidates:
     centre = np.stack([column + 0.5, row + 0.5], axis=1)
     stroke: list[npt.NDArray[Any]] = [np.zeros(len(radius))] * 3
     if mixed:
-        bars = ComponentBars.of(*np.divmod(pixel, error.shape[1]), label, number)
-        long = bars.exceed(share)
-        share = np.where(long, bars.shares, share)
-        centre = np.where(long[:, None], bars.centres, centre)
-        stroke = [bars.angles, np.where(long, bars.lengths, 0.0), bars.widths]
+        middle, angle, length, width, covered = _bars(*np.divmod(pixel, error.shape[1]), label, number)
+        least = np.maximum(MIN_STROKE_SHARE, MIN_ADVANTAGE * share)
+        long = (length > MIN_ASPECT * width) & (covered > least)
+        share = np.where(long, covered, share)
+        centre = np.where(long[:, None], middle, centre)
+        stroke = [angle, np.where(long, length, 0.0), width]
     arrays = (centre, radius, mass * share, *stroke)
     return Candidates(*(np.asarray(array, np.float32) for array in arrays))
 
@@ -169,42 +170,30 @@ def _without_overlap(found: Candidates, size: tuple[int, ...], count: int) -> li
     return chosen
 
 
-@dataclass(frozen=True)
-class ComponentBars:
-    """For each component, the straight bar with its area and second moments."""
+def _bars(
+    row: IndexArray, column: IndexArray, label: npt.NDArray[Any], number: int
+) -> tuple[npt.NDArray[Any], ...]:
+    """Return for each component 1 to ``number`` - 1 the straight bar with its area and second moments.
 
-    centres: FloatArray
-    """[px], shape (component, 2)."""
-    angles: FloatArray
-    """[rad]"""
-    lengths: FloatArray
-    """[px]"""
-    widths: FloatArray
-    """[px]"""
-    shares: FloatArray
-    """Share of the component that the bar covers, estimated by how much the component spreads sideways."""
+    ``label``: component of the pixels at ``row`` and ``column``.
 
-    @staticmethod
-    def of(row: IndexArray, column: IndexArray, label: npt.NDArray[Any], number: int) -> ComponentBars:
-        """Return the bars of the pixels labelled 1 to ``number`` - 1."""
-        size = np.bincount(label, minlength=number)[1:]
+    Returns:
+        centres [px], shape (component, 2), angles [rad], lengths and widths [px], and the share of the
+        component that the bar covers, estimated by how much the component spreads sideways.
+    """
+    size = np.bincount(label, minlength=number)[1:]
 
-        def mean(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-            return np.asarray(np.bincount(label, weights=values, minlength=number)[1:] / size)
+    def mean(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return np.asarray(np.bincount(label, weights=values, minlength=number)[1:] / size)
 
-        x, y = column + 0.5, row + 0.5
-        cx, cy = mean(x), mean(y)
-        # A pixel is a square, whose own second moment is a twelfth.
-        xx, yy = mean(x * x) - cx**2 + 1 / 12, mean(y * y) - cy**2 + 1 / 12
-        xy = mean(x * y) - cx * cy
-        half, root = (xx + yy) / 2, elementary.hypot((xx - yy) / 2, xy)
-        length, breadth = np.sqrt(12 * (half + root)), np.sqrt(12 * np.maximum(half - root, 1e-6))
-        width = size / length
-        angle, share = 0.5 * elementary.arctan2(2 * xy, xx - yy), np.minimum(1.0, width / breadth)
-        arrays = (np.stack([cx, cy], axis=1), angle, length, width, share)
-        return ComponentBars(*(np.asarray(array, np.float32) for array in arrays))
-
-    def exceed(self, fill_shares: FloatArray) -> npt.NDArray[np.bool_]:
-        """Return where a stroke removes more error than a fill that covers ``fill_shares`` of a component."""
-        share = np.maximum(MIN_STROKE_SHARE, MIN_ADVANTAGE * fill_shares)
-        return np.asarray((self.lengths > MIN_ASPECT * self.widths) & (self.shares > share))
+    x, y = column + 0.5, row + 0.5
+    cx, cy = mean(x), mean(y)
+    # A pixel is a square, whose own second moment is a twelfth.
+    xx, yy = mean(x * x) - cx**2 + 1 / 12, mean(y * y) - cy**2 + 1 / 12
+    xy = mean(x * y) - cx * cy
+    half, root = (xx + yy) / 2, elementary.hypot((xx - yy) / 2, xy)
+    length, breadth = np.sqrt(12 * (half + root)), np.sqrt(12 * np.maximum(half - root, 1e-6))
+    width = size / length
+    angle, share = 0.5 * elementary.arctan2(2 * xy, xx - yy), np.minimum(1.0, width / breadth)
+    arrays = (np.stack([cx, cy], axis=1), angle, length, width, share)
+    return tuple(np.asarray(array, np.float32) for array in arrays)

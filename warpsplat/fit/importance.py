@@ -17,11 +17,8 @@ parts, and the surroundings of a face should still be recognisable."""
 EMPTY_WEIGHT = 8.0
 """Weight of an empty pixel over others: what spills over an edge is visible on other backgrounds."""
 
-TEXTURE_SIGMA = 8.0
-"""Standard deviation of the window in which texture is measured [px]."""
-
-TEXTURE_NOISE = 4 / 255
-"""Standard deviation of colours below which an area counts as plain."""
+TEXTURE_SIGMA, TEXTURE_NOISE = 8.0, 4 / 255
+"""Standard deviations: of the window in which texture is measured [px], and of colours in plain areas."""
 
 PIXELS_PER_CHUNK = 1 << 16
 """Pixels whose weights are computed at once, to bound the memory."""

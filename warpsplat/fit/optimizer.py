@@ -37,7 +37,7 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
     if parameters.has_circles:
         program.launch(padded.tie_circles, parameters.shape_count, parameters.arrays)
-    units = Units.of(settings, parameters.canvas)
+    units = units_of(settings, parameters.canvas)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,
@@ -61,27 +61,18 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
             broken=parameters.broken,
             kinds=sum(1 << kind for kind in attribute.kinds),
             paints=sum(1 << paint for paint in attribute.paints),
-            rate=units.resolve(settings.rates[name], attribute.rate_unit),
-            low=units.resolve(*attribute.low),
-            high=units.resolve(*attribute.high),
+            rate=settings.rates[name] * units[attribute.rate_unit],
+            low=attribute.low[0] * units[attribute.low[1]],
+            high=attribute.high[0] * units[attribute.high[1]],
             split=True,
         )
 
 
-@dataclass(frozen=True)
-class Units:
-    """Length of each unit in canvas units."""
+def units_of(settings: Settings, canvas: Canvas) -> dict[Unit, float]:
+    """Return the length of each unit in canvas units; values without a unit stay as they are.
 
-    pixel: float
-    """A pixel of the finest training size, so that learning rates do not depend on the image's size."""
-    canvas: float
-
-    @staticmethod
-    def of(settings: Settings, canvas: Canvas) -> Units:
-        """Return the units of a run with ``settings`` on ``canvas``."""
-        finest = phases(settings, canvas.width, canvas.height)[-1]
-        return Units(canvas.width / finest.width, float(max(canvas.width, canvas.height)))
-
-    def resolve(self, value: float, unit: Unit) -> float:
-        """Return ``value`` in canvas units; a value without a unit stays as it is."""
-        return value * {Unit.ONE: 1.0, Unit.PIXEL: self.pixel, Unit.CANVAS: self.canvas}[unit]
+    A pixel is one of the finest training size, so that learning rates do not depend on the image's size.
+    """
+    finest = phases(settings, canvas.width, canvas.height)[-1]
+    pixel = canvas.width / finest.width
+    return {Unit.ONE: 1.0, Unit.PIXEL: pixel, Unit.CANVAS: float(max(canvas.width, canvas.height))}

@@ -19,11 +19,9 @@ from warpsplat.scene.scene import IntArray, starts_of
 GRADIENT_BYTES = 185
 """Bytes of a gradient of two stops in a file, with the reference to it."""
 
-GAIN_TO_TRY = 1.0
-"""Minimum gain of a ramp over the worth of its bytes while shapes are still added."""
-
-GAIN_TO_KEEP = 4.0
-"""The same while the surplus is removed: the shapes removed then save about as much."""
+GAIN_TO_TRY, GAIN_TO_KEEP = 1.0, 4.0
+"""Minimum gain of a ramp over the worth of its bytes: while shapes are still added, and while the surplus is
+removed, when the shapes removed save about as much."""
 
 RADIAL_ADVANTAGE = 1.05
 """Gain of a radial ramp over that of the linear one above which it is preferred."""

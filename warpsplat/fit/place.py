@@ -19,47 +19,32 @@ GRID_COVER = 1.3
 GRID_JITTER = 0.25
 """Maximum offset of a first shape along each axis, in cells of the grid."""
 
-STROKE_CUBICS = 3
-"""Cubics in a new stroke (paper section 3.2, as in DiffVG)."""
+STROKE_CUBICS, STROKE_ASPECT = 3, 3.0
+"""Cubics in a new stroke (paper section 3.2, as in DiffVG), and its length over its width."""
 
 MIXED_STROKE_POINTS = 6
 """Points of a new stroke among fills: a bar needs few, and with more of them it wobbles."""
 
-STROKE_ASPECT = 3.0
-"""Length over width of a new stroke."""
+REDUCED_PIXELS, REDUCED_SIGMA = 400_000, 128.0
+"""Maximum size of the image that the first shapes take colours and directions from [pixels], and maximum
+standard deviation of its blur [px], whose cost grows with it."""
 
-REDUCED_PIXELS = 400_000
-"""Maximum size of the image that the first shapes take colours and directions from [pixels]."""
-
-REDUCED_SIGMA = 128.0
-"""Maximum standard deviation of its blur [px], whose cost grows with it."""
-
-COLOR_LEVELS = 32
-"""Levels of a channel by which flat colours are distinguished."""
-
-FLAT_SHARE = 0.98
-"""Minimum share of a flat image's pixels that have one of its few colours; the others antialias outlines."""
-
-MAX_FLAT_COLORS = 12
-"""Maximum number of colours of a flat image, whose regions are counted."""
+COLOR_LEVELS, MAX_FLAT_COLORS, FLAT_SHARE = 32, 12, 0.98
+"""Levels of a channel by which flat colours are distinguished, most colours of a flat image, and minimum
+share of its pixels that have one of these; the others antialias outlines."""
 
 MIN_REGION_SHARE = 1e-4
 """Minimum area of a region that counts, over the area of the image."""
 
-SHAPES_PER_REGION = 8
-"""Shapes for a region of one colour: an outline has corners and holes."""
-
-MIN_SIMPLE_CURVES = 32
-"""Shapes for the simplest of flat images."""
+SHAPES_PER_REGION, MIN_SIMPLE_CURVES = 8, 32
+"""Shapes for a region of one colour, whose outline has corners and holes, and for the simplest flat image."""
 
 PIXELS_PER_CURVE = 8
 """Minimum number of pixels per shape: a shape has about as many parameters as these have values."""
 
-MIN_OCCUPIED_SHARE = 0.02
-"""Minimum share of a transparent image that is taken as occupied: bounds the number of places tried."""
-
-MIN_PLACE_OPACITY = 0.05
-"""Minimum opacity of a transparent image around a first shape."""
+MIN_OCCUPIED_SHARE, MIN_PLACE_OPACITY = 0.02, 0.05
+"""Minimum share of a transparent image that is taken as occupied, which bounds the number of places tried,
+and minimum opacity around a first shape."""
 
 Floats = npt.NDArray[np.floating]
 
@@ -219,14 +204,12 @@ def _unit_circle(count: int) -> Floats:
 
 
 def shape_angles(settings: Settings, target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
-    """Return ``contour_angles`` for strokes, 0 for fills, which start as circles."""
+    """Return the direction of new shapes at ``centres`` [rad]: for strokes that of contours.
+
+    It is the structure tensor's lesser eigenvector. Fills start as circles and have none: 0.
+    """
     if settings.kind == Kind.FILL:
         return np.zeros(len(centres), np.float32)
-    return contour_angles(target, centres, sigma)
-
-
-def contour_angles(target: FloatArray, centres: Floats, sigma: float) -> FloatArray:
-    """Return the direction of contours at ``centres`` [rad]: the structure tensor's lesser eigenvector."""
     grey = target.mean(axis=2)
     gx, gy = filters.sobel(grey)
     xx, yy, xy = (filters.gaussian_blur(g, max(sigma, 0.5)) for g in (gx * gx, gy * gy, gx * gy))

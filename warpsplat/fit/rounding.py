@@ -18,17 +18,12 @@ from warpsplat.scene import OPACITY_RANGE, Paint, Scene
 from warpsplat.svg.viewer import on_white, premultiplied
 from warpsplat.svg.write import GRIDS, resized, rounded
 
-STAGES = 3
-"""A third of the control points each: of cubics those on the outline, then the handles."""
+STAGES, STAGE_SHARE = 3, 0.015
+"""A third of the control points each (of cubics those on the outline, then the handles), and the steps after
+each stage as a share of the run."""
 
-STAGE_SHARE = 0.015
-"""Steps after each stage, as a share of the run."""
-
-MAX_LOSS = 0.03
-"""Maximum loss by rounding [dB]."""
-
-MAX_TRADED_LOSS = 0.06
-"""Maximum loss by rounding where bytes are traded for error [dB]: beyond, refitting fails."""
+MAX_LOSS, MAX_TRADED_LOSS = 0.03, 0.06
+"""Maximum loss by rounding [dB], also where bytes are traded for error: beyond, refitting fails."""
 
 STAGED_COST = 0.2
 """Cost of rounding in stages over that of rounding at once, measured."""
@@ -36,12 +31,9 @@ STAGED_COST = 0.2
 USUAL_GRID = 5.0
 """Units per pixel by which files are measured before the grid is chosen."""
 
-OPACITY_BYTES = 10
-"""Mean bytes of a shape's opacity: most shapes share a group that has it."""
-
-OPAQUE_COST = 0.5
-"""Cost of making a shape opaque after the others are refitted, over the cost at first."""
-
+OPACITY_BYTES, OPAQUE_COST = 10, 0.5
+"""Mean bytes of a shape's opacity, as most shapes share a group that has it, and cost of making a shape
+opaque after the others are refitted, over the cost at first."""
 
 DB_PER_DOUBLING = 1.8
 """Gain from twice the shapes, and so twice the bytes, on photographs [dB] (docs/experiments.md)."""

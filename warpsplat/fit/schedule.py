@@ -17,11 +17,8 @@ TRAINING_SLACK = 2.0
 CHECK_INTERVAL = 10
 """Steps between two reads of the loss and of the device's counters."""
 
-EVALUATE_FROM = 0.75
-"""Share of the run after which the file is evaluated."""
-
-EVALUATE_INTERVAL = 50
-"""Steps between two evaluations of the file as a viewer shows it."""
+EVALUATE_FROM, EVALUATE_INTERVAL = 0.75, 50
+"""Share of the run after which the file is evaluated as a viewer shows it, and steps in between."""
 
 REPAINT_SHARE = 0.1
 """Share of the run between two searches for gradients, which take as long as several steps."""

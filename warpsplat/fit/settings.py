@@ -61,11 +61,8 @@ FITTED: tuple[Subject, ...] = ("auto", "photo")
 """Subjects of options that only fitted shapes have a use for."""
 
 
-LEVEL_FACTOR = 4
-"""Shapes of a level over those of the one before, where only ``layered`` is asked for."""
-
-LEAST_LEVEL_SHAPES = 8
-"""Least number of shapes of the first of these levels."""
+LEVEL_FACTOR, LEAST_LEVEL_SHAPES = 4, 8
+"""Shapes of a level over those of the one before if only ``layered`` is asked for, and least of the first."""
 
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""

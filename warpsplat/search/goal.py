@@ -22,27 +22,18 @@ from warpsplat.svg.write import GRIDS
 MOST_CURVES = 20_000
 """Most shapes without ``--curves``."""
 
-PROBE_CURVES = 256
-"""Shapes of the first probe run."""
+PROBES, PROBE_CURVES, PROBE_STEP = 4, 256, 8.0
+"""Most probe runs, shapes of the first one, and largest factor between the numbers of two."""
+
+PROBE_RANGE = 2.0
+"""Factor of the number of shapes over which the estimate of a probe run holds."""
 
 PROBE_GAIN = 1.5
 """Least gain of 1,000 steps over a probe run with as many shapes [dB]. It errs towards too many shapes, since
 removing some at the end costs little."""
 
-PROBE_RANGE = 2.0
-"""Factor of the number of shapes over which the estimate of a probe run holds."""
-
-PROBE_STEP = 8.0
-"""Largest factor between the numbers of shapes of two probe runs."""
-
-PROBES = 4
-"""Most probe runs."""
-
-PROBE_TIME = 0.15
-"""Share of a time budget for all probe runs."""
-
-FIRST_TIME = 0.7
-"""Share of the remaining time for the first fit; the rest is for the rounds."""
+PROBE_TIME, FIRST_TIME = 0.15, 0.7
+"""Shares of a time budget: for all probe runs, and of the rest for the first fit."""
 
 FIRST_FITS = 3
 """First fits of a file of few shapes, with different seeds: by chance they differ by tenths of a decibel."""
@@ -53,11 +44,8 @@ SEARCH_ROUNDS = 6
 LIKELY_PROBES, LIKELY_ROUNDS = 2, 3
 """Probe runs and rounds that a search takes on average, for its progress."""
 
-ENOUGH_DB = 0.03
-"""A file this little above the target is small enough [dB]."""
-
-AIM_DB = 0.01
-"""How far above the target a new candidate aims [dB]."""
+ENOUGH_DB, AIM_DB = 0.03, 0.01
+"""A file this little above the target is small enough, and a new candidate aims so far above it [dB]."""
 
 CUT_DB = 1.3
 """Loss by halving the number of shapes, at the rate of the first to be removed, the others refitted [dB]."""
@@ -68,20 +56,12 @@ NEAR_SIZE = 0.005
 LEAST_LACK = 0.05
 """A file that misses the target gets shapes for at least so much [dB]."""
 
-FULL_SHARE = 0.98
-"""Share of the size limit from which a file is large enough."""
+FULL_SHARE, AIM_FULL = 0.98, 0.996
+"""Shares of the size limit from which a file is large enough, and that a new candidate aims at."""
 
-AIM_FULL = 0.996
-"""Share of the size limit that a new candidate aims at."""
-
-CUT_MOST = 0.8
-"""Least size of a candidate over that of its base: removing more loses shapes that would be missed."""
-
-SAME_GRID = 1.15
-"""Largest growth at which a candidate keeps the grid of its base; beyond, the grid is chosen again."""
-
-GROW_MOST = 1.35
-"""Largest size of a candidate over that of its base."""
+CUT_MOST, GROW_MOST, SAME_GRID = 0.8, 1.35, 1.15
+"""Smallest and largest size of a candidate over that of its base, as removing more loses shapes that would be
+missed, and the largest at which it keeps its base's grid."""
 
 BY_BYTES = Rounding(by_bytes=True)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from warpsplat.fit.optimizer import Units
+from warpsplat.fit.optimizer import units_of
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import IndexArray, Scene
@@ -53,12 +53,12 @@ class Module(torch.nn.Module):
             rate: factor of all learning rates.
         """
         settings = settings or Settings()
-        units = Units.of(settings, self._layout.canvas)
+        units = units_of(settings, self._layout.canvas)
         return [
             {
                 "params": [parameter],
                 "name": name,
-                "lr": rate * units.resolve(settings.rates[name], TABLE[name].rate_unit),
+                "lr": rate * (settings.rates[name] * units[TABLE[name].rate_unit]),
             }
             for name, parameter in self.named_parameters()
         ]
@@ -66,9 +66,10 @@ class Module(torch.nn.Module):
     @torch.no_grad()
     def project(self) -> None:
         """Clamp every attribute to its bounds, as a run does after each step."""
-        units = Units.of(Settings(), self._layout.canvas)
+        units = units_of(Settings(), self._layout.canvas)
         for name, parameter in self.named_parameters():
-            parameter.clamp_(units.resolve(*TABLE[name].low), units.resolve(*TABLE[name].high))
+            low, high = (value * units[unit] for value, unit in (TABLE[name].low, TABLE[name].high))
+            parameter.clamp_(low, high)
 
     def scene(self) -> Scene:
         """Return the scene of the current parameters."""
