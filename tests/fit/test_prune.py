@@ -7,7 +7,7 @@ import pytest
 
 from tests.scenes import random_scene, with_points
 from warpsplat.fit import densification
-from warpsplat.fit.densification import PAIRS_PER_CHUNK, choose_removed, duplicates, prune_mask
+from warpsplat.fit.densification import PAIRS_PER_CHUNK, duplicates, prune_mask
 from warpsplat.fit.place import circle_outlines
 from warpsplat.fit.settings import Density
 from warpsplat.scene import Kind, Scene
@@ -50,10 +50,3 @@ def test_duplicates_match_brute_force(chunk: int, monkeypatch: pytest.MonkeyPatc
                 wanted[min(i, j)] = True
     assert wanted.any()
     np.testing.assert_array_equal(duplicates(scene, DENSITY), wanted)
-
-
-def test_pruned_shapes_are_removed_before_cheap_ones() -> None:
-    costs = np.array([5, 1, 3, 2, 4], np.float32)
-    pruned = np.array([True, False, False, False, True])
-    assert set(choose_removed(pruned, 3, costs)) == {0, 4, 1}
-    assert set(choose_removed(pruned, 0, costs)) == {0, 4}

@@ -181,7 +181,7 @@ def at(*keys: Any, value: Any) -> Callable[[dict[str, Any], dict[str, np.ndarray
         (at("fits", 0, "curves", value=11), "curves"),
         (at("fits", 0, "generator", value={}), "damaged"),
         (at("fits", 0, "generator", "state", "state", value=-1), "damaged"),
-        (at("fits", 0, "room", value=[]), "room"),
+        (at("fits", 0, "room", value=[]), "damaged"),
         (at("fits", 0, "room", 0, "slots", value=10**6), "slots"),
         (at("fits", 0, "per_pixel", value=float("nan")), "per_pixel"),
         (at("0/points", value=lambda a: np.where(a == a.max(), np.float32(np.nan), a)), "points has numbers"),

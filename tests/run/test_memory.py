@@ -162,7 +162,7 @@ def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
     facts = image_facts(data)
     assert facts
     limit = need(facts, make_settings(curves=4)) - 1
-    monkeypatch.setattr("warpsplat.run.reduction.whole_score", lambda *_: limit + (not whole))
+    monkeypatch.setattr("warpsplat.run.memory.whole_score", lambda *_: limit + (not whole))
     output = tmp_path / "out.svg"
     made = warpsplat.vectorize(data, **QUICK, max_memory=limit, output=output, name="big.png")
     assert output.read_text() == made.svg

@@ -115,7 +115,8 @@ def number(
 ) -> Any:
     """Return a number of a type by its name; raise ``ValueError`` if it is missing, or out of range."""
     value = numbers.get(name)
-    if type(value) is not kind or not low <= value <= high:
+    is_of_kind = type(value) is kind  # True is an int, but no number
+    if not (is_of_kind and low <= value <= high):
         raise ValueError(f"{name} is no {kind.__name__} from {low:g} to {high:g}")
     return value
 

@@ -13,7 +13,7 @@ from warpsplat.kernels import constraints as kernels
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
-from warpsplat.scene import Basis, Canvas, FloatArray, IndexArray, Scene
+from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 from warpsplat.scene.joints import Joint
 from warpsplat.scene.scene import ranges
 
@@ -118,17 +118,18 @@ class Constraints:
         ties = _Ties(2 * count)
         ties.join_same(drawing.same)
         ties.join_where(_equal(points, on[straight], following[straight]), on[straight], following[straight])
-        joints = _smooth_joints(drawing, line_start, line_end, ties)
+        joints, leaders = _smooth_joints(drawing, line_start, line_end, ties)
         turned = np.full((count, 2), NONE, np.int32)
         for number, (_, begin, end, side) in enumerate(joints):
             if side == AFTER:
                 turned[begin, 0] = number
             elif side == BEFORE:
                 turned[end, 1] = number
-        leaders = {handle for joint in joints for handle in _handles(*joint[1:])}
         of_lines = set(np.concatenate([on[straight] + 1, on[straight] + 2]).tolist())
         point, before, after, free = np.asarray(joints, np.int32).reshape(-1, 4).T
-        first, member, pinned = ties.groups(leaders, set(on.tolist()), of_lines, _on_border(points, canvas))
+        size = np.array([canvas.width, canvas.height])
+        border = np.asarray(np.minimum(np.abs(points), np.abs(points - size)) < SAME_COORDINATE)
+        first, member, pinned = ties.groups(leaders, set(on.tolist()), of_lines, border)
         return Constraints(line_end, line_start, point, before, after, free, turned, first, member, pinned)
 
     @property
@@ -145,16 +146,10 @@ def _equal(points: FloatArray, a: Links, b: Links) -> npt.NDArray[np.bool_]:
     return np.asarray(np.abs(points[a] - points[b]) < SAME_COORDINATE)
 
 
-def _on_border(points: FloatArray, canvas: Canvas) -> npt.NDArray[np.bool_]:
-    """Return which coordinates lie on the border of the canvas, shape (point, 2)."""
-    size = np.array([canvas.width, canvas.height])
-    return np.asarray(np.minimum(np.abs(points), np.abs(points - size)) < SAME_COORDINATE)
-
-
 def _smooth_joints(
     drawing: Drawing, line_start: Ints, line_end: Ints, ties: _Ties
-) -> list[tuple[int, int, int, int]]:
-    """Return point, neighbours and flags of the smooth joints that direct handles.
+) -> tuple[list[tuple[int, int, int, int]], set[int]]:
+    """Return point, neighbours and flags of the smooth joints that direct handles, and these handles.
 
     Where the tangent is level or upright, ``ties`` get the handles instead.
     """
@@ -172,7 +167,7 @@ def _smooth_joints(
     turned = ~free.all(axis=1) & (reach > MAX_LEVERAGE * _reach(points, smooth, lines, ~free))
     around = np.where(free, handles, lines)
     flat = _equal(points, around[:, 0], smooth) & _equal(points, smooth, around[:, 1])
-    bound: set[int] = set()
+    bound, directed = set[int](), set[int]()
     joints = []
     for i in np.flatnonzero(free.any(axis=1)).tolist():
         own = handles[i][free[i]].tolist()
@@ -186,18 +181,14 @@ def _smooth_joints(
         else:
             (before, after), sides = around[i].tolist(), free[i].tolist()
             joints.append((int(smooth[i]), before, after, BEFORE * sides[0] + AFTER * sides[1]))
-    return joints
+            directed.update(own)
+    return joints, directed
 
 
 def _reach(points: FloatArray, on: Links, others: Links, counted: npt.NDArray[np.bool_]) -> FloatArray:
     """Return the distance from points ``on`` to the farther ``counted`` one of two ``others``, (point, 2)."""
     distance = np.linalg.norm(points[others] - points[on][:, None], axis=2)
     return np.asarray(np.where(counted, distance, 0).max(axis=1, initial=0))
-
-
-def _handles(before: int, after: int, free: int) -> list[int]:
-    """Return the neighbours of a smooth joint that are free handles."""
-    return [before] * bool(free & BEFORE) + [after] * bool(free & AFTER)
 
 
 class _Ties:

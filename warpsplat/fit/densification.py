@@ -100,8 +100,8 @@ def _kept(step: Step, scene: Scene, costs: FloatArray, wanted: int) -> IndexArra
     replaced = 0 if wanted < len(scene) else round(settings.density.replace * (len(scene) - base))
     ranked = costs.astype(np.float32)
     ranked[:base] = np.inf
-    removed = choose_removed(pruned, max(replaced, len(scene) - wanted), ranked)
-    return np.setdiff1d(np.arange(len(scene)), removed)
+    count = max(replaced, len(scene) - wanted, int(pruned.sum()))
+    return np.sort(np.lexsort((ranked, ~pruned))[count:])
 
 
 def _reduce_points(step: Step, costs: FloatArray) -> None:
@@ -164,12 +164,6 @@ def _are_similar(
     overlap = common / (sizes[i] + sizes[j] - common)
     distance = np.linalg.norm(colors[j] - colors[i], axis=1)
     return np.asarray((overlap > density.duplicate_overlap) & (distance < density.duplicate_color))
-
-
-def choose_removed(pruned: BoolArray, count: int, costs: FloatArray) -> IndexArray:
-    """Return ``count`` shapes to remove: all ``pruned`` ones, then those with the least removal ``costs``."""
-    rank = np.lexsort((costs, ~pruned))
-    return np.asarray(rank[: max(count, int(pruned.sum()))])
 
 
 def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:

@@ -56,7 +56,6 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
 
 def weights_at(weights: FloatArray, width: int, height: int) -> FloatArray:
     """Return ``weights`` at another size, with mean 1, as learning rates and other losses assume."""
-    resized = weights
-    if weights.shape != (height, width):
-        resized = filters.resize_area(weights, (width, height))
+    same = weights.shape == (height, width)
+    resized = weights if same else filters.resize_area(weights, (width, height))
     return np.asarray(resized / resized.mean(dtype=np.float64), np.float32)

@@ -8,6 +8,7 @@ without levels.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import replace
 
@@ -30,7 +31,8 @@ def fit_layered(problem: Problem, run: Run) -> Fit:
     steps = sum(each.iterations for each in rounds)
     for settings in rounds:
         is_last = settings is rounds[-1]
-        part = _part(run, done, settings.iterations, steps, is_last=is_last)
+        whole = run.mapped(functools.partial(_of_all, done, steps, is_last))
+        part = whole.part(done / steps, (done + settings.iterations) / steps)
         rounding = Rounding() if is_last else None
         made = fit(replace(problem, settings=settings), part, Start(below=below), rounding)
         done += made.iterations
@@ -41,13 +43,9 @@ def fit_layered(problem: Problem, run: Run) -> Fit:
     return replace(made, iterations=done, renewed=renewed)
 
 
-def _part(run: Run, before: int, own: int, steps: int, *, is_last: bool) -> Run:
-    """Return the run of a level with ``own`` of all ``steps``, ``before`` of which were made earlier."""
-
-    def as_whole(now: Progress) -> Progress:
-        return replace(now, step=before + now.step, steps=steps, fine=now.fine and is_last)
-
-    return run.mapped(as_whole).part(before / steps, (before + own) / steps)
+def _of_all(before: int, steps: int, is_last: bool, now: Progress) -> Progress:
+    """Return the progress of a level, with ``before`` of all ``steps`` made earlier, as that of the whole."""
+    return replace(now, step=before + now.step, steps=steps, fine=now.fine and is_last)
 
 
 def _rounds(settings: Settings) -> list[Settings]:
@@ -57,17 +55,9 @@ def _rounds(settings: Settings) -> list[Settings]:
     """
     rounds = []
     for first, last in itertools.pairwise((0, *settings.levels)):
-        is_last = last == settings.levels[-1]
-        share = LAST if is_last else EARLIER
+        share, coarse = (EARLIER, 1.0) if last < settings.levels[-1] else (LAST, settings.coarse)
         density = replace(settings.density, start=1.0) if first else settings.density
-        rounds.append(
-            replace(
-                settings,
-                curves=last - first,
-                levels=(),
-                iterations=max(1, round(share * settings.iterations)),
-                coarse=settings.coarse if is_last else 1.0,
-                density=density,
-            )
-        )
+        iterations = max(1, round(share * settings.iterations))
+        level = replace(settings, curves=last - first, levels=(), iterations=iterations)
+        rounds.append(replace(level, coarse=coarse, density=density))
     return rounds

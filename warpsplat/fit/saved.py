@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -94,10 +94,7 @@ def step_from(
         colored=parameters.revision if number(numbers, "colored", bool) else -1,
     )
     step = Step(state, settings, target(settings, done - 1), began=number(numbers, "began", int, 0, done))
-    capacities = numbers["room"]
-    if not isinstance(capacities, list) or len(capacities) != len(step.renderers):
-        raise ValueError("room does not match the renderers")
-    for renderer, capacity in zip(step.renderers, capacities, strict=True):
+    for renderer, capacity in zip(step.renderers, numbers["room"], strict=True):
         _restore_capacity(renderer, capacity)
     if "target" in content.arrays:
         shifted = typed(content.arrays, "target", np.float32)
@@ -110,24 +107,17 @@ def step_from(
 
 
 def _capacity(renderer: Renderer) -> dict[str, int]:
-    capacity, needed = renderer.capacity_and_need()
-    return {
-        "samples": capacity.samples,
-        "slots": capacity.slots,
-        "needed samples": needed.samples,
-        "needed slots": needed.slots,
-    }
+    capacity, needed = map(asdict, renderer.capacity_and_need())
+    return capacity | {f"needed {name}": size for name, size in needed.items()}
 
 
 def _restore_capacity(renderer: Renderer, saved: Any) -> None:
     """Set the capacity: what does not fit is left out until the next check, as in the fit that was saved."""
     if not isinstance(saved, dict):
-        raise TypeError("room is not a table")
-    now, _ = renderer.capacity_and_need()
-    samples, slots = SPARE_CAPACITY * now.samples, SPARE_CAPACITY * now.slots
-    renderer.restore_capacity(
-        Capacity(number(saved, "samples", int, 1, samples), number(saved, "slots", int, 1, slots)),
-        Capacity(
-            number(saved, "needed samples", int, 0, samples), number(saved, "needed slots", int, 0, slots)
-        ),
+        raise TypeError("room is no table")
+    most = {name: SPARE_CAPACITY * size for name, size in asdict(renderer.capacity).items()}
+    capacity, needed = (
+        Capacity(**{name: number(saved, prefix + name, int, least, size) for name, size in most.items()})
+        for least, prefix in ((1, ""), (0, "needed "))
     )
+    renderer.restore_capacity(capacity, needed)

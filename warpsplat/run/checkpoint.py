@@ -114,10 +114,6 @@ class CheckpointFile:
             )
         return Content(header, arrays)
 
-    def remove(self) -> None:
-        """Remove the file, since the run is done."""
-        self.path.unlink(missing_ok=True)
-
 
 def open_checkpoint(
     path: str | os.PathLike[str] | None,

@@ -14,8 +14,7 @@ from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, ssim
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.memory import PROGRAM, SSIMULACRA2, memory_limit
-from warpsplat.run.reduction import Reduction
+from warpsplat.run.memory import PROGRAM, SSIMULACRA2, Reduction, memory_limit
 from warpsplat.run.result import LevelScore
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends

@@ -13,8 +13,7 @@ from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, make_settings, solid_color
 from warpsplat.native import release_memory
-from warpsplat.run.memory import factor_for, facts_of, mask_factor
-from warpsplat.run.reduction import Reduction, reduction_for
+from warpsplat.run.memory import Reduction, factor_for, facts_of, mask_factor, reduction_for
 from warpsplat.run.result import job_key
 from warpsplat.scene import FloatArray, Kind, Scene
 

@@ -105,7 +105,7 @@ def refine(
     if output is not None:
         write_named(Path(output), result.svg)
     if kept and not result.stopped:
-        kept.remove()
+        kept.path.unlink(missing_ok=True)
     return result
 
 

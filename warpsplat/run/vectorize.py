@@ -105,7 +105,7 @@ def vectorize(
         saved = kept.open(identity("vectorize", settings, prepared.problem), backend) if kept else None
         result = make_result(prepared, Run(backend, callback, stop, checkpoint=saved), write)
     if kept and not result.stopped:
-        kept.remove()
+        kept.path.unlink(missing_ok=True)
     return result
 
 

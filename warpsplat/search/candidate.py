@@ -84,14 +84,10 @@ def changed(problem: Problem, change: Change, run: Run) -> Fit:
     settings = problem.settings
     density = replace(settings.density, interval=0)  # the shapes stay
     last = problem.having(target_psnr=None, curves=len(scene), density=density)
-    start = Start(scene=scene, begin=repeated_from(settings))
+    # Before coordinates are rounded.
+    latest = settings.iterations - STAGES * stage_steps(settings) - 1
+    start = Start(scene=scene, begin=max(0, min(round((1 - LAST_STEPS) * settings.iterations), latest)))
     return fit(last, run.unsized(), start, Rounding(change.per_pixel, by_bytes=True))
-
-
-def repeated_from(settings: Settings) -> int:
-    """Return the step at which the repeated steps begin: before coordinates are rounded."""
-    steps = settings.iterations
-    return max(0, min(round((1 - LAST_STEPS) * steps), steps - STAGES * stage_steps(settings) - 1))
 
 
 def resized_scene(problem: Problem, change: Change, backend: Backend) -> Scene:
