@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import drawing, logo, seam
+from tests.drawing.drawings import logo, seam
 from tests.helpers import relative_error
 from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Projection
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.scene import Canvas
 from warpsplat.scene.joints import Joint
 
 DRAWINGS = pytest.mark.parametrize("made", [logo(), seam()], ids=["logo", "seam"])
@@ -115,15 +114,3 @@ def test_joints_and_ties_of_a_seam() -> None:
         values = made.scene.points.reshape(-1)[group]
         size = np.array([48, 32])[group % 2]
         assert pinned == ((values == 0) | (values == size)).any()
-
-
-@pytest.mark.parametrize(("line", "directed"), [(10.0, True), (1.0, False)])
-def test_a_short_line_gives_no_direction(line: float, directed: bool) -> None:
-    """Rounding its end would turn a handle twenty times as long by pixels."""
-    end = 10 + line * np.array([0.6, 0.8])
-    first = [10 + t * (end - 10) for t in (0, 1 / 3, 2 / 3, 1)]
-    rest = np.array([[40, 20], [50, 50], [40, 50], [20, 40]], float)
-    outline = np.concatenate([first, [end + 20 * np.array([0.6, 0.8])], rest])
-    kinds = [Joint.CORNER, *2 * [Joint.LINE_HANDLE], Joint.SMOOTH, *2 * [Joint.FREE], Joint.CORNER]
-    made = drawing(Canvas(64, 64, None), ((0, 0, 0), [(outline, [*kinds, *2 * [Joint.FREE]])]))
-    assert (Constraints.of(made).joint_point.tolist() == [3]) is directed

@@ -56,15 +56,6 @@ def test_a_candidate_is_the_deepest_pixel_of_its_component() -> None:
     assert (found.masses <= 1.001 * np.array(wanted)[:, 3]).all()
 
 
-@pytest.mark.parametrize("error", [0.0, 0.1])
-def test_there_are_always_as_many_as_asked_for(error: float) -> None:
-    settings = make_settings()
-    flat = np.full((40, 40, 3), 0.3, np.float32)
-    image = flat + np.float32(error)
-    rng = np.random.default_rng(0)
-    assert len(new_shapes(settings, empty_scene(settings, flat), flat, image, 7, rng)) == 7
-
-
 def bar_and_disc() -> FloatArray:
     image = np.zeros((64, 96, 3), np.float32)
     cv2.line(image, (18, 18), (62, 42), (1.0, 1.0, 1.0), 4)

@@ -11,12 +11,10 @@ import pytest
 from tests.fit.pictures import picture
 from tests.runs import scored, vectorize
 from tests.scenes import mixed_scene
-from warpsplat.errors import UsageError
 from warpsplat.fit.loop import Start
-from warpsplat.fit.options import parse_levels
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import Phase
-from warpsplat.fit.settings import levels_of, make_settings
+from warpsplat.fit.settings import make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.metrics import psnr, score_svg
@@ -88,21 +86,10 @@ def test_hiding_groups_leaves_the_simpler_picture(device: str) -> None:
     assert score.psnr == pytest.approx(result.levels[0].psnr, abs=0.02)
 
 
-def test_levels_are_checked() -> None:
-    assert make_settings(levels="64,256").curves == 256
+def test_levels_of_settings() -> None:
+    assert make_settings(levels="64,256").curves == make_settings(levels=[64, 256]).curves == 256
     assert make_settings(layered=True, curves=512).levels == (32, 128, 512)
-    assert levels_of(20) == (20,)
-    assert parse_levels([3, 5]) == (3, 5)
-    for given, cause in (
-        ({"levels": "5,5"}, "ascend"),
-        ({"levels": "5,x"}, "numbers of shapes"),
-        ({"levels": "0,4"}, "levels must be ascending numbers of shapes"),
-        ({"levels": "4,8", "curves": 9}, "differ"),
-        ({"levels": "4,8", "max_bytes": "4KB"}, "max-bytes"),
-        ({"layered": "yes"}, "true or false"),
-    ):
-        with pytest.raises(UsageError, match=cause):
-            make_settings(**given)
+    assert make_settings(layered=True, curves=20).levels == (20,)
 
 
 def test_levels_are_read_back_and_refined_as_such() -> None:

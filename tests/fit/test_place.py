@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from warpsplat.fit import place
-from warpsplat.fit.place import grid_scene, reduced, shape_angles, simple_curves
+from warpsplat.fit.place import grid_scene, shape_angles, simple_curves
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Kind
 from warpsplat.scene.geometry import areas
@@ -26,13 +26,6 @@ def blobs(height: int, width: int) -> np.ndarray:
     rng = np.random.default_rng(0)
     small = rng.uniform(0, 1, (6, 8, 3)).astype(np.float32)
     return np.clip(cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC), 0, 1)
-
-
-@pytest.mark.parametrize(("shape", "sigma"), [((3000, 4000), 5.0), ((60, 80), 1000.0), ((2, 9000), 500.0)])
-def test_reduced_images_are_bounded(shape: tuple[int, int], sigma: float) -> None:
-    small, span = reduced(np.zeros((*shape, 1), np.float32), sigma)
-    assert small.shape[0] * small.shape[1] <= 1.01 * place.REDUCED_PIXELS
-    assert sigma / span <= place.REDUCED_SIGMA * 1.001
 
 
 def test_strokes_lie_along_contours() -> None:

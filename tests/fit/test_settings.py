@@ -81,6 +81,10 @@ def test_density_may_be_given_in_part() -> None:
         ({"subject": "drawing", "open": True}, "subject drawing and open do not go together"),
         ({"subject": "drawing", "paint": "auto"}, "subject drawing and paint auto do not go together"),
         ({"subject": "line", "max_bytes": 900}, "subject line and max-bytes do not go together"),
+        ({"levels": "5,x"}, "levels must be numbers of shapes"),
+        ({"levels": "5,5"}, "levels must be ascending numbers of shapes"),
+        ({"levels": "4,8", "curves": 9}, "curves 9 and the last of the levels"),
+        ({"levels": "4,8", "max_bytes": "4KB"}, "levels and max-bytes"),
         ({"size": "9x9mm", "page": "a4"}, "size and page do not go together"),
     ],
 )

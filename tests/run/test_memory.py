@@ -198,11 +198,6 @@ def test_a_small_mask_loses_nothing() -> None:
         assert mask_factor(HUGE, replace(HUGE, width=width), 4) == factor
 
 
-def test_opacity_takes_more_memory_to_refine() -> None:
-    wanted = [memory.need_refined(replace(HUGE, channels=channels), Settings()) for channels in (3, 4)]
-    assert wanted[0] < 0.6 * wanted[1]
-
-
 def test_refining_against_what_takes_too_much_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

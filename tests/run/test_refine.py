@@ -10,7 +10,7 @@ import pytest
 
 from tests.fit.pictures import picture
 from tests.runs import scored
-from tests.scenes import ragged_scene, random_scene
+from tests.scenes import random_scene
 from tests.svg.foreign import FOREIGN, HEAD
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
@@ -80,16 +80,6 @@ def test_splines_of_own_files_stay_splines(device: str, kind: Kind) -> None:
     assert scored(result).bytes < 1.15 * len(text), "0.92 to 0.97 over five seeds"
     back, _ = load_scene(result.svg, 48, 40, "b.svg")
     np.testing.assert_array_equal(back.basis, scene.basis)
-
-
-def test_an_own_file_of_both_bases_is_refined(device: str) -> None:
-    """The image has another size than the file."""
-    outlines = [(Kind.FILL, basis, n) for n in (3, 5) for basis in Basis]
-    text = write_svg(ragged_scene(outlines, 48, 40, seed=1), per_pixel=3)
-    target = np.full((80, 96, 3), 0.4, np.float32)
-    result, before = improved(text, target, make_settings(iterations=10), device)
-    assert scored(result).psnr > before
-    assert result.scene.basis.tolist() == [basis for _, basis, _ in outlines]
 
 
 MIXED = (

@@ -23,11 +23,6 @@ def test_a_fit_begins_where_its_schedule_has_as_many_shapes(few: int, share: flo
         assert shapes_at(settings, begin) == pytest.approx(1.5 * few, rel=0.1)
 
 
-def test_a_fit_starts_from_scratch_where_few_steps_would_be_left() -> None:
-    assert begin_of(make_settings("draft", curves=100), 75) == 0
-    assert begin_of(make_settings(curves=100, density={"interval": 0}), 75) == 0
-
-
 @pytest.mark.parametrize(("few", "many"), [(50, 200), (200, 250), (10, 9000)])
 def test_the_schedule_goes_on_from_the_shapes_that_there_are(few: int, many: int) -> None:
     settings, full = make_settings(curves=many), round(1.5 * few)

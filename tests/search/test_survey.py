@@ -9,10 +9,9 @@ import pytest
 
 from tests.fit.pictures import picture
 from warpsplat.fit.problem import Problem, Run
-from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
-from warpsplat.search.survey import BEND, EFFORT_GAIN, STEEPEST, expected, expected_gain, lost_detail, survey
+from warpsplat.search.survey import BEND, STEEPEST, expected, lost_detail, survey
 
 
 def test_it_goes_through_what_was_measured() -> None:
@@ -32,11 +31,6 @@ def test_more_shapes_are_never_worse(few: float) -> None:
     decibels = worth.psnr(np.geomspace(16, 1024, 50))
     assert (np.diff(decibels) >= -1e-9).all()
     assert float(decibels[-1] - decibels[0]) < 6 * STEEPEST + 16 * BEND
-
-
-def test_what_is_much_larger_than_most_steps_see_gains_little() -> None:
-    gains = [expected_gain(30.0, [Phase(100, 100), Phase(side, 100)]) for side in (400, 800, 1600, 9000)]
-    assert gains == pytest.approx([EFFORT_GAIN, EFFORT_GAIN / 2, 0, 0])
 
 
 def test_detail_that_the_finest_size_lacks() -> None:

@@ -114,7 +114,7 @@ def number(
     numbers: Mapping[str, Any], name: str, kind: type, low: float = -math.inf, high: float = math.inf
 ) -> Any:
     """Return a number of a type by its name; raise ``ValueError`` if it is missing, or out of range."""
-    value = numbers.get(name)
+    value: Any = numbers[name]
     is_of_kind = type(value) is kind  # True is an int, but no number
     if not (is_of_kind and low <= value <= high):
         raise ValueError(f"{name} is no {kind.__name__} from {low:g} to {high:g}")
