@@ -45,11 +45,7 @@ class Checkpoint:
     ) -> None:
         """Begin a new run, or resume ``saved``; raise ``CheckpointError`` if that is damaged.
 
-        Args:
-            name: of the file of ``saved``, for messages.
-            write: saves the state of the run.
-            every: time between two saves [s].
-            saved: state of the run to resume.
+        ``name`` is that of the file, for messages; ``write`` saves the state, ``every`` so many seconds.
         """
         self._name, self._write, self._every = name, write, every
         self._results: list[Content] = []
@@ -117,7 +113,7 @@ def number(
     value: Any = numbers[name]
     is_of_kind = type(value) is kind  # True is an int, but no number
     if not (is_of_kind and low <= value <= high):
-        raise ValueError(f"{name} is no {kind.__name__} from {low:g} to {high:g}")
+        raise ValueError(f"{name} is no {kind.__name__} in its range")
     return value
 
 

@@ -227,11 +227,9 @@ class _Ties:
     ) -> tuple[Ints, Ints, Ints]:
         """Return first members, members and pins of the ties of several coordinates or of pinned ones.
 
-        Args:
-            leaders: points that come first in their ties ...
-            on: ... and after these, those on the outlines.
-            of_lines: handles of lines, which follow from the ends of these and are in no tie.
-            border: coordinates that are pinned, with their ties, shape (point, 2).
+        In a tie, points of ``leaders`` come first, then those ``on`` the outlines. The handles ``of_lines``
+        follow from the ends of these and are in none. Coordinates on the ``border``, shape (point, 2), are
+        pinned, with their ties.
         """
         pinned = border.reshape(-1)
         members: dict[int, list[int]] = {}

@@ -72,8 +72,7 @@ def replace_shapes(step: Step, scene: Scene, keep: IndexArray, added: Scene, cou
 def remove_surplus(step: Step, count: int) -> Step:
     """Remove the shapes with the least removal costs until ``count`` are left, but none of earlier levels.
 
-    Returns:
-        the step for them, rendered.
+    Return the step for them, rendered.
     """
     state = step.state
     for rounds_left in range(SURPLUS_ROUNDS, 0, -1):

@@ -67,14 +67,8 @@ def new_shapes(
 
     Where there are too few components, the others are placed at random, in proportion to the error.
 
-    Args:
-        settings: of the run.
-        scene: the current shapes, for the canvas.
-        target: the image, shape (height, width, 3 or 4).
-        image: the render, of the same shape; both may be smaller than the canvas.
-        count: number of shapes.
-        rng: for random places.
-        weights: of the pixels' errors, shape (height, width); default: all equal.
+    ``scene`` has the canvas; the image ``target`` and the render ``image``, shape (height, width, 3 or 4),
+    may be smaller. ``weights``: of the pixels' errors, shape (height, width); default: all equal.
     """
     unit = scene.canvas.width / target.shape[1]
     total = squares(image - target)
@@ -175,11 +169,9 @@ def _bars(
 ) -> tuple[npt.NDArray[Any], ...]:
     """Return for each component 1 to ``number`` - 1 the straight bar with its area and second moments.
 
-    ``label``: component of the pixels at ``row`` and ``column``.
-
-    Returns:
-        centres [px], shape (component, 2), angles [rad], lengths and widths [px], and the share of the
-        component that the bar covers, estimated by how much the component spreads sideways.
+    ``label``: component of the pixels at ``row`` and ``column``. The result: centres [px], shape
+    (component, 2), angles [rad], lengths and widths [px], and the share of the component that the bar covers,
+    estimated by how much the component spreads sideways.
     """
     size = np.bincount(label, minlength=number)[1:]
 

@@ -1,9 +1,8 @@
 """Levels of detail in one file, from coarse to fine (after LIVE, Ma et al. 2022).
 
-Each level is one fit, which places new shapes in front of those of the earlier levels. The earlier ones keep
-moving, but their own picture, without the shapes in front, stays in the loss. So the first shapes are a
-picture of their own, nearly as good as a fit with so many shapes, and the whole is nearly as good as a fit
-without levels.
+Each level is one fit, which places new shapes in front of those of the earlier levels. These keep moving, but
+their own picture, without the shapes in front, stays in the loss: it is nearly as good as a fit with so many
+shapes, and the whole nearly as good as one without levels.
 """
 
 from __future__ import annotations

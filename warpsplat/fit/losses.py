@@ -39,14 +39,9 @@ class LossTarget:
     def __init__(
         self, target: FloatArray, backend: Backend, viewport: Viewport, importance: FloatArray | None = None
     ) -> None:
-        """Copy the target to the device.
+        """Copy the target (see ``Problem.target``) of the viewport's size to the device.
 
-        Args:
-            target: sRGB in [0, 1], shape (height, width, 3), of the viewport's size; or premultiplied with
-                opacity, shape (height, width, 4).
-            backend: where to compute.
-            viewport: of the render.
-            importance: weight of each pixel's error, shape (height, width), mean 1; default: all equal.
+        ``importance``: weight of each pixel's error, shape (height, width), mean 1; default: all equal.
         """
         self.target: wp.array = wp.array(to_tiles(target), dtype=column, device=backend.device)
         self.weighted = importance is not None

@@ -103,10 +103,8 @@ class Palette:
 def best_colors(step: Step, scene: Scene) -> FloatArray:
     """Return the colour of each shape with the least weighted squared error, all else as it is.
 
-    Least squares over its visible pixels; a shape without any keeps its own. Copies these to the host.
-
-    Returns:
-        sRGB, not clipped, shape (shape, 3).
+    Least squares over its visible pixels, which are copied to the host; a shape without any keeps its own.
+    The colours are sRGB, not clipped, shape (shape, 3).
     """
     step.render()
     seen = step.renderer.visible()
@@ -146,12 +144,8 @@ def _mean(scene: Scene, flat: FloatArray, stops: FloatArray) -> FloatArray:
 def main_colors(colors: FloatArray, weights: IndexArray, count: int) -> FloatArray:
     """Return the ``count`` 8-bit colours that represent ``colors`` best: k-means, farthest-first start.
 
-    A colour that makes up most of its cluster represents the cluster as it is.
-
-    ``colors``: sRGB in [0, 1], shape (color, 3); ``weights``: of the colours, shape (color,).
-
-    Returns:
-        shape (count or fewer, 3).
+    A colour that makes up most of its cluster represents the cluster as it is. ``colors`` and the result are
+    sRGB in [0, 1], shape (color, 3), with ``count`` rows or fewer; ``weights`` has shape (color,).
     """
     levels, which = np.unique(np.round(colors * 255), axis=0, return_inverse=True)
     totals = np.bincount(which.reshape(-1), weights=weights).astype(np.float64)

@@ -81,8 +81,7 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
 def reduced(target: FloatArray, sigma: float = 0.0) -> tuple[FloatArray, float]:
     """Return ``target`` so small that a blur by ``sigma`` [px of ``target``] takes no time.
 
-    Returns:
-        the image, ``target`` itself if it is small enough, and the pixels of ``target`` that a pixel spans.
+    Return also how many pixels of ``target`` a pixel spans; 1 if it is ``target`` itself.
     """
     height, width = target.shape[:2]
     span = max(np.sqrt(width * height / REDUCED_PIXELS), sigma / REDUCED_SIGMA)

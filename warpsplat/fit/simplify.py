@@ -24,13 +24,8 @@ MIN_POINTS_BETWEEN = 2
 def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexArray]:
     """Remove the points of splines that cost least, no two of them close to each other.
 
-    Args:
-        scene: any shapes; those of cubics stay as they are.
-        worth: cost of a unit of each shape's area, shape (shape,); at infinite worth all points stay.
-        count: points to remove, at most.
-
-    Returns:
-        the scene, and the rows of its points that stay.
+    ``worth``: cost of a unit of each shape's area, shape (shape,), by which at most ``count`` points go; at
+    infinite worth all stay. Return the scene, and the rows of its points that stay.
     """
     found: list[tuple[float, int, int, int, FloatArray]] = []
     for group in scene.alike():

@@ -29,13 +29,9 @@ class Target:
     """The image at the size of a phase, with weights of its pixels."""
 
     def __init__(self, image: FloatArray, phase: Phase, weights: FloatArray | None = None) -> None:
-        """Reduce the image and the weights to the phase's size, by area.
+        """Reduce an image (see ``Problem.target``) and weights to the phase's size, by area.
 
-        Args:
-            image: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
-                width, 4).
-            phase: the size.
-            weights: of the pixels, shape (height, width) of any size and scale; default: all equal.
+        ``weights``: of the pixels, shape (height, width) of any size and scale; default: all equal.
         """
         self.phase = phase
         height, width = image.shape[:2]

@@ -33,12 +33,9 @@ class Series:
     """Fits of ascending numbers of shapes, one after the other."""
 
     def __init__(self, settings: Settings, numbers: Sequence[int], *, shares: bool = True) -> None:
-        """Begin a series.
+        """Begin a series of fits of these ``numbers`` of shapes, all else by ``settings``.
 
-        Args:
-            settings: of all fits, except for the number of shapes.
-            numbers: of shapes.
-            shares: whether fits continue from one another.
+        ``shares``: whether fits continue from one another.
         """
         self._settings, self._shares = settings, shares
         self._numbers = sorted(numbers)
