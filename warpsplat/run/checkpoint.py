@@ -133,12 +133,7 @@ def open_checkpoint(
     return made
 
 
-def identity(
-    command: str,
-    settings: Settings,
-    problem: Problem,
-    svg: str | None = None,
-) -> dict[str, Any]:
+def identity(command: str, settings: Settings, problem: Problem, svg: str | None = None) -> dict[str, Any]:
     """Return everything that decides a run's result, as JSON has it."""
     mask = problem.importance
     return {

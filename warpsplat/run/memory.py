@@ -181,8 +181,7 @@ def factor_for(
 ) -> int:
     """Return how many times an image has to be reduced: a power of two, at least ``least``; see ``need``.
 
-    Raises:
-        ResourceError: the limit is too small for any size; the message begins with ``name``.
+    Raises ``ResourceError``, which begins with ``name``, if the limit is too small for any size.
     """
     limit, factor = memory_limit(settings), least
     while facts and limit is not None and (wanted := need(facts, settings, factor, mask)) > limit:

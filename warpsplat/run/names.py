@@ -141,12 +141,7 @@ def _text(value: Any) -> str:
 
 
 def check_outputs(errors: Sequence[ErrorAt], outputs: Sequence[Path]) -> None:
-    """Check before the run that every result can be written.
-
-    Raises:
-        UsageError: a folder that is a file, or cannot be written or made, a name that is too long, a
-            result that is a folder, a pipe, a device or a loop of links, or that needs a missing package.
-    """
+    """Raise one of ``errors`` before the run unless every result can be written, in its folder and format."""
     usable: set[Path] = set()
     for error_at, output in zip(errors, outputs, strict=True):
         folder = output.parent

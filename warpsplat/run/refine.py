@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image
 
 from warpsplat.errors import ImageError
 from warpsplat.files.sources import ImageSource, held, source_name
@@ -212,16 +211,10 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
     read = show(write_svg(scene, background=has_background), scene)
     if given.size != read.size:
         raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")
-    alike = likeness(given, read)
+    error = 0.0
+    for rows in rows_of(*given.size):  # strip by strip to save memory
+        a, b = (on_white(each.crop((0, rows.start, given.width, rows.stop))) for each in (given, read))
+        error += float(np.square(a - b).sum())
+    alike = decibels(error / (3 * given.width * given.height))
     if alike < MIN_ALIKE:
         raise ImageError(f"contains something that is not supported ({alike:.1f} dB from what could be read)")
-
-
-def likeness(one: Image.Image, other: Image.Image) -> float:
-    """Return the PSNR of two pictures of one size, on white [dB]; strip by strip to save memory."""
-    width, height = one.size
-    error = 0.0
-    for rows in rows_of(width, height):
-        a, b = (on_white(picture.crop((0, rows.start, width, rows.stop))) for picture in (one, other))
-        error += float(np.square(a - b).sum())
-    return decibels(error / (3 * width * height))
