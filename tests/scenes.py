@@ -131,7 +131,7 @@ def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> S
         points = [part.points - part.points.mean(axis=0) + [12 + 8 * i, 18] for part in parts]
         counts = [len(own) for own in points]
         shapes.append(
-            Scene.of(
+            Scene(
                 canvas(40, 36),
                 np.array([kind], np.int32),
                 np.array([0, sum(counts)], np.int32),
@@ -290,7 +290,7 @@ def polyline_scene(
         sides = [a + (b - a) * t for a, b in itertools.pairwise(ring) for t in (0, 1 / 3, 2 / 3)]
         points.append(np.array(sides if closed else [*sides, ring[-1]]))
     counts = np.array([len(own) for own in points])
-    return Scene.of(
+    return Scene(
         Canvas(*size, np.zeros(3, np.float32)),
         np.array([Kind.STROKE], np.int32),
         np.array([0, counts.sum()], np.int32),

@@ -89,7 +89,7 @@ def drawing(
         moved[members] += rng.normal(0, spread, 2) if spread else 0
         if len(set(owner[members])) > 1:
             same[members] = number
-    scene = Scene.of(
+    scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),
         starts_of(np.bincount(owner, minlength=len(shapes))),

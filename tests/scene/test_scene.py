@@ -45,7 +45,7 @@ def test_each_shape_has_a_basis() -> None:
     scene = mixed_scene()
     with pytest.raises(ValueError, match="basis has shape"):
         replace(scene, basis=scene.basis[1:])
-    empty = Scene.of(scene.canvas, scene.kind[:0], scene.first[:1], points=scene.points[:0])
+    empty = Scene(scene.canvas, scene.kind[:0], scene.first[:1], points=scene.points[:0])
     assert len(empty.basis) == 0
     cubics = random_scene(Kind.FILL)
     assert set(cubics.basis) == {Basis.CUBIC}

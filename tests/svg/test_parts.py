@@ -29,7 +29,7 @@ def squares(rings: list[np.ndarray], *, opacity: float = 0.5) -> Scene:
     """One even-odd shape between two others."""
     shapes = [[square(0, 0, 60)], rings, [square(4, 4, 20)]]
     flat = list(itertools.chain.from_iterable(shapes))
-    return Scene.of(
+    return Scene(
         Canvas(64, 48, np.ones(3, np.float32)),
         np.full(3, Kind.FILL, np.int32),
         starts_of(np.array([sum(map(len, own)) for own in shapes])),

@@ -126,7 +126,7 @@ def scene_of(
     counts = np.array([sum(map(len, outline.contours)) for outline in outlines], np.int32)
     styles = {dashes: i for i, dashes in enumerate(sorted({s.line.dashes for s in shapes if s.line} - {()}))}
     lines = [shape.line for shape in shapes]
-    scene = Scene.of(
+    scene = Scene(
         Canvas(width, height, background.astype(np.float32)),
         np.array([Kind.FILL if one is None else Kind.STROKE for one in lines], np.int32),
         starts_of(counts),

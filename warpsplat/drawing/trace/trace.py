@@ -132,7 +132,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
     colors = np.array([shape.coloring.color for shape in shapes]).reshape(-1, 4)
     has_ramp = np.array([shape.coloring.ramp is not None for shape in shapes], np.bool_)
     joints = np.concatenate([*map(joints_of, contours), np.zeros(0, np.int32)])
-    scene = Scene.of(
+    scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),
         starts_of(by_shape),
