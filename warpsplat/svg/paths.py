@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import NamedTuple
 
 import numpy as np
@@ -11,14 +10,9 @@ import numpy.typing as npt
 
 from warpsplat.portable.elementary import arctan2, cos, sin, tan
 from warpsplat.portable.linear import product
-from warpsplat.svg.inspect import ARGUMENTS, NUMBER
-from warpsplat.svg.values import after_space, numbers
+from warpsplat.svg.inspect import ARGUMENTS, COMMAND, numbers
 
 Points = npt.NDArray[np.float64]
-
-COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
-FLAG = re.compile(r"[01]")
-
 
 CLOSES = 1e-3
 """Largest distance [px] of a closed spline's start from the middle of its control points."""
@@ -68,7 +62,7 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
     pen = _Pen()
     for command, text in COMMAND.findall(data):
         size = ARGUMENTS[command.lower()]
-        values, is_whole = _arc_arguments(text) if command in "Aa" else numbers(text)
+        values, is_whole = numbers(text, of_arcs=size == 7)
         for i in range(0, max(len(values) - size + 1, 1 - size), max(size, 1)):
             # Further pairs after a move are lines.
             move_on = i and command in "Mm"
@@ -80,22 +74,6 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
         for points, is_closed, is_spline in pen.finish(keep_dots)
         if len(points) > 1
     ]
-
-
-def _arc_arguments(text: str) -> tuple[list[float], bool]:
-    """Return the numbers of arcs, and whether they are all of the text.
-
-    A flag is one character, and need not be separated from the next number.
-    """
-    values: list[float] = []
-    position = after_space(text, 0)
-    while position < len(text):
-        found = (FLAG if len(values) % 7 in {3, 4} else NUMBER).match(text, position)
-        if not found:
-            return values, False
-        values.append(float(found[0]))
-        position = after_space(text, found.end())
-    return values, True
 
 
 class _Pen:
