@@ -22,7 +22,7 @@ from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
-from warpsplat.svg.data import PathData, integers, spline_data
+from warpsplat.svg.data import integers, path_data, spline_data
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
@@ -65,7 +65,7 @@ def test_rounding_does_not_add_up(basis: Basis) -> None:
     """A thousand steps of 0.4 units: the end is at 400, not at 0."""
     points = np.stack([0.4 * np.arange(1000), np.zeros(1000)], axis=1).astype(np.float32)
     points[:, 1] = np.arange(1000) % 3  # no lines
-    data = PathData(Scene.uniform(Kind.STROKE, Canvas(400, 1, None), points[None], basis), 1).of(0)
+    (data,) = path_data(Scene.uniform(Kind.STROKE, Canvas(400, 1, None), points[None], basis), 1)
     (drawn,) = cubics(data, keep_dots=True)
     assert ("l" not in data and "c" in data) if basis == Basis.CUBIC else "t" in data
     assert drawn.points[-1, 0] == pytest.approx(400, abs=1)
@@ -74,7 +74,7 @@ def test_rounding_does_not_add_up(basis: Basis) -> None:
 @pytest.mark.parametrize("kind", list(Kind))
 def test_a_spline_is_one_quadratic_and_smooth_ones(kind: Kind) -> None:
     scene = random_scene(kind, count=1, basis=Basis.SPLINE, beziers=7)
-    data = PathData(scene, 10).of(0)
+    (data,) = path_data(scene, 10)
     assert re.fullmatch(r"M-?\d+[ -]\d+q[-\d ]+t[-\d ]+", data)
     assert len(steps_of(data.split("t")[0], "q")) == 2
     assert len(steps_of(data, "t")) == 6

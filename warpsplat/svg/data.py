@@ -6,7 +6,7 @@ Relative coordinates refer to the rounded position before, so that rounding erro
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -41,11 +41,8 @@ THIRD = 0.5 + 1e-9
 def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
     """Return which cubics a file shows as straight lines, by their first points, shape (point,).
 
-    Those are cubics with handles at the thirds, or with rounded handles on the line.
-
-    Args:
-        scene: The scene.
-        exact: Its points in units of the view box, shape (point, 2).
+    Those are cubics with handles at the thirds, or with rounded handles on the line. ``exact``: the points in
+    units of the view box, shape (point, 2).
     """
     found = np.zeros(len(exact), np.bool_)
     rows = cubic_rows(scene)
@@ -82,42 +79,42 @@ def cubic_rows(scene: Scene) -> IndexArray:
     return np.concatenate(rows).astype(np.intp) if rows else np.zeros((0, 4), np.intp)
 
 
-class PathData:
-    """The ``d`` attributes of a scene's shapes, with ``per_pixel`` units of the view box to a pixel."""
+def units(scene: Scene, per_pixel: float) -> Floats:
+    """Return the units of a file to a pixel for each point, shape (point, 1).
 
-    def __init__(self, scene: Scene, per_pixel: float) -> None:
-        spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
-        # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
-        unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
-        exact = scene.points.astype(np.float64) * unit
-        self._straight: list[bool] = straight_cubics(scene, exact).tolist()
-        grid = np.round(exact).astype(np.int64).tolist()
-        self._grid: list[Pair] = [(x, y) for x, y in grid]
-        self._starts, self._closed = scene.starts.tolist(), scene.closed.tolist()
-        self._contours = np.searchsorted(scene.starts, scene.first).tolist()
-        self._strokes = (scene.kind == Kind.STROKE).tolist()
-        self._splines = (scene.basis == Basis.SPLINE).tolist()
-        self._has_twin = np.append(scene.twin[1:], 0).tolist()
+    Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
+    """
+    spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
+    return np.where(spline, per_pixel / 2, per_pixel)[:, None]
 
-    def of(self, shape: int) -> str:
-        """Return the path data of one shape: its contours one after another."""
-        # A fill closes its contours, a stroke does not, and its dashes depend on the start.
-        is_stroked = bool(self._strokes[shape] or self._has_twin[shape])
+
+def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
+    """Yield the ``d`` attributes of a scene's shapes, with ``per_pixel`` units of the view box to a pixel."""
+    exact = scene.points.astype(np.float64) * units(scene, per_pixel)
+    straight = straight_cubics(scene, exact).tolist()
+    grid: list[Pair] = [(x, y) for x, y in np.round(exact).astype(np.int64).tolist()]
+    starts, closed = scene.starts.tolist(), scene.closed.astype(np.bool_).tolist()
+    contours = np.searchsorted(scene.starts, scene.first).tolist()
+    strokes = scene.kind == Kind.STROKE
+    # A fill closes its contours, a stroke does not, and its dashes depend on the start.
+    stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
+    for shape, is_spline in enumerate((scene.basis == Basis.SPLINE).tolist()):
         texts = []
         pen: Pair | None = None
-        for contour in range(*self._contours[shape : shape + 2]):
-            rows = slice(*self._starts[contour : contour + 2])
-            points, closed = self._grid[rows], bool(self._closed[contour])
-            if self._splines[shape]:
-                texts.append(spline_data(points, closed, may_rotate=not is_stroked))
-                texts.append("z" if closed and is_stroked else "")
+        for contour in range(*contours[shape : shape + 2]):
+            rows = slice(*starts[contour : contour + 2])
+            if is_spline:
+                texts.append(spline_data(grid[rows], closed[contour], may_rotate=not stroked[shape]))
+                texts.append("z" if closed[contour] and stroked[shape] else "")
                 continue
-            segments = segments_of(points, self._straight[rows][: len(points) - 2 : 3], closed)
-            if not self._strokes[shape]:  # only in a stroke does a dot show
+            segments = segments_of(
+                grid[rows], straight[rows][: rows.stop - rows.start - 2 : 3], closed[contour]
+            )
+            if not strokes[shape]:  # only in a stroke does a dot show
                 segments = [segment for segment in segments if segment.has_extent()]
-            text, pen = cubic_data(segments, points[0], closed, is_stroked, pen)
+            text, pen = cubic_data(segments, grid[rows.start], closed[contour], stroked[shape], pen)
             texts.append(text)
-        return "".join(texts)
+        yield "".join(texts)
 
 
 def cubic_data(

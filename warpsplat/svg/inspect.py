@@ -182,7 +182,9 @@ def numbers(text: str, *, of_arcs: bool = False) -> tuple[list[float], bool]:
         return [float(value) for value in NUMBER.findall(text)], True
     values: list[float] = []
     position = 0
-    while found := (NEXT_FLAG if of_arcs and len(values) % 7 in {3, 4} else NEXT_NUMBER).match(text, position):
+    while found := (NEXT_FLAG if of_arcs and len(values) % 7 in {3, 4} else NEXT_NUMBER).match(
+        text, position
+    ):
         values.append(float(found[1]))
         position = found.end()
     return values, of_arcs and SPACES.fullmatch(text, position) is not None

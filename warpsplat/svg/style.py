@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from xml.etree import ElementTree
 
 from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import power
-from warpsplat.svg.css import Declaration, declarations
+from warpsplat.svg.css import Declaration, Element, declarations, local_name
 from warpsplat.svg.inspect import LENGTH
 from warpsplat.svg.values import check_length, length
 
@@ -71,24 +70,18 @@ DRAWN = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
 """Elements that are shapes."""
 
 
-def element_style(element: ElementTree.Element, rules: Sequence[Declaration], parent: Style) -> Style:
-    """Return all properties of an element.
-
-    Args:
-        element: The element.
-        rules: Declarations of style sheets that apply to it, the strongest last.
-        parent: Style of its parent.
+def element_style(element: Element, rules: Sequence[Declaration], parent: Style) -> Style:
+    """Return all properties of an element, given the ``rules`` that apply to it, the strongest last.
 
     Raises:
         ImageError: A property has a value that shapes cannot show.
     """
     style = {**parent, **OWN}
-    tag = str(element.tag).rpartition("}")[2]
     for name, value in _cascade(element.attrib, rules).items():
         if len(element) and name in INHERITED:
             check_length(name, value)
         if name in GEOMETRY:
-            if tag in DRAWN:
+            if local_name(element) in DRAWN:
                 raise ImageError(f"sets {name} by style, not supported")
         elif "var(" in value:
             raise ImageError("uses variables in style, not supported")

@@ -16,7 +16,7 @@ from warpsplat.portable.elementary import power_of_ten
 from warpsplat.scene import ATTRIBUTES, NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
-from warpsplat.svg.data import PathData, held_points
+from warpsplat.svg.data import held_points, path_data, units
 from warpsplat.svg.groups import LEVEL_ID, Names, PathElement, color_names, nested, painted
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
@@ -51,8 +51,7 @@ def width_decimals(per_pixel: float) -> int:
 
 def rounded(scene: Scene, per_pixel: float) -> Scene:
     """Return ``scene`` rounded as a file with ``per_pixel`` units to a pixel has it."""
-    spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
-    per_unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
+    per_unit = units(scene, per_pixel)
     points, colors, opacities, widths = (
         values.astype(np.float64) for values in (scene.points, scene.colors, scene.opacities, scene.widths)
     )
@@ -86,7 +85,7 @@ class _Paths:
     ) -> None:
         """``ramps``: identifiers of gradients by shape; the rest is as for ``write_svg``."""
         self._scene, self._per_pixel = scene, per_pixel
-        self._data = PathData(scene, per_pixel)
+        self._data = list(path_data(scene, per_pixel))
         self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
         """Whether the next shape has the same path."""
         colors = hex_colors(scene.colors)
@@ -105,7 +104,7 @@ class _Paths:
 
         ``in_group``: the path is in a group of strokes. ``name``: the identifier's attribute.
         """
-        opacity, paint, data = self._opacities[shape], self._colors[shape], self._data.of(shape)
+        opacity, paint, data = self._opacities[shape], self._colors[shape], self._data[shape]
         own = name
         if self.has_twin[shape] and not alone:
             opacity += self._opacities[shape + 1]
