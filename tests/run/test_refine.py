@@ -22,8 +22,7 @@ from warpsplat.run.refine import likeness, refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.page import placed
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.read import load_kept, load_scene
 from warpsplat.svg.viewer import on_white, premultiplied, render_svg
 from warpsplat.svg.write import write_svg
 
@@ -75,7 +74,7 @@ def test_pictures_are_compared_strip_by_strip(monkeypatch: pytest.MonkeyPatch) -
     a, b = (Image.fromarray(rng.integers(0, 256, (23, 40, 4), dtype=np.uint8)) for _ in range(2))
     whole = psnr(on_white(a), on_white(b))
     for pixels in (1, 100, 10_000):
-        monkeypatch.setattr("warpsplat.svg.strips.STRIP_PIXELS", pixels)
+        monkeypatch.setattr("warpsplat.svg.viewer.STRIP_PIXELS", pixels)
         assert likeness(a, b) == pytest.approx(whole, abs=1e-9)
     assert likeness(a, a) == float("inf")
 

@@ -130,7 +130,7 @@ def _shown(text: str) -> np.ndarray:
 def test_foreign_files_look_the_same(name: str) -> None:
     text = HEAD + FOREIGN[name]
     scene, _ = load_scene(text, 40, 30, name)
-    shown = on_white(render_svg(text, width=40, height=30))
+    shown = on_white(render_svg(text, size=(40, 30)))
     # Strokes: resvg's antialiasing has 16 levels, and much of so small an image is edge.
     least = 34 if "stroke" in name else 38
     assert psnr(render(scene, backend=Backend.on("cpu")).astype(np.float64) * 255, shown) > least

@@ -21,8 +21,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.svg.document import Document
 from warpsplat.svg.excerpts import Excerpts
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.read import load_kept, load_scene
 from warpsplat.svg.viewer import on_white
 from warpsplat.svg.write import write_svg
 

@@ -23,14 +23,13 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.svg.data import integers, path_data, spline_data
-from warpsplat.svg.numbers import hex_colors, number
+from warpsplat.svg.inspect import NAMESPACE
+from warpsplat.svg.numbers import data_uri, hex_colors, number
 from warpsplat.svg.paths import cubics
 from warpsplat.svg.read import load_scene
-from warpsplat.svg.uri import data_uri
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,
-    NAMESPACE,
     SHORT,
     minified,
     read_metadata,

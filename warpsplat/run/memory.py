@@ -20,7 +20,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.native import machine_memory
 from warpsplat.rendering.memory import SHARE, in_words
 from warpsplat.scene import Kind
-from warpsplat.svg.strips import WHOLE_PIXELS
+from warpsplat.svg.viewer import WHOLE_PIXELS
 
 PROGRAM = 280 << 20
 """Bytes of Python, the libraries and compiled kernels."""

@@ -35,10 +35,8 @@ from warpsplat.run.tracking import recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import KeptScene, load_kept
-from warpsplat.svg.strips import rows_of
-from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.read import KeptScene, load_kept, load_scene
+from warpsplat.svg.viewer import on_white, render_svg, rows_of
 from warpsplat.svg.write import minified, shortened, write_svg
 
 if TYPE_CHECKING:
@@ -210,7 +208,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
     Raises:
         ImageError: they differ.
     """
-    given = render_svg(text, width=scene.canvas.width, height=scene.canvas.height)
+    given = render_svg(text, size=(scene.canvas.width, scene.canvas.height))
     read = show(write_svg(scene, background=has_background), scene)
     if given.size != read.size:
         raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")

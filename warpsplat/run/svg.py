@@ -16,8 +16,7 @@ from warpsplat.metrics import Score, score_svg
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.read import load_kept, load_scene
 from warpsplat.svg.write import minified
 
 SvgSource = str | os.PathLike[str] | bytes | Readable

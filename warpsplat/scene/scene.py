@@ -69,7 +69,7 @@ class Scene:
 
     Below, "shape (shape, 3)" is an array with a row for each shape and three columns.
 
-    Only ``canvas``, ``kind``, ``first`` and ``points`` must be given. By default, shapes are cubics, each has one
+    Only ``canvas``, ``kind``, ``first`` and ``points`` must be given. By default, shapes are cubics of one
     contour, closed in fills and open in strokes, traits have their defaults, and attributes are 0.
     """
 
@@ -199,7 +199,7 @@ class Scene:
         canvas: Canvas,
         points: FloatArray,
         basis: Basis = Basis.CUBIC,
-        **attributes: FloatArray,
+        **attributes: Any,
     ) -> Scene:
         """Return shapes of one kind and basis with control points of shape (shape, point, 2)."""
         count, each = points.shape[:2]
@@ -209,7 +209,7 @@ class Scene:
             each * np.arange(count + 1, dtype=np.int32),
             np.full(count, basis, np.int32),
             points=np.ascontiguousarray(points, np.float32).reshape(-1, 2),
-            **{name: np.asarray(values, np.float32) for name, values in attributes.items()},
+            **{name: np.asarray(values, np.float32) for name, values in attributes.items()},  # type: ignore[arg-type]
         )
 
     def shape_of(self, attribute: Attribute) -> tuple[int, ...]:

@@ -12,11 +12,10 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import determinant, product
-from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.document import Document, Element, Style, name_of
 from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, tight_box, translation
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Subpath
-from warpsplat.svg.style import Style
 from warpsplat.svg.values import Color, SvgViewport, check_length, fraction, parse_color
 
 

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from warpsplat.errors import UsageError, cut, shown
+from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import number
-from warpsplat.svg.write import GRIDS, MARK, NAMESPACE, own_head
+from warpsplat.svg.write import GRIDS, MARK, head_of, own_head
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
 """Length of a CSS unit [mm]."""
@@ -82,7 +83,7 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
     sides = [float(found[i]) * factor for i in (1, 2)]
     if not all(0 < side <= LARGEST for side in sides):
         raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {LARGEST:g} mm")
-    return Sheet(*sides, unit=unit)
+    return Sheet(sides[0], sides[1], unit=unit)
 
 
 def placed(text: str, size: str, page: str, unit: str) -> str:
@@ -151,8 +152,7 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
 
 def with_view(svg: str, view: str, width: int, height: int) -> str:
     """Return a file on a sheet with the view box ``view`` and the image's size [px]."""
-    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}"'
-    return VIEW.sub(head, svg, count=1)
+    return VIEW.sub(head_of(width, height, view).removesuffix(">"), svg, count=1)
 
 
 def on_sheet_of(svg: str, view: str, text: str) -> str:

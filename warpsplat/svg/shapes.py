@@ -15,12 +15,11 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.scene import Cap, Join, Picture, Rule
 from warpsplat.svg.css import ANIMATED
-from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.document import Document, Element, Style, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
 from warpsplat.svg.gradients import Colouring, FlatColor, resolve_paint
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Points, Subpath, cubics
-from warpsplat.svg.style import Style
 from warpsplat.svg.values import SvgViewport, fraction, length, lengths, parse_color
 
 MAX_EXTENT = 1e5

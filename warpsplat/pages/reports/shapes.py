@@ -17,7 +17,7 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import OPACITY_RANGE, FloatArray, Kind, Paint, Scene
 from warpsplat.svg.document import Document, Element
 from warpsplat.svg.numbers import hex_colors
-from warpsplat.svg.read_kept import KeptScene
+from warpsplat.svg.read import KeptScene
 
 ROUNDING = 1 / (12 * 255**2)
 """Mean squared error of rounding to 8 bits: an exact file has a finite PSNR by it."""
