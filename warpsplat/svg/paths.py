@@ -92,27 +92,22 @@ class _Pen:
         """Draw one command with the arguments of one node."""
         kind = command.lower()
         origin = self.at if command == kind else 0j
+        before, self.control = self.control, ("", 0j)
         if kind == "m":
             self._lift(False)
             self.at = self.start = origin + complex(v[0], v[1])
             self.points = [self.at]
-        elif kind == "z":
+            return
+        if kind == "z":
             # Relative coordinates return to the start up to rounding, which needs no further cubic.
             if not (_is_near(self.at.real, self.start.real) and _is_near(self.at.imag, self.start.imag)):
                 self._line(self.start)
                 self.is_spline = False
             self._lift(True)
-        else:
-            if not self.points:  # a subpath was closed before
-                self.points = [self.at]
-            # In a spline only the first command has a control point.
-            self.is_spline &= kind == ("t" if len(self.points) > 1 else "q")
-            self._segment(kind, v, origin)
             return
-        self.control = ("", 0j)
-
-    def _segment(self, kind: str, v: list[float], origin: complex) -> None:
-        control = ("", 0j)
+        self.points = self.points or [self.at]  # empty: a subpath was closed before
+        # In a spline only the first command has a control point.
+        self.is_spline &= kind == ("t" if len(self.points) > 1 else "q")
         if kind == "h":
             self._line(complex(origin.real + v[0], self.at.imag))
         elif kind == "v":
@@ -123,16 +118,15 @@ class _Pen:
             points = [origin + complex(x, y) for x, y in zip(v[::2], v[1::2], strict=True)]
             family = {"s": "c", "t": "q"}.get(kind, kind)
             if family != kind:  # smooth: the control point before, mirrored
-                points.insert(0, 2 * self.at - self.control[1] if self.control[0] == family else self.at)
+                points.insert(0, 2 * self.at - before[1] if before[0] == family else self.at)
             if family == "l":
                 self._line(points[0])
-            else:
-                control = (family, points[-2])
-                if family == "q":
-                    points = [(self.at + 2 * points[0]) / 3, (points[1] + 2 * points[0]) / 3, points[1]]
-                self.points += points
-                self.at = points[-1]
-        self.control = control
+                return
+            self.control = (family, points[-2])
+            if family == "q":
+                points = [(self.at + 2 * points[0]) / 3, (points[1] + 2 * points[0]) / 3, points[1]]
+            self.points += points
+            self.at = points[-1]
 
     def _lift(self, is_closed: bool) -> None:
         if self.points:

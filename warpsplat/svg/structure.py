@@ -12,7 +12,7 @@ from warpsplat.errors import ImageError, cause_of
 from warpsplat.portable.linear import determinant, product
 from warpsplat.svg.clip import clip_rectangle, clipped, overlap, polygon
 from warpsplat.svg.css import ancestors
-from warpsplat.svg.document import DRAWN, ROOT, Document, Element, Style, name_of
+from warpsplat.svg.document import DRAWN, ROOT, Document, Element, name_of
 from warpsplat.svg.geometry import (
     Matrix,
     about,
@@ -73,17 +73,9 @@ class _Unit:
 
 
 @dataclass(frozen=True)
-class _Context:
+class _Context(Placement):
     """Properties that an element inherits."""
 
-    style: Style
-    """Its parent's."""
-    matrix: Matrix
-    viewport: SvgViewport
-    paints: tuple[str, str]
-    """See ``Placement.context``."""
-    path: tuple[Element, ...]
-    """The links that led here."""
     depth: int
     use_size: tuple[float | None, float | None] = (None, None)
     """The size that a link gives a nested ``svg``."""
@@ -222,12 +214,9 @@ class _Walk:
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         end = _End(unit, len(self._shapes), fraction(style["opacity"]), clip)
         if tag in DRAWN:
-            place = Placement(style, matrix, viewport, context.paints, bool(context.path))
             own = element if self._keep and not context.link else None
-            self._shapes += [
-                replace(shape, element=own, level=context.level)
-                for shape in element_shapes(element, self._document, place)
-            ]
+            shapes = element_shapes(element, self._document, inner)
+            self._shapes += [replace(shape, element=own, level=context.level) for shape in shapes]
             self._end(end)
             return
         if inner.depth > MAX_DEPTH:
