@@ -9,7 +9,7 @@ import numpy as np
 
 from warpsplat.fit.constraints import Drawing
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
 
 Outline = tuple[np.ndarray, list[Joint]]

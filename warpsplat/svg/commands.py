@@ -42,11 +42,11 @@ class _Written(NamedTuple):
     before: _Written | None
 
     def text(self) -> str:
-        parts, last = [], self
-        while last.before:
+        parts, last = [self.added], self.before
+        while last:
             parts.append(last.added)
             last = last.before
-        return "".join([last.added, *reversed(parts)])
+        return "".join(reversed(parts))
 
 
 def minus(a: Pair, b: Pair) -> Pair:
@@ -127,9 +127,7 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
     A line that comes last need not be written.
     """
     behind = [segments[-1], *segments[:-1]]
-    commands = [
-        _commands(segment, before.mirrored()) for before, segment in zip(behind, segments, strict=True)
-    ]
+    commands = list(map(_commands, segments, (before.mirrored() for before in behind)))
     promise = []
     for i, (before, segment) in enumerate(zip(behind, segments, strict=True)):
         spared = 0

@@ -122,7 +122,7 @@ def cubic_data(
 ) -> tuple[str, Pair]:
     """Return the path data of a contour of lines and cubics, and where the pen is then.
 
-    In a stroke, a ring's joint is visible, and its start matters. ``pen``: where the pen is before, if anywhere.
+    In a stroke, a ring's joint is visible, and its start matters. ``pen``: where the pen is before, if at all.
     """
     if not segments:
         return f"M{integers([start])}z", start
@@ -138,8 +138,8 @@ def cubic_data(
 def spline_data(half: list[Pair], closed: bool, *, may_rotate: bool = True) -> str:
     """Return the path data of a spline: one quadratic, and smooth ones (SVG 1.1, 8.3.7).
 
-    ``half``: its points, in half of the numbers that are written. ``may_rotate``: whether a ring may start where
-    that takes the fewest characters.
+    ``half``: its points, in half of the numbers that are written. ``may_rotate``: a ring may start where that
+    takes the fewest characters.
     """
     if closed and may_rotate:
         start = _cheapest_start(half)

@@ -34,13 +34,12 @@ def attribute(attributes: Mapping[str, str], name: str, viewport: SvgViewport) -
 def outline(tag: str, attributes: Mapping[str, str], viewport: SvgViewport) -> str:
     """Return the path data of a shape element; empty: it draws nothing."""
 
-    def get(name: str) -> float:
-        return attribute(attributes, name, viewport) or 0.0
-
-    def radii() -> tuple[float, float]:
-        rx, ry = (attribute(attributes, name, viewport) for name in ("rx", "ry"))
-        rx, ry = (None if r is None or r < 0 else r for r in (rx, ry))
-        return (rx if rx is not None else ry) or 0.0, (ry if ry is not None else rx) or 0.0
+    def get(name: str, other: str = "") -> float:
+        """Return a length; if it is missing, or a negative radius, the ``other``, or 0."""
+        value = attribute(attributes, name, viewport)
+        if other and (value is None or value < 0):
+            value = max(get(other), 0.0)
+        return value or 0.0
 
     if tag == "path":
         return attributes.get("d", "")
@@ -50,9 +49,9 @@ def outline(tag: str, attributes: Mapping[str, str], viewport: SvgViewport) -> s
         return _poly(attributes.get("points", ""), closed=tag == "polygon")
     if tag == "rect":
         width, height = get("width"), get("height")
-        rx, ry = radii()
-        return _rect(get("x"), get("y"), width, height, min(rx, width / 2), min(ry, height / 2))
-    rx, ry = (get("r"), get("r")) if tag == "circle" else radii()
+        rx, ry = min(get("rx", "ry"), width / 2), min(get("ry", "rx"), height / 2)
+        return _rect(get("x"), get("y"), width, height, rx, ry)
+    rx, ry = (get("r"), get("r")) if tag == "circle" else (get("rx", "ry"), get("ry", "rx"))
     if not (rx > 0 and ry > 0):
         return ""
     x, y = get("cx"), get("cy")
@@ -148,8 +147,8 @@ def view_box_map(attributes: Mapping[str, str], width: float, height: float) -> 
     view = np.diag([*fit, 1.0])
     with np.errstate(all="ignore"):
         view[:2, 2] = shift - fit * (x, y)
-        if not np.isfinite(view).all():
-            raise ImageError("its viewBox is too far from the origin to be drawn")
+    if not np.isfinite(view).all():
+        raise ImageError("its viewBox is too far from the origin to be drawn")
     return view
 
 

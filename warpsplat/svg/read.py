@@ -36,11 +36,10 @@ from warpsplat.svg.document import Document, name_of
 from warpsplat.svg.excerpts import Excerpts
 from warpsplat.svg.gradients import FlatColor, Gradient
 from warpsplat.svg.inspect import NAMESPACE, svg_size
-from warpsplat.svg.kept import Kept, Part, shapes_of
 from warpsplat.svg.paints import unused
 from warpsplat.svg.paths import Points, Subpath, line
 from warpsplat.svg.shapes import Shape, opacity_of
-from warpsplat.svg.structure import read_parts, read_shapes
+from warpsplat.svg.structure import Kept, Part, read_parts, read_shapes, shapes_of
 from warpsplat.svg.viewer import premultiplied, render_svg
 
 

@@ -221,7 +221,7 @@ def _is_of_pixels(subpaths: list[Subpath]) -> bool:
         ends = subpath.points[::3]
         steps = np.diff(subpath.points, axis=0, append=subpath.points[:1])
         gaps = [*np.abs(steps).min(axis=1), *np.abs(ends - np.round(ends)).ravel()]
-        if not max(gaps) <= BETWEEN_PIXELS:
+        if not np.max(gaps) <= BETWEEN_PIXELS:
             return False
     return True
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from warpsplat.errors import ImageError, cause_of
 from warpsplat.portable.linear import determinant, product
-from warpsplat.svg.clip import clip_rectangle, clipped, overlap, polygon
+from warpsplat.svg.clip import clip_rectangle, clipped, overlap, polygon, within
 from warpsplat.svg.css import ancestors
 from warpsplat.svg.document import DRAWN, ROOT, Document, Element, name_of
 from warpsplat.svg.geometry import (
@@ -25,7 +26,6 @@ from warpsplat.svg.geometry import (
 from warpsplat.svg.gradients import FlatColor
 from warpsplat.svg.groups import LEVEL_ID
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
-from warpsplat.svg.kept import Keeping, Part, shapes_of
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Placement, Shape, element_shapes
 from warpsplat.svg.values import SvgViewport, fraction, parse_color
@@ -59,6 +59,25 @@ UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """Corners of a square of size 1."""
 
 CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An element that no shape can hold and a file keeps whole."""
+
+    element: Element
+    cause: str
+    """Why no shape can hold it."""
+    blends: bool
+    """Whether its colours depend on what lies below."""
+
+
+Part = Shape | Kept
+
+
+def shapes_of(parts: Sequence[Part]) -> list[Shape]:
+    """Return the parts that are shapes."""
+    return [part for part in parts if isinstance(part, Shape)]
 
 
 @dataclass(frozen=True)
@@ -158,7 +177,7 @@ class _Walk:
 
     def __init__(self, document: Document, *, keep: bool, see_through: bool) -> None:
         self._document, self._see_through = document, see_through
-        self._keep = Keeping(document) if keep else None
+        self._keep = keep
         self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
         self._linked = 0
@@ -184,10 +203,15 @@ class _Walk:
         try:
             step(*arguments)
         except ImageError as error:
-            if self._keep is None or unit.element is self._document.root:
+            if not self._keep or unit.element is self._document.root:
                 raise
             del self._todo[unit.depth :]
-            self._shapes[unit.first :] = [self._keep.part(unit.element, error)]
+            self._shapes[unit.first :] = [self._kept(unit.element, error)]
+
+    def _kept(self, element: Element, error: ImageError) -> Kept:
+        """Return a part for an element that cannot be read because of ``error``."""
+        texts = [self._document.css, *(child.get("style", "") for child in element.iter())]
+        return Kept(element, str(error), any("mix-blend-mode" in text for text in texts))
 
     def _enter(self, element: Element, context: _Context, unit: _Unit) -> None:
         tag = name_of(element)
@@ -305,17 +329,18 @@ class _Walk:
         Raises:
             ImageError: The shapes would look different.
         """
-        isolates = self._keep is not None and self._keep.isolates(end.unit.element)
+        isolates = "isolation" in self._document.css or "isolation" in end.unit.element.get("style", "")
+        isolates = self._keep and isolates
         if end.clip is None and end.opacity == 1 and not isolates:
             return
         parts = self._shapes[end.first :]
         self._work += len(parts) + (len(parts) ** 2 // PAIRS if end.opacity < 1 else 0)
         if self._work > MAX_WORK:
             raise ImageError("has too many shapes in nested groups with clips or opacity")
-        if self._keep:
-            parts = self._keep.inside(parts, end.clip)
-        elif end.clip is not None:
-            parts = [*clipped(shapes_of(parts), end.clip)]
+        if any(isinstance(part, Kept) and part.blends for part in parts):
+            raise ImageError("uses a blend mode in a group, not supported")
+        if end.clip is not None:
+            parts = list(self._clipped(parts, end.clip))
         if end.opacity < 1:
             shapes = shapes_of(parts)
             hides = end.opacity > 0 and not self._see_through and overlap(shapes)
@@ -324,6 +349,22 @@ class _Walk:
             faded = (replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes)
             parts = [*faded] if end.opacity > 0 else []
         self._shapes[end.first :] = parts
+
+    def _clipped(self, parts: list[Part], clip: Points) -> Iterator[Part]:
+        """Yield the parts inside a convex polygon; elements that cannot be cut are kept if that is allowed."""
+        if not self._keep:
+            yield from clipped(shapes_of(parts), clip)
+            return
+        inside = {id(shape) for shape in within(shapes_of(parts), clip)}
+        for _, run in groupby(parts, lambda part: id(part.element)):
+            alike = list(run)
+            shapes, element = shapes_of(alike), alike[0].element
+            try:
+                yield from alike if inside.issuperset(map(id, shapes)) else clipped(shapes, clip)
+            except ImageError as error:
+                if element is None:
+                    raise
+                yield self._kept(element, error)
 
     def _background(self, matrix: Matrix, viewport: SvgViewport) -> None:
         """Add the root's ``background-color``, which is painted below all shapes."""
