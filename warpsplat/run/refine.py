@@ -35,7 +35,7 @@ from warpsplat.run.tracking import recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
-from warpsplat.svg.read import KeptScene, load_kept, load_scene
+from warpsplat.svg.read import KeptScene, load_kept
 from warpsplat.svg.viewer import on_white, render_svg, rows_of
 from warpsplat.svg.write import minified, shortened, write_svg
 
@@ -182,10 +182,7 @@ def _load(text: str, problem: Problem, name: str, *, keep: bool) -> tuple[KeptSc
     target, settings = problem.target, problem.settings
     width, height = problem.size
     apart = settings.background != "none"
-    if keep:
-        base = load_kept(text, width, height, name, background_apart=apart)
-    else:
-        base = KeptScene(*load_scene(text, width, height, name, background_apart=apart), "")
+    base = load_kept(text, width, height, name, background_apart=apart, keep=keep)
     try:
         _check_read(text, base.scene, base.has_background)
     except ImageError as error:

@@ -122,7 +122,7 @@ def cubic_data(
 ) -> tuple[str, Pair]:
     """Return the path data of a contour of lines and cubics, and where the pen is then.
 
-    In a stroke, a ring's joint is visible, and its start matters. ``pen``: where the pen is before, if at all.
+    In a stroke, a ring's joint is visible, and its start matters. ``pen``: where the pen is before, if any.
     """
     if not segments:
         return f"M{integers([start])}z", start
@@ -144,25 +144,13 @@ def spline_data(half: list[Pair], closed: bool, *, may_rotate: bool = True) -> s
     if closed and may_rotate:
         start = _cheapest_start(half)
         half = half[start:] + half[:start]
-    joints, control = _joints(half, closed)
+    joints, control = spline_joints(half, closed)
     if max(abs(value) for joint in joints for value in joint) <= SMALL:
         return shortest_smooth(joints, control)
-    return _relative(joints, control)
+    return relative_smooth(joints, control)
 
 
-def even_spline_data(half: list[Pair], closed: bool) -> str:
-    """Return data as ``spline_data``, with commands that depend on the number of points alone."""
-    return _relative(*_joints(half, closed))
-
-
-def even_cubic_data(grid: list[Pair], closed: bool) -> str:
-    """Return relative cubics: commands depend on the number of points alone, and rings are not closed."""
-    chain = [*grid, grid[0]] if closed else grid
-    steps = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
-    return f"M{integers(grid[:1])}c{integers(steps)}"
-
-
-def _joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
+def spline_joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
     """Return where the quadratics of a spline meet, and the first one's control point."""
     ring = [half[-1], *half, half[0]] if closed else half
     joints = [(a + c, b + d) for (a, b), (c, d) in itertools.pairwise(ring)]
@@ -171,7 +159,8 @@ def _joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
     return joints, (2 * ring[1][0], 2 * ring[1][1])
 
 
-def _relative(joints: list[Pair], control: Pair) -> str:
+def relative_smooth(joints: list[Pair], control: Pair) -> str:
+    """Return path data of smooth quadratics through ``joints`` in relative commands only."""
     steps = [minus(after, before) for before, after in itertools.pairwise(joints)]
     text = f"M{integers(joints[:1])}q{integers([minus(control, joints[0]), steps[0]])}"
     return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text

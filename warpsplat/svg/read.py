@@ -7,10 +7,10 @@ cubics. A path that is filled and stroked becomes two shapes that share their po
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, groupby, pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -39,16 +39,11 @@ from warpsplat.svg.inspect import NAMESPACE, svg_size
 from warpsplat.svg.paints import unused
 from warpsplat.svg.paths import Points, Subpath, line
 from warpsplat.svg.shapes import Shape, opacity_of
-from warpsplat.svg.structure import Kept, Part, read_parts, read_shapes, shapes_of
+from warpsplat.svg.structure import Kept, Part, read_parts, shapes_of
 from warpsplat.svg.viewer import premultiplied, render_svg
 
-
-class _Outline(NamedTuple):
-    """The points of a shape in a scene's form."""
-
-    basis: Basis
-    contours: list[Points]
-    closed: list[bool]
+_Outline = tuple[Basis, list[Points], list[bool]]
+"""The points of a shape's contours in a scene's form, and which contours are closed."""
 
 
 def _ring(subpath: Subpath) -> Points:
@@ -60,24 +55,19 @@ def _ring(subpath: Subpath) -> Points:
     return points[:-1]
 
 
-def _outline(shape: Shape, is_stroked: bool) -> _Outline:
-    """Return the points of a shape. Contours that are only filled are closed, as filling closes them."""
-    closed = [subpath.is_closed or not is_stroked for subpath in shape.subpaths]
-    pairs = list(zip(shape.subpaths, closed, strict=True))
-    splines = [subpath.spline_ring() if ring else subpath.spline_chain() for subpath, ring in pairs]
-    contours = [spline for spline in splines if spline is not None]
-    if len(contours) == len(splines):
-        return _Outline(Basis.SPLINE, contours, closed)
-    return _Outline(
-        Basis.CUBIC, [_ring(subpath) if ring else subpath.points for subpath, ring in pairs], closed
-    )
-
-
-def _outlines(shapes: list[Shape]) -> list[_Outline]:
-    """Return the points of all shapes, the same for twins."""
+def _outlines(shapes: list[Shape]) -> Iterator[_Outline]:
+    """Yield the points of shapes, the same for twins. Contours that are only filled are closed."""
     twins = [shape.is_twin for shape in shapes] + [False]
-    stroked = [s.line is not None or a or b for s, a, b in zip(shapes, twins[:-1], twins[1:], strict=True)]
-    return [_outline(shape, is_stroked) for shape, is_stroked in zip(shapes, stroked, strict=True)]
+    for shape, *is_twin in zip(shapes, twins[:-1], twins[1:], strict=True):
+        is_stroked = shape.line is not None or any(is_twin)
+        closed = [subpath.is_closed or not is_stroked for subpath in shape.subpaths]
+        pairs = list(zip(shape.subpaths, closed, strict=True))
+        splines = [subpath.spline_ring() if ring else subpath.spline_chain() for subpath, ring in pairs]
+        contours = [spline for spline in splines if spline is not None]
+        if len(contours) == len(splines):
+            yield Basis.SPLINE, contours, closed
+        else:
+            yield Basis.CUBIC, [_ring(subpath) if ring else subpath.points for subpath, ring in pairs], closed
 
 
 def _is_background(shape: Shape, width: int, height: int) -> bool:
@@ -103,13 +93,8 @@ def load_scene(
     Raises:
         ImageError: Not an SVG, nothing drawn, or something that the scene cannot hold.
     """
-    try:
-        shapes = read_shapes(text, width, height)
-        if not shapes:
-            raise ImageError("draws no filled or stroked path")
-        return scene_of(shapes, width, height, background_apart)
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
+    read = load_kept(text, width, height, name, background_apart=background_apart, keep=False)
+    return read.scene, read.has_background
 
 
 def scene_of(
@@ -126,18 +111,18 @@ def scene_of(
     if has_background:
         background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # _is_background has checked
         shapes = shapes[1:]
-    outlines = _outlines(shapes)
-    contours = [points for outline in outlines for points in outline.contours]
-    counts = np.array([sum(map(len, outline.contours)) for outline in outlines], np.int32)
+    bases, rings, closed = zip(*_outlines(shapes), strict=True) if shapes else ((), (), ())
+    contours = list(chain.from_iterable(rings))
+    counts = np.array([sum(map(len, own)) for own in rings], np.int32)
     styles = {dashes: i for i, dashes in enumerate(sorted({s.line.dashes for s in shapes if s.line} - {()}))}
     lines = [shape.line for shape in shapes]
     scene = Scene(
         Canvas(width, height, background.astype(np.float32)),
         np.array([Kind.FILL if one is None else Kind.STROKE for one in lines], np.int32),
         starts_of(counts),
-        np.array([outline.basis for outline in outlines], np.int32),
+        np.array(bases, np.int32),
         starts=starts_of(np.array([len(points) for points in contours], np.int32)),
-        closed=np.array([c for outline in outlines for c in outline.closed], np.int32),
+        closed=np.array(list(chain.from_iterable(closed)), np.int32),
         points=np.concatenate([*contours, np.empty((0, 2))]).astype(np.float32),
         opacities=np.array([opacity_of(shape) for shape in shapes], np.float32),
         rule=np.array([shape.rule for shape in shapes], np.int32),
@@ -215,24 +200,28 @@ class KeptScene:
     """Whether the SVG itself has one."""
     kept: str
     """The kept elements in words; empty: there are none."""
-    document: Document | None = None
+    document: Document
     """The document that the scene was read from."""
-    elements: tuple[int | None, ...] = ()
+    elements: tuple[int | None, ...]
     """Index of the element that draws each shape, the root being 0; None: no single one does."""
-    background_element: int | None = None
+    background_element: int | None
     """Index of the element that is the background."""
 
 
-def load_kept(text: str, width: int, height: int, name: str, *, background_apart: bool = True) -> KeptScene:
-    """Read an SVG as ``read.load_scene`` does, but make pictures of elements that it refuses.
+def load_kept(
+    text: str, width: int, height: int, name: str, *, background_apart: bool = True, keep: bool = True
+) -> KeptScene:
+    """Read an SVG as ``load_scene`` does, but ``keep`` elements that it refuses, as pictures.
 
     Raises:
         ImageError: Not an SVG, no part that shapes can hold, or something that cannot be kept either.
     """
     try:
-        parts, document = read_parts(text, width, height, keep=True)
+        parts, document = read_parts(text, width, height, keep=keep)
         kept = [part for part in parts if isinstance(part, Kept)]
         shapes = _with_pictures(parts, kept, text, document, (width, height)) if kept else shapes_of(parts)
+        if not shapes and not keep:
+            raise ImageError("draws no filled or stroked path")
         scene, has_background = scene_of(shapes, width, height, background_apart)
         if (scene.paint == Paint.PICTURE).all():
             causes = f": {_in_words(kept)}" if kept else ""

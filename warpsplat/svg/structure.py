@@ -351,7 +351,7 @@ class _Walk:
         self._shapes[end.first :] = parts
 
     def _clipped(self, parts: list[Part], clip: Points) -> Iterator[Part]:
-        """Yield the parts inside a convex polygon; elements that cannot be cut are kept if that is allowed."""
+        """Yield the parts inside a convex polygon; elements that cannot be cut are kept if allowed."""
         if not self._keep:
             yield from clipped(shapes_of(parts), clip)
             return
