@@ -9,7 +9,7 @@ import pytest
 
 from tests.fit.pictures import picture, step_for
 from tests.runs import vectorize
-from tests.scenes import random_scene, with_two_stops
+from tests.scenes import random_scene, with_stops
 from warpsplat.fit.paints import choose_paints
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import psnr
@@ -90,7 +90,7 @@ def test_one_kind(device: str, kind: Paint) -> None:
 
 
 def test_a_circle_stays_one_in_training(device: str) -> None:
-    scene = with_two_stops(random_scene(Kind.FILL, 6, 64, 48, seed=1), seed=2)
+    scene = with_stops(random_scene(Kind.FILL, 6, 64, 48, seed=1), seed=2)
     frames = scene.frames.copy()
     frames[:4, 4:] = np.stack([-frames[:4, 3], frames[:4, 2]], axis=1)
     scene = replace(scene, frames=frames)
