@@ -38,10 +38,9 @@ def runs(scene: Scene) -> int:
 
 def overlapping(boxes: FloatArray) -> list[tuple[int, int]]:
     """Return the pairs of boxes less than ``MARGIN`` apart."""
-    low, high = boxes[:, :2].astype(np.float64), boxes[:, 2:].astype(np.float64)
+    low, high = np.split(boxes.astype(np.float64), 2, axis=1)
     gaps = np.maximum(low[:, None], low) - np.minimum(high[:, None], high)
-    pairs = np.argwhere(np.triu(gaps.max(axis=2) < MARGIN - 1e-4, 1))
-    return [(i, j) for i, j in pairs.tolist()]
+    return [(i, j) for i, j in np.argwhere(np.triu(gaps.max(axis=2) < MARGIN - 1e-4, 1)).tolist()]
 
 
 def check(scene: Scene, found: IndexArray) -> None:

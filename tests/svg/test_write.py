@@ -215,12 +215,8 @@ def test_fills_of_one_paint_that_lie_apart_are_one_path() -> None:
     rows = np.repeat([0, 1], scene.point_counts())
     for gap, count in ((20, 1), (3, 2)):
         places = np.array([[8, 20], [8 + gap, 20]])[rows]
-        alike = replace(
-            scene,
-            points=(points + places).astype(np.float32),
-            colors=np.repeat(scene.colors[:1], 2, axis=0),
-            opacities=np.full(2, 0.6, np.float32),
-        )
+        values = {"colors": scene.colors[[0, 0]], "opacities": np.full(2, 0.6, np.float32)}
+        alike = replace(scene, points=(points + places).astype(np.float32), **values)
         text = write_svg(alike, per_pixel=10)
         assert text.count("<path") == count
         shown = np.asarray(render_svg(text), np.int16)
@@ -256,9 +252,7 @@ def test_short_files_are_marked_by_the_order_of_their_attributes(kind: Kind, tmp
 def test_black_is_the_default_of_fills_but_not_of_strokes() -> None:
     for kind in Kind:
         scene = random_scene(kind, count=3)
-        colors = scene.colors.copy()
-        colors[1] = 0
-        scene = replace(scene, colors=colors)
+        scene.colors[1] = 0
         black = replace(scene, canvas=replace(scene.canvas, background=np.zeros(3, np.float32)))
         assert '<rect width="4000" height="3600"/>' in write_svg(black)
         read = load_scene(write_svg(black), 40, 36, "a.svg")[0].canvas.background
@@ -273,15 +267,10 @@ def test_neighbours_of_one_colour_share_a_group() -> None:
     """With the same colour, the same line, or both."""
     for kind in Kind:
         scene = random_scene(kind, count=6)
-        scene = replace(
-            scene,
-            colors=np.repeat(scene.colors[:2], 3, axis=0),
-            widths=np.full(6, scene.widths[0]),
-            opacities=np.ones(6, np.float32),
-        )
+        colors, widths = np.repeat(scene.colors[:2], 3, axis=0), np.full(6, scene.widths[0])
+        scene = replace(scene, colors=colors, widths=widths, opacities=np.ones(6, np.float32))
         text = write_svg(scene, per_pixel=5)
-        name = {Kind.FILL: "fill", Kind.STROKE: "stroke"}[kind]
-        assert text.count(f' {name}="#') == 2 + (kind == Kind.FILL)  # and the background's
+        assert text.count(f' {kind.name.lower()}="#') == 2 + (kind == Kind.FILL)  # and the background's
         assert text.count("stroke-width") == (2 if kind == Kind.STROKE else 0)
         back, _ = load_scene(text, 40, 36, "a.svg")
         held = rounded(scene, 5)
@@ -293,9 +282,7 @@ def test_neighbours_of_one_colour_share_a_group() -> None:
 def test_paths_are_named_by_their_colours() -> None:
     """Each once; the picture is the same, and what is read as well."""
     scene = mixed_scene(seed=3)
-    colors = scene.colors.copy()
-    colors[:3] = [[0, 0, 0.5], [0.01, 0, 0.52], [1, 0.84, 0]]
-    scene = replace(scene, colors=colors)
+    scene.colors[:3] = [[0, 0, 0.5], [0.01, 0, 0.52], [1, 0.84, 0]]
     text = write_svg(scene, per_pixel=5, ids=True)
     names = re.findall(r' id="([^"]*)"', text)
     assert len(names) == len(set(names)) == len(scene)
